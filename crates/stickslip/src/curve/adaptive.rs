@@ -118,14 +118,19 @@ impl Adaptive {
             if found.len() < middles.len() {
                 break;
             }
-            (points, open) = self.joined(points, &open, found);
+            (points, open) = self.insert_middles(points, &open, found);
         }
         Ok(points)
     }
 
     /// Inserts the middle points of the open intervals. Returns all points, and which of the new
     /// intervals are open.
-    fn joined<R>(&self, points: Vec<Kept<R>>, open: &[bool], middles: Vec<Kept<R>>) -> (Vec<Kept<R>>, Vec<bool>) {
+    fn insert_middles<R>(
+        &self,
+        points: Vec<Kept<R>>,
+        open: &[bool],
+        middles: Vec<Kept<R>>,
+    ) -> (Vec<Kept<R>>, Vec<bool>) {
         let all = || points.iter().chain(&middles).map(|(point, _)| &point.values);
         let count = all().map(Vec::len).max().unwrap_or(0);
         let largest = |quantity: usize| {
@@ -203,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_stopped_returns_what_is_there() {
+    fn stopping_returns_the_points_so_far() {
         let system = crate::model::example::blade_couple().assemble().unwrap();
         let adaptive = Adaptive { range: (700.0, 800.0), tolerance: 0.01 };
         assert!(adaptive.curve(&EventDriven, &system, &|_| vec![0.0], &|_| (), &|| true).unwrap().is_empty());

@@ -9,9 +9,9 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
 
-/// Two orbits differ if their amplitudes differ by more than `OTHER` times the largest
+/// Two orbits differ if their amplitudes differ by more than `DIFFERENCE` times the largest
 /// amplitude, and by more than `ERRORS` times the estimated error.
-const OTHER: f64 = 1e-2;
+const DIFFERENCE: f64 = 1e-2;
 const ERRORS: f64 = 3.0;
 /// Amplitudes below this fraction of a mean are rounding.
 const ROUNDING: f64 = 1e-10;
@@ -95,10 +95,13 @@ impl BothWays {
             let held = held(system, orbit.omega);
             // The reverse sweep estimates no errors, so an orbit that is reported is solved
             // again with an error estimate.
-            let shown = other(point, orbit, held).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
+            let shown =
+                amplitude_ratio(point, orbit, held).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
             // unstable orbits are not reported, because no motion stays on them
             let shown = shown.filter(|orbit| orbit.is_stable() != Some(false));
-            others.extend(shown.and_then(|orbit| other(point, &orbit, held).map(|ratio| Other { orbit, ratio })));
+            others.extend(
+                shown.and_then(|orbit| amplitude_ratio(point, &orbit, held).map(|ratio| Other { orbit, ratio })),
+            );
         })?;
         others.reverse();
         Ok(others)
@@ -134,7 +137,7 @@ fn amplitudes(orbit: &Orbit) -> Vec<f64> {
 /// Returns the ratio of the largest amplitude of an orbit to that of a point at the same
 /// frequency, if the two orbits differ. Amplitudes below `held` (m), or below the rounding of
 /// the means, count as zero.
-fn other(point: &Point, orbit: &Orbit, held: f64) -> Option<f64> {
+fn amplitude_ratio(point: &Point, orbit: &Orbit, held: f64) -> Option<f64> {
     if point.values.is_empty() {
         return None;
     }
@@ -142,7 +145,7 @@ fn other(point: &Point, orbit: &Orbit, held: f64) -> Option<f64> {
     let held = orbit.places.iter().map(|place| ROUNDING * place.mean.abs()).fold(held, f64::max);
     let largest = |values: &[f64]| values.iter().copied().fold(held.max(f64::MIN_POSITIVE), f64::max);
     let (here, there) = (largest(&point.values), largest(&found));
-    let enough = (OTHER.max(ERRORS * point.error) * here.max(there)).max(held);
+    let enough = (DIFFERENCE.max(ERRORS * point.error) * here.max(there)).max(held);
     let differs = point.values.iter().zip(&found).any(|(a, b)| (a - b).abs() > enough);
     differs.then(|| (there / here).clamp(f64::MIN_POSITIVE, f64::MAX))
 }

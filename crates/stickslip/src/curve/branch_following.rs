@@ -12,24 +12,24 @@ use num_complex::Complex64;
 
 /// Largest difference between two consecutive orbits of a branch, relative to the largest
 /// amplitude. It applies to amplitudes and to first harmonics, which include the phase.
-const STRIDE: f64 = 0.2;
+const MAX_CHANGE: f64 = 0.2;
 /// A step below this fraction of the interval is not halved again: the branch ends or turns
 /// there.
-const FINEST: f64 = 1.0 / 512.0;
+const MIN_STEP: f64 = 1.0 / 512.0;
 /// Maximum number of steps in an interval.
-const MOST: usize = 80;
+const MAX_STEPS: usize = 80;
 /// Work limit of all steps in an interval, as a fraction of the work limit of a point. After it
 /// is exceeded, no interval is repeated in smaller steps.
-const EFFORT: f64 = 0.3;
+const WORK_LIMIT: f64 = 0.3;
 /// Largest number of degrees of freedom plus joint directions for branch following and the
 /// reverse sweep, which takes as much time as the curve.
-const LARGE: usize = 24;
+const MAX_SIZE: usize = 24;
 
 /// Tells whether curves of a system use branch following and the reverse sweep: the system is
 /// small, and several orbits may exist at a frequency.
 pub fn is_followed(system: &System) -> bool {
     let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
-    system.dofs() + directions <= LARGE && !system.contracts()
+    system.dofs() + directions <= MAX_SIZE && !system.contracts()
 }
 
 /// Returns a solver with branch following for systems that use it; otherwise the method's own
@@ -40,7 +40,7 @@ pub fn is_followed(system: &System) -> bool {
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = advised(method, system)?;
     Ok(if is_followed(system) {
-        Box::new(BranchFollower { solver, last: None, told: None, end: None, spent: false })
+        Box::new(BranchFollower { solver, last: None, announced: None, end: None, work_limit_reached: false })
     } else {
         solver
     })
@@ -50,12 +50,12 @@ struct BranchFollower<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     last: Option<BranchPoint>,
     /// The orbit that [`Solver::begin_at`] announced.
-    told: Option<BranchPoint>,
+    announced: Option<BranchPoint>,
     /// The end of a branch at which smaller steps failed.
     end: Option<BranchEnd>,
     /// True after the steps in an interval exceeded the work limit. No interval is repeated
     /// after that.
-    spent: bool,
+    work_limit_reached: bool,
 }
 
 /// The end of a branch: the last orbit on it, and a nearby frequency (rad/s) at which the branch
@@ -89,7 +89,7 @@ impl BranchPoint {
     }
 
     /// Tells whether an orbit can be the next one of the branch.
-    fn leads_to(&self, orbit: &Orbit) -> bool {
+    fn may_precede(&self, orbit: &Orbit) -> bool {
         self.is_near(&BranchPoint::new(orbit))
     }
 
@@ -97,7 +97,7 @@ impl BranchPoint {
     fn is_near(&self, other: &BranchPoint) -> bool {
         let pairs = || self.places.iter().zip(&other.places);
         let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
-        pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= STRIDE * largest)
+        pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= MAX_CHANGE * largest)
     }
 }
 
@@ -108,10 +108,10 @@ impl BranchFollower<'_> {
 
     fn next(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
         let mut found = self.solve(omega, start, between);
-        let known = [&self.last, &self.told].into_iter().flatten().find(|last| start == Some(&last.start[..]));
+        let known = [&self.last, &self.announced].into_iter().flatten().find(|last| start == Some(&last.start[..]));
         if let (Some(last), Ok(orbit)) = (known, &found)
-            && !self.spent
-            && !last.leads_to(orbit)
+            && !self.work_limit_reached
+            && !last.may_precede(orbit)
             && self.end.as_ref().is_none_or(|end| !end.lies_between(last, omega))
             && let Some(orbit) = self.followed(last.clone(), omega, between)
         {
@@ -126,21 +126,22 @@ impl BranchFollower<'_> {
         let from = last.omega;
         let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
         let mut beyond;
-        for _ in 0..MOST {
+        for _ in 0..MAX_STEPS {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
             let found = self.solve(target, Some(&last.start), between || !arrives);
             effort += self.solver.effort();
-            self.spent = effort > EFFORT || matches!(found, Err(OrbitError::NotConverged { spent: true, .. }));
-            match found.ok().filter(|orbit| last.leads_to(orbit)) {
+            self.work_limit_reached =
+                effort > WORK_LIMIT || matches!(found, Err(OrbitError::NotConverged { spent: true, .. }));
+            match found.ok().filter(|orbit| last.may_precede(orbit)) {
                 Some(orbit) if arrives => return Some(orbit),
-                _ if self.spent => return None,
+                _ if self.work_limit_reached => return None,
                 Some(orbit) => (last, at, step, beyond) = (BranchPoint::new(&orbit), share, 2.0 * step, omega),
                 None => (step, beyond) = (0.5 * step, target),
             }
             step = step.min(1.0 - at);
-            if step < FINEST {
+            if step < MIN_STEP {
                 self.end = Some(BranchEnd { last, beyond });
                 return None;
             }
@@ -163,9 +164,9 @@ impl Solver for BranchFollower<'_> {
     }
 
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
-        if [&self.last, &self.told].into_iter().flatten().all(|last| last.start != start) {
+        if [&self.last, &self.announced].into_iter().flatten().all(|last| last.start != start) {
             let orbit = self.solver.between(omega, Some(start));
-            self.told = orbit.ok().map(|orbit| BranchPoint { start: start.to_vec(), ..BranchPoint::new(&orbit) });
+            self.announced = orbit.ok().map(|orbit| BranchPoint { start: start.to_vec(), ..BranchPoint::new(&orbit) });
         }
         self.solver.begin_at(omega, start);
     }
@@ -208,7 +209,13 @@ mod tests {
         let asked = std::sync::Arc::default();
         let solver = EventDriven.solver(&system).unwrap();
         let solver = Slow { solver, effort, asked: std::sync::Arc::clone(&asked) };
-        let mut onward = Onward { solver: Box::new(solver), last: None, told: None, end: None, spent: false };
+        let mut onward = BranchFollower {
+            solver: Box::new(solver),
+            last: None,
+            announced: None,
+            end: None,
+            work_limit_reached: false,
+        };
         let mut start: Option<Vec<f64>> = None;
         let mut amplitudes = Vec::new();
         for hertz in [119.5, 120.5, 121.5] {
@@ -216,7 +223,7 @@ mod tests {
             amplitudes.push(orbit.places[0].amplitude());
             start = Some(orbit.start);
         }
-        assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > STRIDE), "{amplitudes:?}");
+        assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > MAX_CHANGE), "{amplitudes:?}");
         asked.load(std::sync::atomic::Ordering::Relaxed)
     }
 
@@ -236,13 +243,19 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_a_branch_is_sought_once() {
+    fn the_end_of_a_branch_is_located_once() {
         let system = crate::model::example::blade_couple().assemble().unwrap();
         let asked: std::sync::Arc<std::sync::atomic::AtomicUsize> = std::sync::Arc::default();
         let from = TAU * 119.5;
         let solver = EventDriven.solver(&system).unwrap();
         let solver = Ends { solver, end: from + 0.2, asked: std::sync::Arc::clone(&asked) };
-        let mut onward = Onward { solver: Box::new(solver), last: None, told: None, end: None, spent: false };
+        let mut onward = BranchFollower {
+            solver: Box::new(solver),
+            last: None,
+            announced: None,
+            end: None,
+            work_limit_reached: false,
+        };
         let start = onward.orbit(from, None).unwrap().start;
         let count = || asked.load(std::sync::atomic::Ordering::Relaxed);
         let mut searches = |beyond: f64| {
@@ -259,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_that_takes_too_long_is_the_last() {
+    fn no_interval_is_repeated_after_the_work_limit() {
         assert!(searches(0.0) > 6, "a way without searches tests nothing");
         assert_eq!((searches(1.0), searches(0.2)), (1, 2));
     }

@@ -86,10 +86,10 @@ pub enum TraceError {
 const ROUNDING: f64 = 1e-9;
 /// Relative width at which the search for a peak ends. The height of a smooth peak is then
 /// accurate to rounding, that of a kink to about this fraction.
-const LOCATED: f64 = 1e-9;
+const PEAK_TOLERANCE: f64 = 1e-9;
 /// Two points at the same parameter are equal if their unknowns differ by less than this
 /// fraction.
-const SAME: f64 = 1e-6;
+const EQUAL_POINTS: f64 = 1e-6;
 
 /// A point, with its unknowns and its parameter.
 type PathPoint = (TracePoint, (Vec<f64>, f64));
@@ -117,7 +117,7 @@ impl CurvePart {
             let leaves = end == End::Border && !self.single;
             let Some((_, last)) = self.points.last().filter(|_| leaves) else { return end };
             match CurvePart::excursion(equations, last.clone(), steps) {
-                Some(back) if !self.has(&back.0) => from = back,
+                Some(back) if !self.contains(&back.0) => from = back,
                 _ => return end,
             }
         }
@@ -151,10 +151,10 @@ impl CurvePart {
     }
 
     /// Tells whether the curve contains a point at a border of the range.
-    fn has(&self, (x, value): &(Vec<f64>, f64)) -> bool {
+    fn contains(&self, (x, value): &(Vec<f64>, f64)) -> bool {
         let distance = |other: &[f64]| x.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
         let size = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        self.points.iter().any(|(_, (other, at))| at == value && distance(other) <= SAME * size)
+        self.points.iter().any(|(_, (other, at))| at == value && distance(other) <= EQUAL_POINTS * size)
     }
 }
 
@@ -197,20 +197,20 @@ impl Trace<'_> {
             before.points.reverse();
             way.points.splice(..0, before.points);
         }
-        let mut branch = self.told(&mut equations, way, end);
+        let mut branch = self.with_peaks_and_turns(&mut equations, way, end);
         if end == End::Border && !branch.reaches(self.range.1) {
             let mut way = CurvePart { single, ..CurvePart::default() };
             if let Ok(start) = equations.start(self.range.1) {
                 way.follow(&mut equations, (start, self.range.1), Steps { direction: -steps.direction, ..steps });
             }
             way.points.reverse();
-            branch.append(self.told(&mut equations, way, end));
+            branch.append(self.with_peaks_and_turns(&mut equations, way, end));
         }
         Ok(branch)
     }
 
     /// Computes peaks and turning points of the curve.
-    fn told(&self, equations: &mut BranchEquations<'_>, way: CurvePart, end: End) -> Branch {
+    fn with_peaks_and_turns(&self, equations: &mut BranchEquations<'_>, way: CurvePart, end: End) -> Branch {
         let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = way.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
         let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
@@ -240,7 +240,7 @@ impl Trace<'_> {
             let orbit = equations.near(&arc[1].0, value);
             orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit))
         };
-        let close = |a: f64, b: f64| (b - a).abs() <= LOCATED * (a.abs() + b.abs());
+        let close = |a: f64, b: f64| (b - a).abs() <= PEAK_TOLERANCE * (a.abs() + b.abs());
         let Ok(found) = maximum((a, b), close, |value| Ok::<_, Infallible>(height(value)));
         if found.1 > best.1 { found } else { best }
     }

@@ -104,7 +104,7 @@ pub struct ModeRequest {
 }
 
 /// Displacements of places below this fraction of a mode's largest coordinate are rounding.
-const UNSEEN: f64 = 1e-12;
+const PLACE_ROUNDING: f64 = 1e-12;
 
 /// Checks that a system can have nonlinear modes.
 ///
@@ -143,7 +143,8 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     let last = request.points.max(2) - 1;
     let followed = ModeBranches::new(&mut equations, request);
     let larger = |a: &(f64, ModeState), b: &(f64, ModeState)| a.1.damping.total_cmp(&b.1.damping);
-    let largest = followed.curves().filter_map(|curve| curve.largest(&mut equations, (low, high))).max_by(larger);
+    let largest =
+        followed.curves().filter_map(|curve| curve.largest_damping(&mut equations, (low, high))).max_by(larger);
     let merges = followed.curves().flat_map(|curve| curve.merges(&equations)).filter(|a| (low..high).contains(a));
     let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.at < high);
     let mut mode = Mode {
@@ -157,7 +158,7 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     };
     for i in 0..=last {
         let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
-        match followed.curves().find_map(|curve| curve.at(&mut equations, amplitude)) {
+        match followed.curves().find_map(|curve| curve.state_at(&mut equations, amplitude)) {
             Some(state) => mode.points.push(point(&equations, amplitude, &state)),
             None if followed.passes(amplitude) => mode.missing.push(amplitude),
             None => {}
@@ -179,16 +180,16 @@ impl ModeBranches {
         // A single mode has the same number at both ends. For a law with memory, large motions
         // are expensive, so the branch from small amplitudes is tried first.
         let rising = match equations.is_alone_with_memory() {
-            true => ModeCurve::from_rest(equations, request.mode, request.range),
+            true => ModeCurve::from_small_amplitude(equations, request.mode, request.range),
             false => None,
         };
-        if rising.as_ref().is_some_and(|rising| rising.top() >= high) {
+        if rising.as_ref().is_some_and(|rising| rising.largest_amplitude() >= high) {
             return ModeBranches { falling: None, rising };
         }
         let falling = ModeCurve::follow(equations, request.mode, request.range);
-        let end = falling.end().min(high);
+        let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.lost.is_some() && end > low;
-        let below = if is_sought { ModeCurve::from_rest(equations, request.mode, (low, end)) } else { None };
+        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, (low, end)) } else { None };
         ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
 
@@ -198,8 +199,8 @@ impl ModeBranches {
 
     /// Tells whether a branch passes an amplitude.
     fn passes(&self, amplitude: f64) -> bool {
-        self.falling.as_ref().is_some_and(|curve| amplitude > curve.end())
-            || self.rising.as_ref().is_some_and(|curve| amplitude < curve.top())
+        self.falling.as_ref().is_some_and(|curve| amplitude > curve.smallest_amplitude())
+            || self.rising.as_ref().is_some_and(|curve| amplitude < curve.largest_amplitude())
     }
 
     /// Returns amplitude and cause of the end of the mode, if it ends above the smallest
@@ -208,9 +209,9 @@ impl ModeBranches {
         let falling = self.falling.as_ref()?;
         let lost = falling.lost?;
         match &self.rising {
-            Some(rising) if rising.top() >= falling.end().min(high) => None,
+            Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
             Some(rising) if lost.reason == Reason::NoBeginning => {
-                Some(Lost { at: rising.top(), reason: Reason::FromRest })
+                Some(Lost { at: rising.largest_amplitude(), reason: Reason::FromRest })
             }
             _ => Some(lost),
         }
@@ -232,7 +233,7 @@ pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     Ok(equations.linear_modes().get(index).and_then(|linear| {
         let shape = linear.shape.as_slice();
         let largest = size(&displacements(equations.at_places(shape)));
-        (largest > UNSEEN * size(shape)).then(|| 1.0 / largest)
+        (largest > PLACE_ROUNDING * size(shape)).then(|| 1.0 / largest)
     }))
 }
 
@@ -245,7 +246,7 @@ pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoi
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let path = ModeCurve::follow(&mut equations, request.mode, request.range);
     let mut orbits = Vec::new();
-    for pair in path.within(&mut equations, request.range).windows(2) {
+    for pair in path.states_within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
         // The curve turns between states that are not consecutive, and the damping jumps.
         if (upper.damping < 0.0) == (lower.damping < 0.0) || k - i > 1 {
@@ -256,7 +257,7 @@ pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoi
         let (mut a, mut fa, mut b, mut fb) = (below.ln(), lower.damping, above.ln(), upper.damping);
         for _ in 0..100 {
             let c = (a * fb - b * fa) / (fb - fa);
-            let Some(state) = path.at(&mut equations, c.exp()) else { break };
+            let Some(state) = path.state_at(&mut equations, c.exp()) else { break };
             let fc = state.damping;
             found = Some((c.exp(), state));
             if fc == 0.0 || (b - a).abs() < 1e-14 || fc.abs() < 1e-15 {
@@ -303,7 +304,7 @@ mod tests {
     /// while the dampers stick. The frequency is that of the wave with one nodal diameter,
     /// `√((k + 4 kt sin²(π/N))/m)`.
     #[test]
-    fn the_modes_of_a_tuned_ring_go_down_to_where_all_sticks() {
+    fn modes_of_a_tuned_ring_reach_full_stick() {
         let (blades, k, kt) = (6, 4.0, 0.8);
         let system = ring(blades);
         let request = ModeRequest { mode: 1, range: (1e-6, 1e-2), points: 5, harmonics: 3, samples: 128 };
@@ -391,7 +392,7 @@ mod tests {
     /// At a cubic stiffness of a million times the linear one, the linear mode is not a useful
     /// initial guess.
     #[test]
-    fn a_cubic_spring_is_followed_to_where_it_is_all_there_is() {
+    fn a_dominant_cubic_spring_has_the_elliptic_solution() {
         let (k, b) = (1e4, 1e9);
         let quarter = |m: f64| {
             let (mut x, mut y) = (1.0, (1.0 - m).sqrt());
@@ -440,7 +441,7 @@ mod tests {
     /// A mass with rigid friction that falls with velocity does not vibrate if friction is
     /// thousands of times the spring force. The curve ends there after some hundred steps.
     #[test]
-    fn a_mode_is_left_where_nothing_vibrates() {
+    fn an_overdamped_mode_ends() {
         let mut model = Model::default();
         let between = || ["m".to_owned(), GROUND.to_owned()];
         model.masses.push(Mass::new("m", 1.0));
@@ -461,7 +462,7 @@ mod tests {
     /// and its energy loss `2 π ζ ω² Σ h² Xₕᴴ M Xₕ` under these forces. With positive damping
     /// its orbit is unique.
     #[test]
-    fn the_exact_orbit_under_the_forces_of_a_mode_is_the_mode() {
+    fn a_mode_equals_the_forced_exact_orbit() {
         let mut couple = example::blade_couple();
         couple.joints[0].law = std::sync::Arc::new(Coulomb { limit: 8.0 });
         let system = couple.assemble().unwrap();
@@ -470,7 +471,7 @@ mod tests {
         for index in [0, 1] {
             let path = ModeCurve::follow(&mut equations, index, (1e-4, 2e-2));
             for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
-                let state = path.at(&mut equations, amplitude).unwrap();
+                let state = path.state_at(&mut equations, amplitude).unwrap();
                 let n = system.dofs();
                 let mut model = couple.clone();
                 model.forces.clear();

@@ -63,7 +63,7 @@ pub struct PerformanceCurve {
 
 /// Peaks that differ by less than this fraction of the highest are equal. Orbits are accurate to
 /// about 1e-10, and smaller differences do not matter to a design.
-const SAME: f64 = 1e-9;
+const EQUAL_PEAKS: f64 = 1e-9;
 
 /// Returns the height of a row; infinity without a peak.
 fn height(row: &Row) -> f64 {
@@ -74,7 +74,10 @@ fn height(row: &Row) -> f64 {
 fn lowest(rows: &[Row]) -> Vec<usize> {
     let heights = || rows.iter().map(height).filter(|height| height.is_finite());
     let (least, most) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));
-    (0..rows.len()).filter(|row| height(&rows[*row]) <= least + SAME * most).filter(|_| least.is_finite()).collect()
+    (0..rows.len())
+        .filter(|row| height(&rows[*row]) <= least + EQUAL_PEAKS * most)
+        .filter(|_| least.is_finite())
+        .collect()
 }
 
 impl PerformanceCurve {
@@ -103,7 +106,7 @@ pub enum PerformanceError<E> {
 
 /// Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10, and the
 /// curve is flat to second order or kinked at the optimum.
-const BRACKET: f64 = 1e-7;
+const OPTIMUM_TOLERANCE: f64 = 1e-7;
 
 impl<E: Send> Performance<'_, E> {
     /// Computes the peak at one value of the parameter.
@@ -193,7 +196,7 @@ impl<E: Send> Performance<'_, E> {
     /// between two branches.
     fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
         let mut best = middle;
-        let close = |a: f64, b: f64| b - a <= BRACKET * (a.abs() + b.abs());
+        let close = |a: f64, b: f64| b - a <= OPTIMUM_TOLERANCE * (a.abs() + b.abs());
         maximum((low, high), close, |value| {
             let row = self.peak(value)?;
             if height(&row) < height(&best) {

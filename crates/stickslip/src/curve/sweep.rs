@@ -98,22 +98,22 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
             see(omega, None);
             continue;
         }
-        let (outcome, led) = (solver.orbit(omega, start.as_deref()), start.is_some());
+        let (outcome, had_guess) = (solver.orbit(omega, start.as_deref()), start.is_some());
         (watch.finished)();
         // After a failure, the next point has no initial guess, because the last orbit may be
         // far away.
         start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
         let found = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
-        missing.push(PendingPoint { omega, outcome, led });
+        missing.push(PendingPoint { omega, outcome, had_guess });
         if found.is_none() && omegas.peek().is_some() {
             continue;
         }
         if let Some(behind) = found {
             let before = missing.len() - 1;
-            from_behind(solver, &behind, &mut missing[..before], watch);
+            solve_missing_in_reverse(solver, &behind, &mut missing[..before], watch);
         }
         for point in &mut missing {
-            point.seek_alone(solver, watch);
+            point.solve_without_guess(solver, watch);
             see(point.omega, Some(point.outcome.as_ref()));
         }
         missing.clear();
@@ -154,27 +154,29 @@ struct PendingPoint {
     omega: f64,
     outcome: Result<Orbit, OrbitError>,
     /// True if the search began from the previous orbit.
-    led: bool,
+    had_guess: bool,
 }
 
 impl PendingPoint {
     /// Tells whether another initial guess may help. It does not for a series that is too short.
-    fn is_sought_again(&self) -> bool {
+    fn may_succeed_from_another_guess(&self) -> bool {
         self.outcome.as_ref().is_err_and(|error| !matches!(error, OrbitError::Truncation { .. }))
     }
 
     /// Solves the point without initial guess, if the searches from its neighbours failed.
-    fn seek_alone(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
-        if self.led && self.is_sought_again() && !watch.stop.load(Ordering::Relaxed) {
+    fn solve_without_guess(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
+        if self.had_guess && self.may_succeed_from_another_guess() && !watch.stop.load(Ordering::Relaxed) {
             self.outcome = solver.orbit(self.omega, None).or(self.outcome.clone());
         }
     }
 }
 
 /// Solves the missing points in reverse from the next orbit, until one of them fails.
-fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [PendingPoint], watch: Watch<'_>) {
+fn solve_missing_in_reverse(solver: &mut dyn Solver, behind: &[f64], missing: &mut [PendingPoint], watch: Watch<'_>) {
     let mut start = behind.to_vec();
-    for PendingPoint { omega, outcome, led } in missing.iter_mut().rev().take_while(|point| point.is_sought_again()) {
+    for PendingPoint { omega, outcome, had_guess } in
+        missing.iter_mut().rev().take_while(|point| point.may_succeed_from_another_guess())
+    {
         if watch.stop.load(Ordering::Relaxed) {
             return;
         }
@@ -185,7 +187,7 @@ fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [PendingPo
             }
             Err(error) => {
                 // a search that exhausted the work limit is not repeated
-                *led &= !matches!(error, OrbitError::NotConverged { spent: true, .. });
+                *had_guess &= !matches!(error, OrbitError::NotConverged { spent: true, .. });
                 return;
             }
         }
@@ -245,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn points_beyond_a_fold_are_found_from_behind_and_seen_in_order() {
+    fn points_beyond_a_fold_are_solved_in_reverse_and_reported_in_order() {
         let omegas: Vec<f64> = (0..8).map(|i| 750.0 + 5.0 * f64::from(i)).collect();
         let found = outcomes((757.0, 773.0), &omegas);
         assert_eq!(found, omegas.iter().map(|omega| (*omega, true)).collect::<Vec<_>>());

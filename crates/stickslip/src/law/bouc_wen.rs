@@ -9,7 +9,7 @@
 //! The law gives no energy in a closed motion for any `beta >= 0`: at the same z, the slope in
 //! loading does not exceed that in unloading.
 
-use super::kernels::kink::{power, size};
+use super::kernels::kink::{abs, power};
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ const EXPONENT: &str = "exponent";
 /// The highest exponent, because units are written up to the 9th power. At the corner of the
 /// bilinear loop (the limit of high exponents) the force is then 0.930 of its bound. For a
 /// sharper knee, use `jenkins`.
-const SHARPEST: f64 = 9.0;
+const MAX_EXPONENT: f64 = 9.0;
 
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
@@ -38,7 +38,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             "shape of the hysteresis loop; beta + gamma must be more than zero",
         )
         .to_the(EXPONENT),
-        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, SHARPEST), "sharpness of the knee").or(1.0),
+        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, MAX_EXPONENT), "sharpness of the knee").or(1.0),
     ],
     sample: &[10_000.0, 1.5e7, 1e7, 2.0],
     build: |values| Arc::new(BoucWen { stiffness: values[0], beta: values[1], gamma: values[2], exponent: values[3] }),
@@ -68,7 +68,7 @@ pub struct BoucWen {
 
 impl BoucWen {
     /// Returns the limit of z, m.
-    fn bound(&self) -> f64 {
+    fn state_limit(&self) -> f64 {
         (self.beta + self.gamma).powf(-1.0 / self.exponent)
     }
 }
@@ -84,7 +84,7 @@ impl Law for BoucWen {
         true
     }
     fn scale(&self) -> f64 {
-        self.stiffness * self.bound()
+        self.stiffness * self.state_limit()
     }
     fn springs(&self) -> Option<[Vec<f64>; 2]> {
         Some([vec![0.0], vec![self.stiffness]])
@@ -116,8 +116,8 @@ impl RateLaw for BoucWen {
         let (zero, v, z) = (S::from(0.0), motion.velocity[0], z[0]);
         let sum = self.beta + self.gamma;
         // |z|^(n-1) z |u'| = |z|^n sgn z |u'|
-        let loop_making = size(v) * super::kernels::kink::sign(z.re()) * (self.beta / sum);
-        rate[0] = (v - power(z, self.exponent) * (loop_making + v * (self.gamma / sum))) / self.bound();
+        let loop_making = abs(v) * super::kernels::kink::sign(z.re()) * (self.beta / sum);
+        rate[0] = (v - power(z, self.exponent) * (loop_making + v * (self.gamma / sum))) / self.state_limit();
         [z * self.scale(), zero, zero]
     }
 }
@@ -132,9 +132,9 @@ mod tests {
         for z in [-1.1, -0.4, 0.0, 0.9] {
             for v in [-2.0, 0.7] {
                 let mut rate = [0.0];
-                let force = law.evaluate(&Relative::along(0.0, v), &[z / law.bound()], &mut rate)[0];
+                let force = law.evaluate(&Relative::along(0.0, v), &[z / law.state_limit()], &mut rate)[0];
                 let expected = v - 0.5 * f64::abs(v) * f64::abs(z).powf(0.7) * z + 0.2 * v * f64::abs(z).powf(1.7);
-                assert!((rate[0] * law.bound() - expected).abs() < 1e-14 && (force - 3.0 * z).abs() < 1e-14);
+                assert!((rate[0] * law.state_limit() - expected).abs() < 1e-14 && (force - 3.0 * z).abs() < 1e-14);
             }
         }
     }

@@ -111,13 +111,13 @@ impl Prox for CoulombArctan {
 
 /// Largest half-width of a sample, relative to the scale `1 + |y|` of the arctangent, at which
 /// the quadrature of [`Mean::of`] is exact to rounding.
-const GENTLE: f64 = 0.2;
+const QUADRATURE_BELOW: f64 = 0.2;
 
 /// Returns means of `arctan(y + eξ)` over `-1 < ξ < 1`, in closed form, or by quadrature if the
 /// closed form would lose digits to cancellation.
 fn mean_of_arctangent(y: f64, e: f64) -> Mean {
     let reach = e.abs();
-    if reach < GENTLE * (1.0 + y.abs()) {
+    if reach < QUADRATURE_BELOW * (1.0 + y.abs()) {
         return Mean::of(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x)));
     }
     let (low, high) = (y - reach, y + reach);
@@ -145,7 +145,7 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
     // The left side is increasing and concave in w, so Newton's method from below converges
     // monotonically.
     let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
-    for _ in 0..RESOLVED {
+    for _ in 0..MAX_ITERATIONS {
         let left = w + FRAC_2_PI * (s * w).atan() - target;
         let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
         let step = left / slope;
@@ -160,4 +160,4 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
 }
 
 /// Upper bound on the iterations of [`resolve`]; they converge quadratically.
-const RESOLVED: usize = 60;
+const MAX_ITERATIONS: usize = 60;

@@ -5,7 +5,7 @@
 //! without reaching it. It is the Bouc-Wen law with `n = 1`, `gamma = 0`, `beta = k / limit`.
 //! Source: Dahl, "A solid friction model" (1968), exponent 1.
 
-use super::kernels::kink::size;
+use super::kernels::kink::abs;
 use super::{Law, LawInfo, Parameter, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -72,7 +72,7 @@ impl RateLaw for Dahl {
         let zero = S::from(0.0);
         let Some(&share) = z.first() else { return [zero; 3] };
         let v = motion.velocity[0];
-        rate[0] = (v - size(v) * share) * (self.stiffness / self.limit);
+        rate[0] = (v - abs(v) * share) * (self.stiffness / self.limit);
         [share * self.limit, zero, zero]
     }
 }

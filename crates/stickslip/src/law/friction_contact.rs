@@ -170,8 +170,8 @@ impl StepLaw for FrictionContact {
                 };
             }
             [one, two, ..] => {
-                let way = [0, 1].map(|a| (to[a] - from[a]) * closed);
-                [*one, *two] = planar_slip::step([*one, *two], way, self.tangential, [first, last]);
+                let increment = [0, 1].map(|a| (to[a] - from[a]) * closed);
+                [*one, *two] = planar_slip::step([*one, *two], increment, self.tangential, [first, last]);
             }
             [] => {}
         }
@@ -207,20 +207,20 @@ impl StepLaw for FrictionContact {
             (1.0, [0.0; 2])
         };
         let limits = [if closes { 0.0 } else { before * self.friction }, after * self.friction];
-        let way: [f64; 2] = std::array::from_fn(|a| if a < t { (to[a] - from[a]) * closed } else { 0.0 });
+        let increment: [f64; 2] = std::array::from_fn(|a| if a < t { (to[a] - from[a]) * closed } else { 0.0 });
         let (force, own) = match z {
             [force] => {
-                let (force, own) = along_a_line(*force, way[0], self.tangential, limits[1]);
+                let (force, own) = line_step_with_derivatives(*force, increment[0], self.tangential, limits[1]);
                 ([force, 0.0], own)
             }
-            _ => planar_slip::step_with_slopes([z[0], z[1]], way, self.tangential, limits),
+            _ => planar_slip::step_with_slopes([z[0], z[1]], increment, self.tangential, limits),
         };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force);
         let slip = [if closes { 0.0 } else { self.friction }, self.friction].map(|by| by * self.normal);
         let width = 2 * directions + t;
         for (a, row) in slopes.state.chunks_exact_mut(width).enumerate() {
             for b in 0..t {
-                let by = own.by_way[a][b];
+                let by = own.by_increment[a][b];
                 row[b] = -by * closed;
                 row[directions + b] = by * closed;
                 row[t] += by * (to[b] - from[b]) * by_normal[0];
@@ -249,16 +249,21 @@ impl StepLaw for FrictionContact {
     }
 }
 
-/// Computes [`planar_slip::step_with_slopes`] for a single direction, where the limit at the end of
-/// the step decides.
-fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, planar_slip::PlanarDerivatives) {
-    let trial = force + way * stiffness;
+/// Computes [`planar_slip::step_with_slopes`] for a single direction, where the limit at the end
+/// of the step decides.
+fn line_step_with_derivatives(
+    force: f64,
+    increment: f64,
+    stiffness: f64,
+    limit: f64,
+) -> (f64, planar_slip::PlanarDerivatives) {
+    let trial = force + increment * stiffness;
     let mut slopes = planar_slip::PlanarDerivatives::NONE;
     if trial.abs() > limit {
         slopes.by_limits[0][1] = trial.signum();
         return (limit.copysign(trial), slopes);
     }
-    (slopes.by_force[0][0], slopes.by_way[0][0]) = (1.0, stiffness);
+    (slopes.by_force[0][0], slopes.by_increment[0][0]) = (1.0, stiffness);
     (trial, slopes)
 }
 
@@ -269,7 +274,7 @@ mod tests {
     /// A step that closes the contact counts only its closed part. It equals two steps that are
     /// separated at the instant of closing.
     #[test]
-    fn a_step_that_closes_is_two_steps_with_the_closing_between() {
+    fn a_closing_step_equals_two_steps() {
         for tangents in [1, 2] {
             let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.9, preload: -1.0, tangents };
             let at = |t: f64| {
@@ -290,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn one_tangent_is_two_with_a_second_that_rests() {
+    fn one_tangent_equals_two_with_one_at_rest() {
         let one = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 1 };
         let two = FrictionContact { tangents: 2, ..one };
         let (mut z, mut w) = ([0.0; 1], [0.0; 2]);
@@ -364,14 +369,14 @@ mod tests {
     /// A contact that separates loses its history. A second cycle on the same path therefore
     /// ends early, at the first point with the states of the first cycle.
     #[test]
-    fn a_way_that_meets_its_trail_is_followed_no_farther() {
+    fn a_cycle_ends_early_at_known_states() {
         let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 2 };
         let n = 64;
         let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
         let signal = |of: fn(f64) -> f64| (0..n).map(|i| of(angle(i))).collect::<Vec<f64>>();
-        let way = [signal(f64::cos), signal(|t| (2.0 * t).sin()), signal(|t| 0.8 * (t - 1.0).sin())];
+        let path = [signal(f64::cos), signal(|t| (2.0 * t).sin()), signal(|t| 0.8 * (t - 1.0).sin())];
         let around = |z: &mut [f64], trail: &mut [f64], force: &mut [Vec<f64>; 3]| {
-            Step::around(&law, 3, &way, (z, trail), force, None);
+            Step::around(&law, 3, &path, (z, trail), force, None);
         };
         let fresh = || (vec![f64::NAN; 2 * n], [(); 3].map(|()| vec![0.0; n]));
         let (mut trail, mut force) = fresh();
@@ -388,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_say_what_they_do() {
+    fn contact_states_follow_force_and_load() {
         let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.5, preload: 1.0, tangents: 2 };
         assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0]), Contact::Open);
         assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.3, 0.4, 1.0]), Contact::Slip);

@@ -91,7 +91,7 @@ mod tests {
     use crate::law::Rate;
 
     #[test]
-    fn it_is_open_before_the_gap_and_presses_at_rest_where_the_gap_is_negative() {
+    fn contact_depends_on_the_gap() {
         let at = |gap: f64, u: f64| {
             let law = Gap { gap, stiffness: 1e3 };
             let force = Rate::value(&law, &Relative::along(u, 0.0), &[], &mut [])[0];

@@ -21,8 +21,10 @@
 //! too large between them.
 
 use super::interface::describing_function;
-use super::interface::ideal_elements::STUCK;
-use super::interface::masing::{LEGS, Masing, advance, counted, first_that_goes_on, share, stiffness};
+use super::interface::ideal_elements::UNREACHABLE_LIMIT;
+use super::interface::masing::{
+    MAX_LEGS, Masing, advance_legs, complex_stiffness, first_unreversed_leg, leg_count, leg_force,
+};
 use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Step, StepLaw, StepSlopes};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -30,7 +32,7 @@ use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
 /// Largest number of sliders.
-const MOST: u32 = 1000;
+const MAX_ELEMENTS: u32 = 1000;
 
 /// Ratio of successive bin edges is `exp(GRADING / √elements)`. More elements make both the bins
 /// and the first bin smaller.
@@ -58,7 +60,7 @@ pub(super) static INFO: LawInfo = LawInfo {
         Parameter::new(
             "elements",
             Dimension::NONE,
-            Range::UpTo(MOST),
+            Range::UpTo(MAX_ELEMENTS),
             "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
         )
         .or(0.0),
@@ -113,11 +115,11 @@ impl Iwan {
     }
 
     /// Returns the force of first loading (N) at a non-negative displacement. With a limit of
-    /// `STUCK` or more, the law is the linear spring `KT`. Without this special case, a
-    /// distribution with χ near -1 would slip in part at any displacement.
+    /// `UNREACHABLE_LIMIT` or more, the law is the linear spring `KT`. Without this special case,
+    /// a distribution with χ near -1 would slip in part at any displacement.
     fn first_loading<S: Real>(&self, u: S) -> S {
         let far = self.slips_at();
-        if self.limit >= STUCK {
+        if self.limit >= UNREACHABLE_LIMIT {
             return u * self.stiffness;
         }
         if u.re() >= far {
@@ -187,9 +189,11 @@ impl Law for Iwan {
     }
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         match (self.masing(), amplitude > 0.0) {
-            (Some(law), true) => stiffness(law, amplitude),
+            (Some(law), true) => complex_stiffness(law, amplitude),
             (Some(_), false) => self.stiffness.into(),
-            (None, _) => describing_function::stiffness(self.pieces(), None, None, (None, 1), (amplitude, omega)),
+            (None, _) => {
+                describing_function::complex_stiffness(self.pieces(), None, None, (None, 1), (amplitude, omega))
+            }
         }
     }
     fn is_incrementally_passive(&self) -> bool {
@@ -207,7 +211,7 @@ impl Masing for Iwan {
     fn backbone(&self, displacement: f64) -> (f64, f64) {
         let far = self.slips_at();
         let slope = match displacement / far {
-            _ if self.limit >= STUCK => self.stiffness,
+            _ if self.limit >= UNREACHABLE_LIMIT => self.stiffness,
             x if x >= 1.0 => 0.0,
             x if x <= 0.0 => self.stiffness,
             x => self.stiffness * (1.0 - x.powf(self.chi + 1.0) / (1.0 + self.beta)),
@@ -222,7 +226,7 @@ impl Masing for Iwan {
 impl StepLaw for Iwan {
     /// The legs of the history.
     fn states(&self) -> usize {
-        LEGS
+        MAX_LEGS
     }
     fn state_scale(&self) -> f64 {
         self.slips_at()
@@ -233,9 +237,9 @@ impl StepLaw for Iwan {
         to: &[S; MOST_DIRECTIONS],
         z: &mut [S],
     ) -> [S; MOST_DIRECTIONS] {
-        advance(z, to[0] - from[0], self.slips_at(), |k, leg| share(k, leg, |u| self.first_loading(u)));
+        advance_legs(z, to[0] - from[0], self.slips_at(), |k, leg| leg_force(k, leg, |u| self.first_loading(u)));
         let legs = z.iter().take_while(|leg| leg.re() != 0.0).enumerate();
-        let force: S = legs.map(|(k, leg)| share(k, *leg, |u| self.first_loading(u))).sum();
+        let force: S = legs.map(|(k, leg)| leg_force(k, *leg, |u| self.first_loading(u))).sum();
         // a leg of zero length still has a slope
         let force = if z[0].re() == 0.0 { force + z[0] * self.stiffness } else { force };
         [force, S::from(0.0), S::from(0.0)]
@@ -249,13 +253,13 @@ impl StepLaw for Iwan {
         z: &mut [f64],
         slopes: StepSlopes<'_>,
     ) -> Option<[f64; MOST_DIRECTIONS]> {
-        let before = counted(z);
+        let before = leg_count(z);
         // The step may drop or merge legs.
-        if before == z.len() || first_that_goes_on(&z[..before]).is_some() {
+        if before == z.len() || first_unreversed_leg(&z[..before]).is_some() {
             return None;
         }
         let force = self.advance(from, to, z);
-        let (last, width) = (counted(z).max(1) - 1, 2 + z.len());
+        let (last, width) = (leg_count(z).max(1) - 1, 2 + z.len());
         slopes.state.fill(0.0);
         slopes.force.fill(0.0);
         let slipping = z[0].abs() >= self.slips_at();
@@ -303,17 +307,17 @@ mod tests {
     fn slopes_are_those_of_dual_numbers() {
         use stickslip_numerics::dual::{Dual, partials, variable};
         let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.4, beta: 0.2, elements: 0 };
-        let (mut z, mut u, mut deepest) = ([0.0; LEGS], 0.0, 0);
+        let (mut z, mut u, mut deepest) = ([0.0; MAX_LEGS], 0.0, 0);
         for k in 0..3000 {
             let noise = ((k * 7919 + 13) as f64).sin();
             let to = u + noise * law.slips_at() * if k % 50 == 0 { 4.0 } else { 0.6 };
-            let mut dual: [Dual<18>; LEGS] = std::array::from_fn(|i| variable(z[i], 2 + i));
+            let mut dual: [Dual<18>; MAX_LEGS] = std::array::from_fn(|i| variable(z[i], 2 + i));
             let (a, b): (Dual<18>, Dual<18>) = (variable(u, 0), variable(to, 1));
             let zero = Dual::<18>::from(0.0);
             let force = law.advance(&[a, zero, zero], &[b, zero, zero], &mut dual)[0];
-            let (mut of_force, mut of_state) = (vec![0.0; 18], vec![0.0; 18 * LEGS]);
+            let (mut of_force, mut of_state) = (vec![0.0; 18], vec![0.0; 18 * MAX_LEGS]);
             let slopes = StepSlopes { directions: 1, force: &mut of_force, state: &mut of_state };
-            let full = z[LEGS - 1] != 0.0;
+            let full = z[MAX_LEGS - 1] != 0.0;
             let found = law.tangent(&[u, 0.0, 0.0], &[to, 0.0, 0.0], &mut z, slopes);
             assert_eq!(found.is_none(), full);
             if let Some(found) = found {

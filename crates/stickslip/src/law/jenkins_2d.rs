@@ -93,8 +93,8 @@ impl StepLaw for Jenkins2d {
         to: &[S; MOST_DIRECTIONS],
         z: &mut [S],
     ) -> [S; MOST_DIRECTIONS] {
-        let way = [to[0] - from[0], to[1] - from[1]];
-        let force = planar_slip::step([z[0], z[1]], way, self.stiffness, [S::from(self.limit); 2]);
+        let increment = [to[0] - from[0], to[1] - from[1]];
+        let force = planar_slip::step([z[0], z[1]], increment, self.stiffness, [S::from(self.limit); 2]);
         z.copy_from_slice(&force);
         [force[0], force[1], S::from(0.0)]
     }
@@ -105,12 +105,12 @@ impl StepLaw for Jenkins2d {
         z: &mut [f64],
         StepSlopes { force: forces, state: states, .. }: StepSlopes<'_>,
     ) -> Option<[f64; MOST_DIRECTIONS]> {
-        let way = [to[0] - from[0], to[1] - from[1]];
-        let (force, slopes) = planar_slip::step_with_slopes([z[0], z[1]], way, self.stiffness, [self.limit; 2]);
+        let increment = [to[0] - from[0], to[1] - from[1]];
+        let (force, slopes) = planar_slip::step_with_slopes([z[0], z[1]], increment, self.stiffness, [self.limit; 2]);
         z.copy_from_slice(&force);
         for (a, row) in states.chunks_exact_mut(6).enumerate() {
-            let (way, before) = (slopes.by_way[a], slopes.by_force[a]);
-            row.copy_from_slice(&[-way[0], -way[1], way[0], way[1], before[0], before[1]]);
+            let (increment, before) = (slopes.by_increment[a], slopes.by_force[a]);
+            row.copy_from_slice(&[-increment[0], -increment[1], increment[0], increment[1], before[0], before[1]]);
         }
         forces.copy_from_slice(states);
         Some([force[0], force[1], 0.0])

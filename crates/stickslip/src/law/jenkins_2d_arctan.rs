@@ -86,16 +86,16 @@ impl Law for Jenkins2dArctan {
 }
 
 /// Largest force that determines a state, relative to the limit.
-const BELOW: f64 = 1.0 - 1e-12;
+const MAX_FORCE_RATIO: f64 = 1.0 - 1e-12;
 
 /// Below this value of `|z|²`, functions of it are evaluated as series. Their next terms are
 /// then below rounding.
-const SMALL: f64 = 1e-3;
+const SERIES_BELOW: f64 = 1e-3;
 
 /// Even functions of ρ, smooth at zero, from `ρ²`: `arctan(sinh ρ) / ρ = G`, `sinh ρ / ρ`, and
 /// `(cosh ρ - 1/G) / ρ²`.
-fn even<S: Real>(square: S) -> [S; 3] {
-    if square.re() < SMALL {
+fn even_functions<S: Real>(square: S) -> [S; 3] {
+    if square.re() < SERIES_BELOW {
         let gudermann =
             (((square * (277.0 / 72_576.0) - 61.0 / 5040.0) * square + 1.0 / 24.0) * square - 1.0 / 6.0) * square + 1.0;
         let sinh = ((square * (1.0 / 5040.0) + 1.0 / 120.0) * square + 1.0 / 6.0) * square + 1.0;
@@ -127,7 +127,7 @@ impl RateLaw for Jenkins2dArctan {
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         let size = force[0].hypot(force[1]);
         // Forces beyond the limit are replaced by values just below it.
-        let rho = ((size / self.limit).min(BELOW) / FRAC_2_PI).tan().asinh();
+        let rho = ((size / self.limit).min(MAX_FORCE_RATIO) / FRAC_2_PI).tan().asinh();
         let share = if size > 0.0 { rho / size } else { 0.0 };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force * share);
         true
@@ -137,7 +137,7 @@ impl RateLaw for Jenkins2dArctan {
         let zero = S::from(0.0);
         let &[x, y] = z else { return [zero; 3] };
         let z = [x, y];
-        let [gudermann, sinh, difference] = even(dot(z, z));
+        let [gudermann, sinh, difference] = even_functions(dot(z, z));
         // rate of the spring's elongation: u' - s'
         let creep = [0, 1].map(|a| motion.velocity[a] - z[a] * sinh * (1.0 / self.alpha));
         // Radially, df = limit (2/π) / cosh |z| d|z|; tangentially, df = limit (2/π) G dz.
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_force_decides_the_state() {
+    fn state_from_force_is_exact() {
         let law = Jenkins2dArctan { stiffness: 3.0, limit: 2.0, alpha: 5.0 };
         for force in [[0.0, 0.0], [0.5, -1.2], [1e-9, 0.0], [-1.9, 0.6]] {
             let mut z = [0.0; 2];
@@ -169,11 +169,11 @@ mod tests {
     #[test]
     fn series_join_the_closed_forms() {
         for scale in [0.999, 1.001] {
-            let square: f64 = SMALL * scale;
+            let square: f64 = SERIES_BELOW * scale;
             let rho = square.sqrt();
             let gudermann = rho.sinh().atan() / rho;
             let expected = [gudermann, rho.sinh() / rho, (rho.cosh() - 1.0 / gudermann) / square];
-            for (found, expected) in even(square).into_iter().zip(expected) {
+            for (found, expected) in even_functions(square).into_iter().zip(expected) {
                 // the last function loses digits to cancellation
                 assert!((found - expected).abs() < 1e-12, "{found} {expected}");
             }

@@ -76,12 +76,12 @@ impl Law for JenkinsArctan {
     }
     fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
         // The exact law is a sufficient initial guess for the smooth one.
-        describing_function::of_piece(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
+        describing_function::slider_or_stop(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
     }
 }
 
 /// Largest force that determines a state, relative to the limit.
-const BELOW: f64 = 1.0 - 1e-12;
+const MAX_FORCE_RATIO: f64 = 1.0 - 1e-12;
 
 impl JenkinsArctan {
     /// Returns the slider without its spring.
@@ -112,7 +112,7 @@ impl RateLaw for JenkinsArctan {
     }
     fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
         // Forces beyond the limit are replaced by values just below it.
-        let share = (force[0] / self.limit).clamp(-BELOW, BELOW);
+        let share = (force[0] / self.limit).clamp(-MAX_FORCE_RATIO, MAX_FORCE_RATIO);
         z.fill((share / FRAC_2_PI).tan().asinh());
         true
     }

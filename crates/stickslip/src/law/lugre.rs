@@ -13,8 +13,8 @@
 //! with `q = s0 z sgn(v) / g`. Under this condition the bracket is never negative.
 
 use super::interface::parameter::STATIC_LIMIT;
-use super::kernels::kink::size;
-use super::kernels::stribeck_curve::falling;
+use super::kernels::kink::abs;
+use super::kernels::stribeck_curve::stribeck_force;
 use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -81,7 +81,7 @@ pub struct LuGre {
 impl LuGre {
     /// Returns the force of steady sliding without viscous friction, N.
     fn steady<S: Real>(&self, velocity: S) -> S {
-        falling(velocity, self.limit, self.static_limit, self.velocity)
+        stribeck_force(velocity, self.limit, self.static_limit, self.velocity)
     }
 }
 
@@ -106,7 +106,7 @@ impl Law for LuGre {
         Contact::by_limit(self.steady(velocity[0]), velocity, &[force[0] - self.viscous * velocity[0]])
     }
     fn consistent(&self) -> Result<(), String> {
-        super::kernels::stribeck_curve::limits_fit(self.limit, self.static_limit)?;
+        super::kernels::stribeck_curve::check_limits(self.limit, self.static_limit)?;
         if self.limit == 0.0 && self.static_limit > 0.0 {
             return Err("`limit` is zero, but `static_limit` is positive: the law divides by the \
                  friction force, which is `limit` at high velocity; make `limit` positive"
@@ -130,7 +130,7 @@ impl RateLaw for LuGre {
         let viscous = v * self.viscous;
         let Some(&share) = z.first() else { return [viscous, zero, zero] };
         let bending = share * self.static_limit;
-        let deflected = v - size(v) * bending / self.steady(v); // z'
+        let deflected = v - abs(v) * bending / self.steady(v); // z'
         rate[0] = deflected * (self.stiffness / self.static_limit);
         [bending + deflected * self.damping + viscous, zero, zero]
     }

@@ -7,7 +7,7 @@
 //! influence on the critical velocity of stick-slip motion" (1982).
 
 use super::interface::parameter::STATIC_LIMIT;
-use super::kernels::stribeck_curve::limits_fit;
+use super::kernels::stribeck_curve::check_limits;
 use super::{
     Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, SharedLaw, Slider, Sliding, StribeckArctan,
 };
@@ -126,7 +126,7 @@ impl Law for Stribeck {
         Contact::by_limit(limit, velocity, force)
     }
     fn consistent(&self) -> Result<(), String> {
-        limits_fit(self.limit, self.static_limit)
+        check_limits(self.limit, self.static_limit)
     }
 }
 
@@ -138,7 +138,7 @@ impl Sliding for Stribeck {
 
 /// Upper bound on the iterations for the velocity. Bisection alone needs one per bit of the
 /// result.
-const SEARCHED: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 
 impl Prox for Stribeck {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
@@ -153,7 +153,7 @@ impl Prox for Stribeck {
         // rounding of the force, expressed as a velocity
         let rounding = f64::EPSILON * target / penalty;
         let mut v = high;
-        for _ in 0..SEARCHED {
+        for _ in 0..MAX_ITERATIONS {
             let (friction, fall) = self.friction(v);
             let excess = friction + penalty * v - target;
             if excess > 0.0 {
@@ -199,7 +199,7 @@ mod tests {
             let y = -4.0 + 0.04 * f64::from(k);
             let (force, slope) = resolve(y);
             let velocity = (y - force) / penalty;
-            let friction: f64 = super::super::kernels::stribeck_curve::falling(velocity, 2.0, 2.5, 0.01);
+            let friction: f64 = super::super::kernels::stribeck_curve::stribeck_force(velocity, 2.0, 2.5, 0.01);
             if velocity == 0.0 {
                 assert!(force.abs() <= 2.5);
             } else {

@@ -7,7 +7,7 @@
 //! curve.
 
 use super::interface::parameter::STATIC_LIMIT;
-use super::kernels::stribeck_curve::{falling, limits_fit};
+use super::kernels::stribeck_curve::{check_limits, stribeck_force};
 use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::f64::consts::FRAC_2_PI;
@@ -73,10 +73,10 @@ impl Law for StribeckArctan {
         Some(self)
     }
     fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
-        Contact::by_limit(falling(velocity[0], self.limit, self.static_limit, self.velocity), velocity, force)
+        Contact::by_limit(stribeck_force(velocity[0], self.limit, self.static_limit, self.velocity), velocity, force)
     }
     fn consistent(&self) -> Result<(), String> {
-        limits_fit(self.limit, self.static_limit)
+        check_limits(self.limit, self.static_limit)
     }
 }
 
@@ -84,7 +84,7 @@ impl RateLaw for StribeckArctan {
     #[inline]
     fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let (zero, v) = (S::from(0.0), motion.velocity[0]);
-        let friction = falling(v, self.limit, self.static_limit, self.velocity);
+        let friction = stribeck_force(v, self.limit, self.static_limit, self.velocity);
         [(v * self.alpha).atan() * friction * FRAC_2_PI, zero, zero]
     }
 }
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn smoothing_takes_from_the_static_limit_what_the_heading_says() {
+    fn smoothing_reduces_the_static_limit_by_0_8_percent() {
         let law = StribeckArctan { limit: 0.8, static_limit: 1.0, velocity: 1.0, alpha: 1000.0 };
         let force = |v: f64| law.evaluate(&Relative::along(0.0, v), &[], &mut [])[0];
         let most = (1..10_000).map(|k| force(f64::from(k) * 1e-4)).fold(0.0, f64::max);

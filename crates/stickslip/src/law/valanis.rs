@@ -11,7 +11,7 @@
 //! The law gives no energy in a closed motion: apart from the spring Et, the slope at a given
 //! force is never larger in loading than in unloading.
 
-use super::kernels::kink::{sign, size};
+use super::kernels::kink::{abs, sign};
 use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -74,7 +74,7 @@ impl Law for Valanis {
     }
     /// The limit of the force beyond the spring Et in slip.
     fn scale(&self) -> f64 {
-        self.stiffness / self.lambda * self.sliding()
+        self.stiffness / self.lambda * self.slip_state()
     }
     /// Without friction, the slip stiffness remains.
     fn springs(&self) -> Option<[Vec<f64>; 2]> {
@@ -96,7 +96,7 @@ impl Law for Valanis {
 
 impl Valanis {
     /// Returns the limit of the state in slip.
-    fn sliding(&self) -> f64 {
+    fn slip_state(&self) -> f64 {
         let (stick, slip) = (self.stiffness, self.slip_stiffness);
         (stick - slip) / (stick - self.kappa * slip)
     }
@@ -112,11 +112,11 @@ impl RateLaw for Valanis {
         let mut knee = S::from(1.0) - y * (self.kappa * sign(v.re()));
         // No motion exceeds the limit of the state, but iterations may. The pole at
         // `|y| = 1/kappa` would give them a spurious solution.
-        let least = 1.0 - self.kappa * self.sliding();
+        let least = 1.0 - self.kappa * self.slip_state();
         if knee.re() < least {
             knee = S::from(least);
         }
-        rate[0] = ((v - size(v) * y) / knee - v * (self.slip_stiffness / self.stiffness)) * self.lambda;
+        rate[0] = ((v - abs(v) * y) / knee - v * (self.slip_stiffness / self.stiffness)) * self.lambda;
         [u * self.slip_stiffness + y * (self.stiffness / self.lambda), S::from(0.0), S::from(0.0)]
     }
 }
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_state_beyond_slip_comes_back() {
+    fn a_state_beyond_slip_returns() {
         let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.98 };
         for y in [1.0, 1.0 / 0.98, 1.1, 2.0_f64] {
             for sign in [1.0, -1.0] {
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn slip_goes_on_along_the_line_that_the_scale_says() {
+    fn slip_force_is_the_scale() {
         let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.7 };
         let mut rate = [1.0];
         law.evaluate(&Relative::along(0.0, 1.0), &[law.scale() * law.lambda / law.stiffness], &mut rate);

@@ -190,7 +190,7 @@ impl<'a> WithSecond<'a> {
         let near = start.filter(|start| self.last.as_deref() == Some(*start)).or(error.candidate());
         let found = by(&mut **second, near);
         self.effort += second.effort();
-        let mut orbit = found.map_err(|_| error.after(name))?;
+        let mut orbit = found.map_err(|_| error.with_failed_alternative(name))?;
         orbit.evidence.instead_of = Some(self.chosen);
         self.last = Some(orbit.start.clone());
         Ok(orbit)

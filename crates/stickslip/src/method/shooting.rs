@@ -22,8 +22,8 @@ use super::switched::flow::SwitchedFlow;
 use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
 use crate::model::System;
-use crate::orbit::postprocess::{NO_WORK, measure};
-use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history};
+use crate::orbit::postprocess::{CONSERVATIVE_WORK, results};
+use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history_dependent_joints};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -548,7 +548,7 @@ impl<'a> Shooter<'a> {
     fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
-        let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
+        let Ok(measured) = results(self.system, &path, omega, (symmetry, period));
         let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
         // a joint may stick right up to its limit. Its derivative is then that of an instant of
         // slip, which does not hold for nearby motions that stick
@@ -556,7 +556,7 @@ impl<'a> Shooter<'a> {
             measured.joints.iter().any(|joint| joint.slip_fraction > 0.0 && measured.stuck.contains(&joint.name));
         // the residual of the closed state may do work on a vibration as small as rest
         let left = CLOSED * norm(&self.weights, &closed.state) * self.rest;
-        let least = f64::max(NO_WORK * self.rest * self.rest, left / ENERGY_GAP);
+        let least = f64::max(CONSERVATIVE_WORK * self.rest * self.rest, left / ENERGY_GAP);
         Orbit {
             method: self.name,
             omega,
@@ -572,7 +572,7 @@ impl<'a> Shooter<'a> {
                 truncation: closed.missing,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),
-                history: history(laws, &measured.joints, &measured.stuck, symmetry),
+                history: history_dependent_joints(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
                 history_spread: None,
                 found_by: self.name,

@@ -306,6 +306,10 @@ impl PathSignals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        ContactSummary { shares, switches, rests: sticks(self.steps.each().map(|node| node.contact[joint])) }
+        ContactSummary {
+            shares,
+            switches,
+            sticks_throughout: sticks(self.steps.each().map(|node| node.contact[joint])),
+        }
     }
 }

@@ -200,7 +200,7 @@ impl TimeHistory {
             }
             followed.map_err(|cause| TimeHistoryError::Breakdown {
                 last: next.checked_sub(1).map(|last| last as f64 * self.step),
-                cause: cause.later(begin),
+                cause: cause.shifted(begin),
             })?;
             begin = end;
         }

@@ -1,7 +1,7 @@
 //! Assembles a system from a model: checks, and the matrices of
 //! `M x'' + C x' + K x + Σ W f = F(t)`.
 
-use super::coordinates::{Coordinates, combined};
+use super::coordinates::{Coordinates, merge_duplicates};
 use super::error::{Element, ModelError};
 use super::name_resolution::{PlaceSource, PlaceTarget, Places};
 use super::place::places_of;
@@ -82,11 +82,11 @@ impl Model {
         let motions = assembler.motions()?;
         let builder = System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
         let builder = builder.earlier(self.substructure.as_ref().and_then(|substructure| substructure.earlier));
-        let (builder, forces) = assembler.forces(assembler.seen(builder))?;
+        let (builder, forces) = assembler.forces(assembler.add_places(builder))?;
         let builder = assembler.loads_of_motions(builder, &matrices, &motions);
         let (builder, signs) = assembler.joints(builder, &motions)?;
         let builder = assembler.moved(builder, &matrices, (&motions, &forces), &signs);
-        let system = builder.build().map_err(|error| whole(&error))?;
+        let system = builder.build().map_err(|error| model_error(&error))?;
         // a ring that was edited after its creation can lack the symmetry; then the whole ring
         // is solved
         Ok(match self.ring.and_then(Ring::wave) {
@@ -97,7 +97,7 @@ impl Model {
 }
 
 /// Converts an error of the whole structure.
-pub(super) fn whole(error: &dyn fmt::Display) -> ModelError {
+pub(super) fn model_error(error: &dyn fmt::Display) -> ModelError {
     ModelError::new(Element::Whole, "mass", error.to_string())
 }
 
@@ -130,7 +130,7 @@ type Harmonics = BTreeMap<u32, Complex64>;
 impl Assembler<'_> {
     /// Returns the sum of places with the given signs, as weights of the free and then the
     /// moved coordinates.
-    fn along(&self, ends: &[(PlaceTarget, f64)]) -> Row {
+    fn row_of(&self, ends: &[(PlaceTarget, f64)]) -> Row {
         let parts = ends.iter().flat_map(|(end, sign)| {
             let row: &[(usize, f64)] = match end {
                 PlaceTarget::Ground => &[],
@@ -138,11 +138,16 @@ impl Assembler<'_> {
             };
             row.iter().map(move |(at, weight)| (*at, weight * sign))
         });
-        combined(parts.collect())
+        merge_duplicates(parts.collect())
     }
 
     /// Checks that a spring connects two rotations or two displacements.
-    fn alike(&self, between: &[String; 2], ends: [PlaceTarget; 2], element: Element) -> Result<(), ModelError> {
+    fn check_same_kind(
+        &self,
+        between: &[String; 2],
+        ends: [PlaceTarget; 2],
+        element: Element,
+    ) -> Result<(), ModelError> {
         let turns = ends.map(|end| self.places.is_rotation(end));
         if turns[0] == turns[1] || ends.contains(&PlaceTarget::Ground) {
             return Ok(());
@@ -175,13 +180,13 @@ impl Assembler<'_> {
             }
             let a = self.places.find(&spring.between[0], element, "between")?;
             let b = self.places.find(&spring.between[1], element, "between")?;
-            differ(&spring.between, element)?;
-            self.alike(&spring.between, [a, b], element)?;
-            let along = self.along(&[(a, 1.0), (b, -1.0)]);
+            check_distinct(&spring.between, element)?;
+            self.check_same_kind(&spring.between, [a, b], element)?;
+            let along = self.row_of(&[(a, 1.0), (b, -1.0)]);
             add_along(&mut stiffness, &along, spring.stiffness);
             add_along(&mut damping, &along, spring.damping);
         }
-        let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| whole(&error));
+        let sum = |entries| Matrix::from_triplets(total, entries).map_err(|error| model_error(&error));
         let modes = self.coordinates.modes.clone();
         Ok(AssembledMatrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
     }
@@ -194,11 +199,11 @@ impl Assembler<'_> {
                 return Ok(matrix.clone());
             }
             let free = matrix.entries().filter(|(row, column, _)| row < n && column < n);
-            Matrix::from_triplets(*n, free).map_err(|error| whole(&error))
+            Matrix::from_triplets(*n, free).map_err(|error| model_error(&error))
         };
         let (mass, damping) = (block(&matrices.mass)?, block(&matrices.damping)?);
         let structure = Structure::sparse(names.clone(), mass, damping, block(&matrices.stiffness)?);
-        let structure = structure.map_err(|error| whole(&error))?;
+        let structure = structure.map_err(|error| model_error(&error))?;
         Ok(match &matrices.modes {
             None => structure,
             Some(modes) if *moved == 0 => structure.with_damped_modes(modes),
@@ -210,10 +215,12 @@ impl Assembler<'_> {
     }
 
     /// Adds the places of results: those without imposed motion.
-    fn seen(&self, mut builder: SystemBuilder) -> SystemBuilder {
-        let unseen = &self.coordinates.unseen;
-        for ((place, row), unseen) in self.places.stated.iter().zip(&self.coordinates.places).zip(unseen) {
-            if !place.moved && !unseen {
+    fn add_places(&self, mut builder: SystemBuilder) -> SystemBuilder {
+        let without_results = &self.coordinates.without_results;
+        for ((place, row), without_results) in
+            self.places.stated.iter().zip(&self.coordinates.places).zip(without_results)
+        {
+            if !place.moved && !without_results {
                 let axis = self.axis(row).0;
                 let axis = match place.radius {
                     Some(radius) => axis.rotation(radius),
@@ -315,12 +322,12 @@ impl Assembler<'_> {
         for (j, joint) in self.model.joints.iter().enumerate() {
             let element = Element::Joint(j);
             joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
-            differ(&joint.between, element)?;
+            check_distinct(&joint.between, element)?;
             let mut axes = Vec::new();
             let faces = (joint.law.directions(), joint.law.normal());
             for (along, [a, b]) in self.places.axes(&joint.between, faces, element)? {
                 signs.iter_mut().for_each(|signs| signs.push(0.0));
-                let (axis, moved) = self.axis(&self.along(&[(a, 1.0), (b, -1.0)]));
+                let (axis, moved) = self.axis(&self.row_of(&[(a, 1.0), (b, -1.0)]));
                 let mut imposed = Vec::new();
                 for (k, sign) in moved {
                     if let Some(last) = signs[k].last_mut() {
@@ -365,7 +372,7 @@ impl Assembler<'_> {
     }
 }
 
-fn differ(between: &[String; 2], element: Element) -> Result<(), ModelError> {
+fn check_distinct(between: &[String; 2], element: Element) -> Result<(), ModelError> {
     if between[0] == between[1] {
         let message = format!("both ends are `{}`; name two different places", between[0]);
         return Err(ModelError::new(element, "between", message));
@@ -382,7 +389,7 @@ fn finite_at_least_zero(value: f64, element: Element, key: &'static str, unit: &
 
 /// Amplitudes (N, m) for which energies neither underflow nor overflow after division by
 /// stiffness or damping.
-const SIZES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+const AMPLITUDE_RANGE: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
 fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Complex64, ModelError> {
     for (value, key) in [(amplitude, "amplitude"), (phase, "phase")] {
@@ -390,7 +397,7 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
             return Err(ModelError::new(element, key, format!("must be a finite number, found {value}")));
         }
     }
-    if amplitude != 0.0 && !SIZES.contains(&amplitude.abs()) {
+    if amplitude != 0.0 && !AMPLITUDE_RANGE.contains(&amplitude.abs()) {
         let message = format!("{amplitude:e} in SI units is out of range (1e-140 to 1e140); check its unit");
         return Err(ModelError::new(element, "amplitude", message));
     }

@@ -413,7 +413,7 @@ mod tests {
     /// Compares 50 random bodies on springs with `Tᵀ K T` and `diag(m, J)`, assembled here: the
     /// static and dynamic motion of a point under forces and moments.
     #[test]
-    fn random_bodies_move_as_an_independent_assembly_says() {
+    fn random_bodies_agree_with_independent_assembly() {
         for case in 0..50u64 {
             let stream = Stream::new(case);
             let mut draw = 0;

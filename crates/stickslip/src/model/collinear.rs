@@ -37,16 +37,17 @@ impl CollinearAxis {
 
     /// Returns the factor `velocity along self = factor · velocity along other`, if one factor
     /// holds at all times.
-    pub fn along(&self, other: &CollinearAxis) -> Option<f64> {
+    pub fn ratio_to(&self, other: &CollinearAxis) -> Option<f64> {
         let (lead, weight) = other.lead?;
         let factor = self.weight(lead) / weight;
         if !factor.is_finite() || factor == 0.0 {
             return None; // the axes are orthogonal, or only imposed motion moves one of them
         }
         let near = PARALLEL * self.lead.map_or(0.0, |(_, weight)| weight.abs());
-        let parallel = both(&self.rows, &other.rows).all(|(own, its)| (own - factor * its).abs() <= near);
+        let parallel = merge_join(&self.rows, &other.rows).all(|(own, its)| (own - factor * its).abs() <= near);
         let near = PARALLEL * self.imposed.iter().map(|(_, g)| g.norm()).fold(0.0, f64::max);
-        let together = || both(&self.imposed, &other.imposed).all(|(own, its)| (own - its * factor).norm() <= near);
+        let together =
+            || merge_join(&self.imposed, &other.imposed).all(|(own, its)| (own - its * factor).norm() <= near);
         (parallel && together()).then_some(factor)
     }
 
@@ -57,7 +58,10 @@ impl CollinearAxis {
 
 /// Pairs the values of two lists with sorted keys. A key that one list lacks counts as zero
 /// there.
-fn both<'a, K: Ord, T: Copy + Default>(one: &'a [(K, T)], other: &'a [(K, T)]) -> impl Iterator<Item = (T, T)> + 'a {
+fn merge_join<'a, K: Ord, T: Copy + Default>(
+    one: &'a [(K, T)],
+    other: &'a [(K, T)],
+) -> impl Iterator<Item = (T, T)> + 'a {
     let (mut one, mut other) = (one.iter().peekable(), other.iter().peekable());
     std::iter::from_fn(move || {
         let order = match (one.peek(), other.peek()) {
@@ -77,7 +81,7 @@ mod tests {
     use super::*;
 
     fn factor(one: &Axis, other: &Axis) -> Option<f64> {
-        Line::of(one).along(&Line::of(other))
+        CollinearAxis::of(one).ratio_to(&CollinearAxis::of(other))
     }
 
     #[test]

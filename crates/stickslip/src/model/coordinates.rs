@@ -33,7 +33,7 @@ pub(super) struct Coordinates {
     pub places: Vec<Row>,
     /// Marks places without results: places of a body that follow an imposed motion of that
     /// body.
-    pub unseen: Vec<bool>,
+    pub without_results: Vec<bool>,
     /// Mass, damping and stiffness of the substructure and the bodies.
     pub entries: [Entries; 3],
     /// Modal damping in addition to the damping entries, over the free and then the moved
@@ -42,12 +42,12 @@ pub(super) struct Coordinates {
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
-/// Largest number of places for which [`MotionElimination::unseen`] decouples the moved displacements. The
-/// Gram matrix of more places would be large.
-const MOST_UNSEEN: usize = 2000;
+/// Largest number of places for which [`MotionElimination::decouple`] decouples the moved
+/// displacements. The Gram matrix of more places would be large.
+const DECOUPLING_LIMIT: usize = 2000;
 /// Relative tolerance: a moved place whose free part is smaller depends on other places and is
 /// not a separate coordinate.
-const DEPENDENT: f64 = 1e-10;
+const DEPENDENCE_TOLERANCE: f64 = 1e-10;
 
 impl Coordinates {
     pub fn new(model: &Model, places: &Places) -> Result<Self, ModelError> {
@@ -97,7 +97,7 @@ impl Coordinates {
         }
         for (place, stated) in places.stated.iter().enumerate() {
             if let PlaceSource::View(index, along) = stated.of {
-                rows[place] = view(&model.places[index], along, places, &rows);
+                rows[place] = node_view(&model.places[index], along, places, &rows);
             }
         }
         let of_part = |entries: Entries| -> Entries {
@@ -127,15 +127,15 @@ impl Coordinates {
         };
         let others = places.stated.iter().zip(&rows).zip(&of_body);
         let others = others.filter(|((place, _), of_body)| !place.moved && !**of_body).map(|(other, _)| other);
-        turned.unseen(&others.map(|(_, row)| turned.row(row)).collect::<Vec<Row>>());
+        turned.decouple(&others.map(|(_, row)| turned.row(row)).collect::<Vec<Row>>());
         let placed: Vec<Row> = rows.iter().map(|row| turned.row(row)).collect();
-        let unseen = follows(model, places, (&placed, &of_body), turned.free)?;
+        let without_results = check_followers(model, places, (&placed, &of_body), turned.free)?;
         Ok(Coordinates {
             free: turned.free,
             moved: moved.len(),
             names: names.into_iter().zip(&turned.pivot).filter(|(_, pivot)| !**pivot).map(|(name, _)| name).collect(),
             places: placed,
-            unseen,
+            without_results,
             entries: entries.map(|entries| turned.entries(entries)),
             modes: modes.map(|modes| turned.modes(&modes, moved.len())),
             reduced: part.reduced,
@@ -150,7 +150,7 @@ impl Coordinates {
 
 /// Returns one direction of a place that is a second view of a node, over the coordinates of
 /// that node.
-fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
+fn node_view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
     let of = place.of.as_deref().unwrap_or_default();
     let is_of = |name: &str| name == of || name.split_once('.').is_some_and(|(node, _)| node == of);
     let node: Vec<&Row> =
@@ -220,20 +220,20 @@ impl BodyCoordinates {
 ///
 /// Results come from the free coordinates alone. Places of moved bodies are not rejected. They
 /// are marked as places without results if their imposed motion is not zero.
-fn follows(
+fn check_followers(
     model: &Model,
     places: &Places,
     (rows, of_body): (&[Row], &[bool]),
     free: usize,
 ) -> Result<Vec<bool>, ModelError> {
-    let mut unseen = vec![false; rows.len()];
+    let mut without_results = vec![false; rows.len()];
     let moved: Vec<&str> = places.stated.iter().filter(|place| place.moved).map(|place| place.name.as_str()).collect();
     let moves = |name: &str| model.motions.iter().any(|motion| motion.on == name && motion.amplitude != 0.0);
     for (number, (place, row)) in places.stated.iter().zip(rows).enumerate().filter(|(_, (place, _))| !place.moved) {
         let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
-        let mut on = row.iter().filter(|(at, weight)| *at >= free && weight.abs() > DEPENDENT * size);
+        let mut on = row.iter().filter(|(at, weight)| *at >= free && weight.abs() > DEPENDENCE_TOLERANCE * size);
         if of_body[number] {
-            unseen[number] = on.any(|(at, _)| moves(moved[at - free]));
+            without_results[number] = on.any(|(at, _)| moves(moved[at - free]));
             continue;
         }
         let Some((at, _)) = on.next() else { continue };
@@ -246,7 +246,7 @@ fn follows(
         );
         return Err(ModelError::new(Element::Motion(motion), "on", message));
     }
-    Ok(unseen)
+    Ok(without_results)
 }
 
 /// The transformation `x = T (q, u)`, in which moved displacements replace some coordinates.
@@ -262,11 +262,11 @@ impl MotionElimination {
         // x_p = Σ a x + Σ b u for every replaced coordinate; the indices of u begin at `count`
         let mut given: BTreeMap<usize, Row> = BTreeMap::new();
         for (k, (name, row)) in moved.iter().enumerate() {
-            let row = combined(substituted(row, &given));
+            let row = merge_duplicates(substituted(row, &given));
             let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
             let free = row.iter().filter(|(at, _)| *at < count);
             let most = free.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()).then(b.0.cmp(&a.0)));
-            let Some(&(at, weight)) = most.filter(|(_, weight)| weight.abs() > DEPENDENT * size) else {
+            let Some(&(at, weight)) = most.filter(|(_, weight)| weight.abs() > DEPENDENCE_TOLERANCE * size) else {
                 let message =
                     format!("the motion of `{name}` is determined by other imposed motions; remove one of them");
                 return Err(ModelError::new(Element::Motion(0), "on", message));
@@ -274,7 +274,7 @@ impl MotionElimination {
             let mut own: Row = vec![(count + k, 1.0 / weight)];
             own.extend(row.iter().filter(|part| part.0 != at).map(|part| (part.0, -part.1 / weight)));
             let one = BTreeMap::from([(at, own)]);
-            given.values_mut().for_each(|other| *other = combined(substituted(other, &one)));
+            given.values_mut().for_each(|other| *other = merge_duplicates(substituted(other, &one)));
             given.extend(one);
         }
         let free = count - given.len();
@@ -300,12 +300,13 @@ impl MotionElimination {
     /// `x = Z q + t u` describes the same structure for every `t` that moves the moved place by
     /// one. This function takes the `t` of the least norm that does not move the other places.
     /// The places stay unchanged if no such `t` exists.
-    fn unseen(&mut self, others: &[Row]) {
+    fn decouple(&mut self, others: &[Row]) {
         let size = |row: &Row| row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
         let moved = self.rows.iter().flatten().map(|(at, _)| (at + 1).saturating_sub(self.free)).max().unwrap_or(0);
-        let follows =
-            |row: &Row| row.iter().any(|(at, weight)| *at >= self.free && weight.abs() > DEPENDENT * size(row));
-        if others.len() > MOST_UNSEEN || !others.iter().any(follows) {
+        let follows = |row: &Row| {
+            row.iter().any(|(at, weight)| *at >= self.free && weight.abs() > DEPENDENCE_TOLERANCE * size(row))
+        };
+        if others.len() > DECOUPLING_LIMIT || !others.iter().any(follows) {
             return;
         }
         let mut parts = DMatrix::zeros(others.len(), self.free + moved);
@@ -314,7 +315,7 @@ impl MotionElimination {
         }
         let (own, direct) = (parts.columns(0, self.free), parts.columns(self.free, moved));
         let Some(eigen) = eigen::symmetric(own * own.transpose()) else { return };
-        let least = DEPENDENT * eigen.eigenvalues.amax();
+        let least = DEPENDENCE_TOLERANCE * eigen.eigenvalues.amax();
         let inverse = eigen.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
         let shapes = &eigen.eigenvectors;
         let weights = shapes * DMatrix::from_diagonal(&inverse) * (shapes.transpose() * direct);
@@ -330,14 +331,14 @@ impl MotionElimination {
                 .filter(|(_, weight)| *weight != 0.0)
                 .collect();
             row.extend(more);
-            *row = combined(std::mem::take(row));
+            *row = merge_duplicates(std::mem::take(row));
         }
     }
 
     /// Transforms a weighted sum of the coordinates to the free and then the moved coordinates.
     fn row(&self, row: &Row) -> Row {
         let parts = row.iter().flat_map(|(at, weight)| self.rows[*at].iter().map(move |(to, w)| (*to, weight * w)));
-        combined(parts.collect())
+        merge_duplicates(parts.collect())
     }
 
     /// Returns `Tᵀ A T`.
@@ -380,7 +381,7 @@ fn substituted(row: &Row, given: &BTreeMap<usize, Row>) -> Row {
 }
 
 /// Returns the same sum with every coordinate once, in the order of first occurrence.
-pub(super) fn combined(row: Row) -> Row {
+pub(super) fn merge_duplicates(row: Row) -> Row {
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
     let mut out: Row = Vec::with_capacity(row.len());
     for (at, weight) in row {

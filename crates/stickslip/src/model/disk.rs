@@ -30,11 +30,11 @@ pub enum Around {
 
 impl Around {
     /// Returns the fraction of the amplitude and the phase lead (rad) in a sector.
-    fn at(self, sector: usize, sectors: usize) -> (f64, f64) {
-        let phase = |order: i64| crate::structure::turn(turns(order, sector, sectors), sectors);
+    fn in_sector(self, sector: usize, sectors: usize) -> (f64, f64) {
+        let phase = |order: i64| crate::structure::unit_root(reduced_order(order, sector, sectors), sectors);
         match self {
             // without whole turns, so that equivalent orders give identical bits
-            Around::EngineOrder(order) => (1.0, TAU * turns(order, sector, sectors) as f64 / sectors as f64),
+            Around::EngineOrder(order) => (1.0, TAU * reduced_order(order, sector, sectors) as f64 / sectors as f64),
             Around::NodalDiameter(diameter) => (phase(diameter).re, 0.0),
             Around::Sector(one) => (if one == sector { 1.0 } else { 0.0 }, 0.0),
         }
@@ -43,11 +43,11 @@ impl Around {
     /// Returns the order of the wave, from 0 to the number of sectors, if it travels.
     fn order(self, sectors: usize) -> Option<usize> {
         match self {
-            Around::EngineOrder(order) => Some(turns(order, 1, sectors) as usize),
+            Around::EngineOrder(order) => Some(reduced_order(order, 1, sectors) as usize),
             // a wave with all sectors in phase, or with opposite adjacent sectors, both stands
             // and travels
             Around::NodalDiameter(diameter) => {
-                let order = turns(diameter, 1, sectors) as usize;
+                let order = reduced_order(diameter, 1, sectors) as usize;
                 (2 * order).is_multiple_of(sectors).then_some(order)
             }
             Around::Sector(_) => None,
@@ -56,7 +56,7 @@ impl Around {
 }
 
 /// Returns `order · sector` without whole turns.
-fn turns(order: i64, sector: usize, sectors: usize) -> i64 {
+fn reduced_order(order: i64, sector: usize, sectors: usize) -> i64 {
     let sectors = sectors as i64;
     (order.rem_euclid(sectors) * sector as i64).rem_euclid(sectors)
 }
@@ -141,13 +141,13 @@ impl Disk {
                 joint.name = format!("{}_{s}", joint.name);
                 joint.between = joint.between.each_ref().map(name);
             }
-            for (force, around) in one.forces.iter_mut().zip(spread(&self.forces)) {
-                let (share, lead) = around.at(s, self.sectors);
+            for (force, around) in one.forces.iter_mut().zip(distributions(&self.forces)) {
+                let (share, lead) = around.in_sector(s, self.sectors);
                 force.on = name(&force.on);
                 (force.amplitude, force.phase) = (force.amplitude * share, force.phase + lead);
             }
-            for (motion, around) in one.motions.iter_mut().zip(spread(&self.motions)) {
-                let (share, lead) = around.at(s, self.sectors);
+            for (motion, around) in one.motions.iter_mut().zip(distributions(&self.motions)) {
+                let (share, lead) = around.in_sector(s, self.sectors);
                 motion.on = name(&motion.on);
                 (motion.amplitude, motion.phase) = (motion.amplitude * share, motion.phase + lead);
             }
@@ -171,9 +171,12 @@ impl Disk {
     /// `harmonic · order` is the engine order of each part, up to whole turns.
     fn order(&self, sector: &Model) -> Option<usize> {
         let forces =
-            sector.forces.iter().zip(spread(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
-        let motions =
-            sector.motions.iter().zip(spread(&self.motions)).map(|(m, around)| (m.amplitude, m.harmonic, around));
+            sector.forces.iter().zip(distributions(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
+        let motions = sector
+            .motions
+            .iter()
+            .zip(distributions(&self.motions))
+            .map(|(m, around)| (m.amplitude, m.harmonic, around));
         let excitation: Vec<(u32, Around)> = forces
             .chain(motions)
             .filter(|(amplitude, ..)| *amplitude != 0.0)
@@ -260,11 +263,11 @@ impl Disk {
                 _ => Ok(()),
             }
         };
-        for (i, (force, around)) in sector.forces.iter().zip(spread(&self.forces)).enumerate() {
+        for (i, (force, around)) in sector.forces.iter().zip(distributions(&self.forces)).enumerate() {
             excited(&force.on, around, Element::Force(i))?;
             find(&force.on, Element::Force(i), "on")?;
         }
-        for (i, (motion, around)) in sector.motions.iter().zip(spread(&self.motions)).enumerate() {
+        for (i, (motion, around)) in sector.motions.iter().zip(distributions(&self.motions)).enumerate() {
             excited(&motion.on, around, Element::Motion(i))?;
         }
         Ok(())
@@ -366,7 +369,7 @@ fn joins([a, b]: &[String; 2], [c, d]: &[String; 2]) -> bool {
 }
 
 /// Extends the list with engine order 0 for all further elements.
-fn spread(stated: &[Around]) -> impl Iterator<Item = Around> {
+fn distributions(stated: &[Around]) -> impl Iterator<Item = Around> {
     stated.iter().copied().chain(std::iter::repeat(Around::EngineOrder(0)))
 }
 
@@ -446,7 +449,7 @@ mod tests {
 
     /// One sector is solved only if the complete excitation travels with the wave.
     #[test]
-    fn which_waves_travel() {
+    fn travelling_waves_are_detected() {
         let order = |forces: &[(u32, Around)], sectors: usize| {
             let mut sector = sector();
             sector.forces = forces

@@ -142,7 +142,7 @@ impl Places {
             collected.body(i, body)?;
         }
         for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_some()) {
-            viewed(model, place, Element::Place(i))?;
+            check_view(model, place, Element::Place(i))?;
             collected.node(Element::Place(i), (&place.name, &place.directions), |along| PlaceSource::View(i, along))?;
         }
         collected.moved(model)?;
@@ -150,10 +150,10 @@ impl Places {
         let mut joints = BTreeSet::new();
         for (i, joint) in model.joints.iter().enumerate() {
             let element = Element::Joint(i);
-            identifier(&joint.name, element, "name", is_identifier)?;
+            check_identifier(&joint.name, element, "name", is_identifier)?;
             let taken = columns.contains(&joint.name) || places.directions.contains_key(&joint.name);
             if taken || !joints.insert(joint.name.as_str()) {
-                return twice(&joint.name, element, "name");
+                return duplicate_name(&joint.name, element, "name");
             }
         }
         Ok(places)
@@ -256,7 +256,7 @@ impl Places {
 
 /// Checks a place that is a view of another node: the node must have the directions that its
 /// rows use.
-fn viewed(model: &Model, place: &Place, element: Element) -> Result<(), ModelError> {
+fn check_view(model: &Model, place: &Place, element: Element) -> Result<(), ModelError> {
     let Some(of) = &place.of else { return Ok(()) };
     let mass = model.masses.iter().find(|mass| mass.name == *of).map(|mass| mass.places().len());
     let body = model.bodies.iter().find(|body| body.name == *of).map(|body| body.directions.len());
@@ -299,19 +299,19 @@ impl PlaceCollector<'_> {
         (name, directions): (&String, &Vec<String>),
         of: impl Fn(usize) -> PlaceSource,
     ) -> Result<(), ModelError> {
-        identifier(name, element, "name", is_identifier)?;
+        check_identifier(name, element, "name", is_identifier)?;
         if directions.len() > crate::law::MOST_DIRECTIONS {
             let message = format!("a node has at most three directions, found {}", directions.len());
             return Err(ModelError::new(element, "directions", message));
         }
         for (k, along) in directions.iter().enumerate() {
-            identifier(along, element, "directions", is_identifier)?;
+            check_identifier(along, element, "directions", is_identifier)?;
             if directions[..k].contains(along) {
-                return twice(along, element, "directions");
+                return duplicate_name(along, element, "directions");
             }
         }
         if self.places.directions.contains_key(name) || self.places.ends.contains_key(name) {
-            return twice(name, element, "name");
+            return duplicate_name(name, element, "name");
         }
         for (along, place) in places_of(name, directions).into_iter().enumerate() {
             let moved = self.motions.contains(place.as_str());
@@ -326,14 +326,14 @@ impl PlaceCollector<'_> {
     /// Adds a rigid body. As a node, the body has the displacements of its centre of mass.
     fn body(&mut self, index: usize, body: &Body) -> Result<(), ModelError> {
         let element = Element::Body(index);
-        identifier(&body.name, element, "name", is_identifier)?;
+        check_identifier(&body.name, element, "name", is_identifier)?;
         body.check().map_err(|(key, message)| ModelError::new(element, key, message))?;
         if self.places.directions.contains_key(&body.name) || self.places.ends.contains_key(&body.name) {
-            return twice(&body.name, element, "name");
+            return duplicate_name(&body.name, element, "name");
         }
         for (along, (name, place)) in body.directions.iter().zip(body.places()).enumerate() {
             if body.directions[..along].contains(name) {
-                return twice(name, element, "directions");
+                return duplicate_name(name, element, "directions");
             }
             let (moved, radius) = (self.motions.contains(place.as_str()), body.radius(name));
             self.place(
@@ -350,7 +350,7 @@ impl PlaceCollector<'_> {
     fn place(&mut self, place: DeclaredPlace, element: Element, key: &'static str) -> Result<(), ModelError> {
         let column = place.name.replace('.', "_");
         if !self.columns.insert(column.clone()) {
-            return twice(&column, element, key);
+            return duplicate_name(&column, element, key);
         }
         self.places.ends.insert(place.name.clone(), PlaceTarget::At(self.places.stated.len()));
         self.places.stated.push(place);
@@ -361,7 +361,7 @@ impl PlaceCollector<'_> {
     fn moved(&mut self, model: &Model) -> Result<(), ModelError> {
         for (i, motion) in model.motions.iter().enumerate() {
             let element = Element::Motion(i);
-            identifier(&motion.on, element, "on", is_place)?;
+            check_identifier(&motion.on, element, "on", is_place)?;
             if self.places.ends.contains_key(&motion.on) {
                 continue;
             }
@@ -379,7 +379,12 @@ impl PlaceCollector<'_> {
     }
 }
 
-fn identifier(name: &str, element: Element, key: &'static str, accepts: fn(&str) -> bool) -> Result<(), ModelError> {
+fn check_identifier(
+    name: &str,
+    element: Element,
+    key: &'static str,
+    accepts: fn(&str) -> bool,
+) -> Result<(), ModelError> {
     if name == GROUND {
         Err(ModelError::new(element, key, "`ground` is the fixed frame and cannot be declared"))
     } else if accepts(name) {
@@ -390,6 +395,6 @@ fn identifier(name: &str, element: Element, key: &'static str, accepts: fn(&str)
     }
 }
 
-fn twice<T>(name: &str, element: Element, key: &'static str) -> Result<T, ModelError> {
+fn duplicate_name<T>(name: &str, element: Element, key: &'static str) -> Result<T, ModelError> {
     Err(ModelError::new(element, key, format!("the name `{name}` appears twice")))
 }

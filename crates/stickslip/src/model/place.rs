@@ -119,7 +119,9 @@ pub enum FrameError {
     #[error("the {0} must be three finite numbers, not all zero")]
     NoDirection(&'static str),
     /// The tangent is parallel to the normal.
-    #[error("the angle between tangent and normal is {angle:.1} degrees; it must be more than {LEAST} degrees")]
+    #[error(
+        "the angle between tangent and normal is {angle:.1} degrees; it must be more than {MIN_TANGENT_ANGLE} degrees"
+    )]
     Parallel {
         /// Angle between tangent and normal, degrees.
         angle: f64,
@@ -128,7 +130,7 @@ pub enum FrameError {
 
 /// Smallest angle between a tangent and the normal or its opposite, degrees. Vectors with three
 /// digits still define a plane at this angle.
-const LEAST: f64 = 1.0;
+const MIN_TANGENT_ANGLE: f64 = 1.0;
 
 impl Frame {
     /// Creates a frame from a normal and an optional tangent.
@@ -151,7 +153,7 @@ impl Frame {
         let share = dot(along, normal);
         let across: [f64; 3] = std::array::from_fn(|i| along[i] - share * normal[i]);
         let angle = dot(across, across).sqrt().atan2(share.abs()).to_degrees();
-        let first = unit(across).filter(|_| angle > LEAST).ok_or(FrameError::Parallel { angle })?;
+        let first = unit(across).filter(|_| angle > MIN_TANGENT_ANGLE).ok_or(FrameError::Parallel { angle })?;
         let second = [
             normal[1] * first[2] - normal[2] * first[1],
             normal[2] * first[0] - normal[0] * first[2],

@@ -54,12 +54,12 @@ impl SubstructureParts {
             (_, None) => {}
         }
         match substructure.reduction {
-            Reduction::None { up_to } => SubstructureParts::whole(substructure, up_to, model),
+            Reduction::None { up_to } => SubstructureParts::full(substructure, up_to, model),
             _ => SubstructureParts::reduced(substructure, model),
         }
     }
 
-    fn whole(substructure: &Substructure, up_to: f64, model: &Model) -> Result<Self, ModelError> {
+    fn full(substructure: &Substructure, up_to: f64, model: &Model) -> Result<Self, ModelError> {
         let (mass, own, stiffness) = substructure.component.matrices();
         let entries: Entries = mass.entries().collect();
         let springs: Entries = stiffness.entries().collect();
@@ -69,7 +69,7 @@ impl SubstructureParts {
         };
         let mut modes = None;
         let mut modal = |ratio: f64, up_to: f64| {
-            let (stiffness, damped) = substructure.component.modal_damping(ratio, up_to).map_err(failed)?;
+            let (stiffness, damped) = substructure.component.modal_damping(ratio, up_to).map_err(reduction_error)?;
             modes = Some(damped).filter(|damped| !damped.is_empty());
             Ok::<_, ModelError>(times(&springs, stiffness))
         };
@@ -94,10 +94,10 @@ impl SubstructureParts {
     fn reduced(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
         let own = model.places.iter().filter(|place| place.of.is_none());
         let seen: Vec<Row> = own.flat_map(|place| place.rows.iter().cloned()).collect();
-        let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(failed)?;
+        let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(reduction_error)?;
         let ReducedForm::Alone(reduced) = component.form() else { return Ok(SubstructureParts::default()) };
         let damped = damping_law(substructure, &component).map(|damping| reduced.damped(&damping));
-        let damped = damped.transpose().map_err(failed)?;
+        let damped = damped.transpose().map_err(reduction_error)?;
         let reduced = damped.as_ref().unwrap_or(reduced);
         let entries = |matrix: &nalgebra::DMatrix<f64>| -> Entries {
             let all = (0..matrix.ncols()).flat_map(|k| (0..matrix.nrows()).map(move |i| (i, k)));
@@ -155,8 +155,8 @@ impl SubstructureParts {
             (Reduction::None { .. }, _) => SectorParts::whole(substructure, &kept, &seen, blade.as_deref())?,
             (_, None) => SectorParts::reduced(substructure, &kept, &seen, sectors)?,
             (_, Some(blade)) => {
-                let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(failed)?;
-                return SubstructureParts::in_modes(substructure, component, model);
+                let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(reduction_error)?;
+                return SubstructureParts::mistuned_ring(substructure, component, model);
             }
         };
         let n = one.names.len();
@@ -198,13 +198,13 @@ impl SubstructureParts {
     }
 
     /// Returns a mistuned ring in its own modes.
-    fn in_modes(
+    fn mistuned_ring(
         substructure: &Substructure,
         component: Arc<ReducedComponent>,
         model: &Model,
     ) -> Result<Self, ModelError> {
-        let ReducedForm::Ring(modes) = component.form() else { return Err(failed(ReductionError::NoPorts)) };
-        let damping = modes.damped(damping_law(substructure, &component).as_ref()).map_err(failed)?;
+        let ReducedForm::Ring(modes) = component.form() else { return Err(reduction_error(ReductionError::NoPorts)) };
+        let damping = modes.damped(damping_law(substructure, &component).as_ref()).map_err(reduction_error)?;
         let own = |of: usize| modes.own.iter().enumerate().map(|(k, own)| (k, k, own[of])).collect();
         let mut next = 0;
         let of_place = |place: &super::Place| {
@@ -247,7 +247,7 @@ impl SectorParts {
             SubstructureDamping::Rayleigh { mass, stiffness } => {
                 [scaled(&sector.mass, mass), scaled(&sector.stiffness, stiffness)].concat()
             }
-            SubstructureDamping::Ratio(_) | SubstructureDamping::RatioUpTo { .. } => return Err(no_modes()),
+            SubstructureDamping::Ratio(_) | SubstructureDamping::RatioUpTo { .. } => return Err(modal_damping_error()),
         };
         let rows = substructure.component.rows();
         Ok(SectorParts {
@@ -265,10 +265,12 @@ impl SectorParts {
         seen: &[Row],
         sectors: usize,
     ) -> Result<Self, ModelError> {
-        let component = kept.reduced(seen, &substructure.reduction).map_err(failed)?;
-        let ReducedForm::Sector(sector) = component.form() else { return Err(failed(ReductionError::NoPorts)) };
+        let component = kept.reduced(seen, &substructure.reduction).map_err(reduction_error)?;
+        let ReducedForm::Sector(sector) = component.form() else {
+            return Err(reduction_error(ReductionError::NoPorts));
+        };
         let damping = match damping_law(substructure, &component) {
-            Some(law) => sector.damped(&law, sectors).map_err(failed)?,
+            Some(law) => sector.damped(&law, sectors).map_err(reduction_error)?,
             None => sector.damping.clone().unwrap_or_default(),
         };
         let mut places = vec![RingRow::new(); seen.len()];
@@ -293,7 +295,7 @@ fn scaled(entries: &[RingEntry], factor: f64) -> Vec<RingEntry> {
     all.map(|&(row, column, shift, value)| (row, column, shift, factor * value)).collect()
 }
 
-fn failed(error: ReductionError) -> ModelError {
+fn reduction_error(error: ReductionError) -> ModelError {
     let key = match &error {
         ReductionError::Modes(ModesError::Negative { .. }) => "stiffness",
         ReductionError::Modes(ModesError::NegativeMass) => "mass",
@@ -312,7 +314,7 @@ fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Opt
     }
 }
 
-fn no_modes() -> ModelError {
+fn modal_damping_error() -> ModelError {
     let message = "a damping ratio needs the modes of the ring, which are computed only with a reduction; use \
                    `rayleigh` or a damping matrix, or remove `reduce = false`";
     ModelError::new(Element::Substructure, "modal_damping", message)

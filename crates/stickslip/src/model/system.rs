@@ -2,7 +2,7 @@
 
 use super::ReductionEvidence;
 use crate::law::{LawError, SharedLaw};
-use crate::structure::{ReducedComponent, Sector, Structure, turn};
+use crate::structure::{ReducedComponent, Sector, Structure, unit_root};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 pub struct System {
     structure: Structure,
     places: Vec<String>,
-    seen: Vec<Axis>,
+    place_axes: Vec<Axis>,
     reduced: Option<Arc<ReducedComponent>>,
     earlier: Option<ReductionEvidence>,
     joints: Vec<SystemJoint>,
@@ -68,7 +68,7 @@ impl Cyclic {
     /// Returns the phase factor of a harmonic in sector `sector` relative to the first sector,
     /// `e^{j 2π h order n / sectors}`.
     pub fn lead(self, harmonic: usize, sector: usize) -> Complex64 {
-        turn((self.diameter(harmonic) * sector) as i64, self.sectors)
+        unit_root((self.diameter(harmonic) * sector) as i64, self.sectors)
     }
 }
 
@@ -76,7 +76,7 @@ impl PartialEq for System {
     fn eq(&self, other: &Self) -> bool {
         self.structure == other.structure
             && self.places == other.places
-            && self.seen == other.seen
+            && self.place_axes == other.place_axes
             && self.joints == other.joints
             && self.loads == other.loads
             && self.moved == other.moved
@@ -352,9 +352,9 @@ impl SystemBuilder {
     /// Adds a place of results. Without any call, each degree of freedom is a place.
     #[must_use]
     pub fn place(mut self, name: impl Into<String>, along: Axis) -> Self {
-        let (names, seen) = self.places.get_or_insert_default();
+        let (names, place_axes) = self.places.get_or_insert_default();
         names.push(name.into());
-        seen.push(along);
+        place_axes.push(along);
         self
     }
 
@@ -425,8 +425,8 @@ impl SystemBuilder {
             let rows = (0..n).map(|row| Axis::new(vec![(row, 1.0)]));
             (self.structure.places().to_vec(), rows.collect())
         };
-        let (places, seen) = self.places.unwrap_or_else(unit);
-        for (name, axis) in places.iter().zip(&seen) {
+        let (places, place_axes) = self.places.unwrap_or_else(unit);
+        for (name, axis) in places.iter().zip(&place_axes) {
             axis.check(n, || format!("place `{name}`"))?;
         }
         for joint in &self.joints {
@@ -442,7 +442,7 @@ impl SystemBuilder {
         Ok(System {
             structure: self.structure,
             places,
-            seen,
+            place_axes,
             reduced: self.reduced,
             earlier: self.earlier,
             joints: self.joints,
@@ -455,7 +455,7 @@ impl SystemBuilder {
 
 /// Relative difference between loads of a sector and those of the first sector that counts as
 /// rounding of the phases. It is relative to the largest load.
-const ALIKE: f64 = 1e-12;
+const SYMMETRY_TOLERANCE: f64 = 1e-12;
 
 impl System {
     /// Creates a builder for a system on a structure.
@@ -485,7 +485,7 @@ impl System {
     pub fn on(&self, structure: Structure) -> Result<System, SystemError> {
         let loads = self.loads.iter().map(|load| (load.harmonic, load.clone()));
         let builder = SystemBuilder {
-            places: Some((self.places.clone(), self.seen.clone())),
+            places: Some((self.places.clone(), self.place_axes.clone())),
             reduced: self.reduced.clone(),
             earlier: self.earlier,
             joints: self.joints.clone(),
@@ -500,7 +500,7 @@ impl System {
     ///
     /// Harmonic h becomes `h · periods`. A motion that repeats after `periods` periods of the
     /// excitation repeats after one period of the new system.
-    pub(crate) fn slowed(&self, periods: u32) -> System {
+    pub(crate) fn subharmonic(&self, periods: u32) -> System {
         // a motion of several periods need not travel with the excitation
         let mut system = System { cyclic: None, ..self.clone() };
         system.loads.iter_mut().for_each(|load| load.harmonic *= periods);
@@ -516,7 +516,7 @@ impl System {
     /// # Errors
     /// [`SystemError::NotCyclic`]: the sectors differ, or the loads do not travel with the wave.
     pub fn travelling(self, cyclic: Cyclic) -> Result<System, SystemError> {
-        match self.off(cyclic) {
+        match self.symmetry_violation(cyclic) {
             Some(what) => Err(SystemError::NotCyclic(what)),
             None => Ok(System { cyclic: Some(cyclic), ..self }),
         }
@@ -529,7 +529,7 @@ impl System {
     }
 
     /// Returns the first part of the system that violates the given symmetry.
-    fn off(&self, cyclic: Cyclic) -> Option<&'static str> {
+    fn symmetry_violation(&self, cyclic: Cyclic) -> Option<&'static str> {
         let Cyclic { sectors, order } = cyclic;
         let n = self.dofs();
         if order >= sectors || Sector::of(&self.structure, sectors).is_none() {
@@ -537,7 +537,7 @@ impl System {
         }
         let size = n / sectors;
         let near = |first: Complex64, harmonic: u32, sector: usize, z: Complex64, largest: f64| {
-            (first * cyclic.lead(harmonic as usize, sector) - z).norm() <= ALIKE * largest
+            (first * cyclic.lead(harmonic as usize, sector) - z).norm() <= SYMMETRY_TOLERANCE * largest
         };
         for load in &self.loads {
             for values in [&load.force, &load.by_velocity, &load.by_acceleration] {
@@ -592,7 +592,7 @@ impl System {
 
     /// Returns each place as a weighted sum of degrees of freedom.
     pub fn seen(&self) -> &[Axis] {
-        &self.seen
+        &self.place_axes
     }
 
     /// Returns the reduced component that is a part of the structure, with its error.
@@ -616,7 +616,7 @@ impl System {
     /// Returns displacements, velocities or accelerations at the places, from those of the
     /// degrees of freedom (length n).
     pub fn at_places(&self, values: &[f64]) -> Vec<f64> {
-        self.seen.iter().map(|axis| axis.along(values)).collect()
+        self.place_axes.iter().map(|axis| axis.along(values)).collect()
     }
 
     /// Returns the joints.

@@ -101,7 +101,7 @@ pub enum Breakdown {
         time: f64,
     },
     /// The motion grows without bound, or a number is no longer finite.
-    #[error("the motion{} grows without bound{}", .place.as_ref().map_or_else(String::new, |place| format!(" of `{place}`")), by(*.time))]
+    #[error("the motion{} grows without bound{}", .place.as_ref().map_or_else(String::new, |place| format!(" of `{place}`")), time_suffix(*.time))]
     Unbounded {
         /// Time of the failure, s; not finite if it is unknown.
         time: f64,
@@ -112,13 +112,13 @@ pub enum Breakdown {
 
 /// Formats an estimate with two digits, or with four if two do not distinguish it from the
 /// tolerance.
-fn told_apart(estimate: f64, tolerance: f64) -> String {
+fn distinct_digits(estimate: f64, tolerance: f64) -> String {
     let short = format!("{estimate:.1e}");
     if short == format!("{tolerance:.1e}") { format!("{estimate:.3e}") } else { short }
 }
 
 /// Returns advice for a series that is too short.
-fn beyond(needed: Option<usize>) -> String {
+fn truncation_advice(needed: Option<usize>) -> String {
     let raise = "raise `tolerance`";
     needed.map_or_else(
         || format!("; {raise}"),
@@ -131,25 +131,25 @@ fn beyond(needed: Option<usize>) -> String {
     )
 }
 
-fn by(time: f64) -> String {
+fn time_suffix(time: f64) -> String {
     if time.is_finite() { format!(" by t = {time:.6e} s") } else { String::new() }
 }
 
 impl Breakdown {
     /// Returns the time of the failure, s, if known.
     pub fn time(&self) -> Option<f64> {
-        self.clone().instant().map(|time| *time).filter(|time| time.is_finite())
+        self.clone().time_mut().map(|time| *time).filter(|time| time.is_finite())
     }
 
     /// Shifts the time of the failure by `begin` (s), for a motion that began later.
-    pub(crate) fn later(mut self, begin: f64) -> Self {
-        if let Some(time) = self.instant() {
+    pub(crate) fn shifted(mut self, begin: f64) -> Self {
+        if let Some(time) = self.time_mut() {
             *time += begin;
         }
         self
     }
 
-    fn instant(&mut self) -> Option<&mut f64> {
+    fn time_mut(&mut self) -> Option<&mut f64> {
         match self {
             Breakdown::Chatter { time, .. }
             | Breakdown::Redundant { time, .. }
@@ -193,7 +193,7 @@ pub enum OrbitError {
     /// The motion does not settle.
     #[error(
         "{method} at Ω = {omega:.4} rad/s: the motion has not settled after {returns} returns; it still changes by {change:.1e} per return{}",
-        unsettled(*.repeats, *.needed, .instead)
+        settling_advice(*.repeats, *.needed, .instead)
     )]
     Unsettled {
         /// Name of the method.
@@ -237,7 +237,7 @@ pub enum OrbitError {
     /// The longest series that the method may use does not reach the tolerance.
     #[error(
         "{method} at Ω = {omega:.4} rad/s: the estimated error with {harmonics} harmonics is {}, above the tolerance {tolerance:.1e}{}{instead}",
-        told_apart(*.estimate, *.tolerance), beyond(*.needed)
+        distinct_digits(*.estimate, *.tolerance), truncation_advice(*.needed)
     )]
     Truncation {
         /// Name of the method.
@@ -292,7 +292,7 @@ pub enum OrbitError {
     #[error(
         "{method} at Ω = {omega:.4} rad/s: without its joints, the structure {}: {}",
         if *resonance == 0.0 { "has a rigid-body mode" } else { "has an undamped resonance" },
-        unbounded(*resonance)
+        resonance_advice(*resonance)
     )]
     Resonance {
         /// Name of the method.
@@ -399,7 +399,7 @@ impl std::fmt::Display for Course {
 }
 
 /// Describes a motion that does not settle, and gives advice.
-fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> String {
+fn settling_advice(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> String {
     let by_newton = if instead.is_empty() { String::new() } else { format!("{instead}, which needs no settling") };
     match repeats {
         // A motion that repeats after one return is settled, so `repeats` is at least 2.
@@ -419,7 +419,7 @@ fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> Stri
 
 /// Describes a structure with an undamped resonance at this frequency, rad/s, and gives advice.
 /// Zero means a mean force that no stiffness carries.
-fn unbounded(resonance: f64) -> String {
+fn resonance_advice(resonance: f64) -> String {
     if resonance == 0.0 {
         return "some bodies have no support; add a spring, or a constant force or preload that closes their contacts"
             .to_owned();
@@ -435,7 +435,7 @@ impl OrbitError {
     }
 
     /// Adds that the method `other` found no orbit either.
-    pub(crate) fn after(mut self, other: &str) -> Self {
+    pub(crate) fn with_failed_alternative(mut self, other: &str) -> Self {
         match &mut self {
             OrbitError::NotConverged { instead, .. } | OrbitError::Truncation { instead, .. } => {
                 *instead = format!("; `{other}` found no orbit either");

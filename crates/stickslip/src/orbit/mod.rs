@@ -62,7 +62,7 @@ pub(crate) fn laws(system: &System) -> impl Iterator<Item = &SharedLaw> {
 
 /// Returns the names of joints whose history affects the orbit: see [`Evidence::history`]. The
 /// laws are those that the method used.
-pub(crate) fn history<'a>(
+pub(crate) fn history_dependent_joints<'a>(
     laws: impl Iterator<Item = &'a SharedLaw>,
     joints: &[JointMotion],
     stuck: &[String],
@@ -111,14 +111,14 @@ pub struct Found {
 /// Permitted difference between the ends of a period, and between `start` and the path.
 /// Displacements are relative to their size, velocities to their size times Ω. A series of a few
 /// harmonics is no more accurate.
-const CLOSES: f64 = 1e-3;
+const CLOSURE: f64 = 1e-3;
 /// Two states are equal below this difference relative to the largest amplitude (velocities:
 /// times Ω). Time integration closes orbits to 1e-9, which stiff contacts degrade to 1e-7. The
 /// second constant is the number of instants that are compared.
-const REPEATS: f64 = 1e-6;
-const REPEATED_AT: usize = 8;
+const EQUAL_STATES: f64 = 1e-6;
+const COMPARED_INSTANTS: usize = 8;
 /// Distance from the end of the period at which the path is evaluated, relative to the period.
-const BEFORE: f64 = 1e-9;
+const END_OFFSET: f64 = 1e-9;
 /// Energy gap above which a motion is not an orbit of the system.
 const LARGEST_GAP: f64 = 0.1;
 
@@ -182,13 +182,13 @@ impl Orbit {
             return Err(wrong("has a `start` without finite displacements and velocities of all degrees of freedom"));
         }
         let sampled = sampled_path::Sampled::new(system, path.as_ref(), omega, period);
-        if !sampled.fits() {
+        if !sampled.is_consistent() {
             return Err(wrong("has samples with a wrong number of values, or with NaN or infinity"));
         }
-        let Ok(measured) = postprocess::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
+        let Ok(measured) = postprocess::results(system, &sampled, omega, (Symmetry::FullPeriod, period));
         let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
         let apart =
-            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSES * size);
+            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSURE * size);
         let rated = |sample: Sample| -> Vec<f64> {
             sample.displacement.into_iter().chain(sample.velocity.into_iter().map(|v| v / omega)).collect()
         };
@@ -197,7 +197,7 @@ impl Orbit {
         if apart(&begin, 1.0, &stated) {
             return Err(wrong("does not begin at `start`"));
         }
-        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - BEFORE)))) {
+        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - END_OFFSET)))) {
             return Err(wrong("does not return to its initial state after one period"));
         }
         if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
@@ -222,7 +222,7 @@ impl Orbit {
                 truncation,
                 accuracy,
                 return_defect: None,
-                history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+                history: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
                 history_spread: None,
                 found_by: method,
@@ -255,10 +255,10 @@ impl Orbit {
         let size = self.places.iter().map(|place| place.size()).fold(0.0, f64::max);
         let drive = self.period() / self.periods as f64;
         let after = |periods: usize| {
-            (0..REPEATED_AT).all(|i| {
-                let time = self.period() * i as f64 / REPEATED_AT as f64;
+            (0..COMPARED_INSTANTS).all(|i| {
+                let time = self.period() * i as f64 / COMPARED_INSTANTS as f64;
                 let (now, later) = (state(time), state(time + periods as f64 * drive));
-                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= REPEATS * size)
+                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= EQUAL_STATES * size)
             })
         };
         (1..self.periods)

@@ -41,7 +41,7 @@ pub(crate) trait PathSignals {
     /// Returns the contact states of a joint.
     fn faces(&self, joint: usize) -> ContactSummary;
     /// Combines signals of the degrees of freedom into the signal of a place.
-    fn along(&self, place: &Axis, of: impl Fn(usize) -> Self::Signal) -> Self::Signal {
+    fn at_place(&self, place: &Axis, of: impl Fn(usize) -> Self::Signal) -> Self::Signal {
         match *place.rows() {
             [(row, 1.0)] => of(row),
             ref rows => {
@@ -52,8 +52,8 @@ pub(crate) trait PathSignals {
         }
     }
     /// Returns the displacement of a place, m.
-    fn seen(&self, place: &Axis) -> Self::Signal {
-        self.along(place, |row| self.displacement(row))
+    fn place_displacement(&self, place: &Axis) -> Self::Signal {
+        self.at_place(place, |row| self.displacement(row))
     }
     /// Returns the energy that the `force` along an axis dissipates in the return, J.
     fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
@@ -69,19 +69,19 @@ pub(crate) struct ContactSummary {
     pub switches: usize,
     /// True if the joint sticks during the whole return. A joint that stays open neither slips
     /// nor sticks.
-    pub rests: bool,
+    pub sticks_throughout: bool,
 }
 
 /// Number of samples in which a stuck joint may slip. At the edge of a continuum of orbits the
 /// force reaches its limit, and samples cannot resolve the excess.
-const EDGE: usize = 1;
+const EDGE_SAMPLES: usize = 1;
 
 /// Tells whether a joint with these states at the samples sticks during the whole return.
 pub(crate) fn sticks(mut contact: impl Iterator<Item = Contact>) -> bool {
     let mut slips = 0;
     contact.all(|contact| {
         slips += usize::from(contact != Contact::Stick);
-        slips <= EDGE && !matches!(contact, Contact::Touch | Contact::Open)
+        slips <= EDGE_SAMPLES && !matches!(contact, Contact::Touch | Contact::Open)
     })
 }
 
@@ -117,14 +117,14 @@ pub(crate) struct OrbitResults {
     pub energy: Energy,
     /// Force amplitudes times velocity amplitudes times period, J: an upper bound of the
     /// exchanged work.
-    pub possible: f64,
+    pub work_bound: f64,
     /// Names of joints that stick for the whole period.
     pub stuck: Vec<String>,
 }
 
 /// Computes the results of a motion under an excitation of `omega` (rad/s) that repeats after
 /// `period` (s).
-pub(crate) fn measure<S: PathSignals>(
+pub(crate) fn results<S: PathSignals>(
     system: &System,
     signals: &S,
     omega: f64,
@@ -139,7 +139,7 @@ pub(crate) fn measure<S: PathSignals>(
     let mut places = Vec::with_capacity(system.places().len());
     for (name, place) in system.places().iter().zip(system.seen()) {
         let (minimum, maximum) = mirrored(signals.range(place)?);
-        let x = signals.seen(place);
+        let x = signals.place_displacement(place);
         places.push(PlaceMotion {
             name: name.clone(),
             maximum,
@@ -156,10 +156,10 @@ pub(crate) fn measure<S: PathSignals>(
         first = axes.end;
         let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
-        let ContactSummary { shares, switches, rests } = signals.faces(j);
+        let ContactSummary { shares, switches, sticks_throughout } = signals.faces(j);
         // A law without a slip limit never slips, and a smooth law always creeps. Neither counts
         // as stuck, because their orbits are unique.
-        if rests && joint.law().scale().is_finite() && joint.law().rate().is_none() {
+        if sticks_throughout && joint.law().scale().is_finite() && joint.law().rate().is_none() {
             stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {
@@ -175,7 +175,7 @@ pub(crate) fn measure<S: PathSignals>(
     let (energy, possible) = energy(system, signals, omega, &forces);
     let friction = joints.iter().map(|joint| joint.dissipation).sum();
     let energy = Energy { work_in: times * energy.0, viscous: times * energy.1, friction };
-    Ok(OrbitResults { places, joints, energy, possible: times * possible, stuck })
+    Ok(OrbitResults { places, joints, energy, work_bound: times * possible, stuck })
 }
 
 /// Returns the work of the loads and of imposed motion, the loss in dampers, and the bound of
@@ -270,7 +270,7 @@ fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S:
 }
 
 /// Bisection of a turning point ends at this fraction of the interval.
-const REFINED: f64 = 1e-12;
+const BISECTION_WIDTH: f64 = 1e-12;
 
 /// Returns the smallest and the largest value of a signal over intervals. Each interval has its
 /// length, and value, slope and curvature at both ends; the signal is a quintic between them.
@@ -283,7 +283,7 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
         if from[1] * to[1] < 0.0 {
             // one turning point inside: bisection on the velocity
             let (mut left, mut right) = (0.0, 1.0);
-            while right - left > REFINED {
+            while right - left > BISECTION_WIDTH {
                 let middle = 0.5 * (left + right);
                 if quintic(middle, length, from, to).1 * from[1] > 0.0 { left = middle } else { right = middle }
             }
@@ -295,15 +295,19 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
 
 /// Work below this fraction of its bound is no reference for the energy gap, because the motion
 /// is nearly conservative.
-pub(crate) const NO_WORK: f64 = 1e-6;
+pub(crate) const CONSERVATIVE_WORK: f64 = 1e-6;
 
 impl OrbitResults {
     /// Returns `|work in - viscous - friction|` relative to the work. `least` is the smallest
     /// reference energy, J.
     pub fn energy_gap(&self, least: f64) -> f64 {
         let balance = (self.energy.work_in - self.energy.viscous - self.energy.friction).abs();
-        let reference =
-            self.energy.work_in.abs().max(NO_WORK * (self.possible + self.energy.friction.abs())).max(least);
+        let reference = self
+            .energy
+            .work_in
+            .abs()
+            .max(CONSERVATIVE_WORK * (self.work_bound + self.energy.friction.abs()))
+            .max(least);
         if reference > 0.0 { balance / reference } else { balance }
     }
 }

@@ -125,7 +125,7 @@ impl PathSignals for Sampled<'_> {
         ContactSummary {
             shares: ContactFractions::of((0..count).map(|i| (contact(i), self.nodes[i].1))),
             switches: (0..count).filter(|&i| contact(i) != contact(i + 1)).count(),
-            rests: sticks((0..count).map(contact)),
+            sticks_throughout: sticks((0..count).map(contact)),
         }
     }
 }
@@ -133,7 +133,7 @@ impl PathSignals for Sampled<'_> {
 impl Sampled<'_> {
     /// Tells whether every sample matches the numbers of degrees of freedom and joints, and is
     /// finite.
-    pub fn fits(&self) -> bool {
+    pub fn is_consistent(&self) -> bool {
         let n = self.system.dofs();
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         self.samples.iter().all(|sample| {

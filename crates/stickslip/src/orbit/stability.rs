@@ -41,7 +41,7 @@ impl Orbit {
             return Stability::Unknown;
         }
         match eigen::largest_modulus(&self.return_map) {
-            Some(modulus) => Stability::Computed { largest: self.over_period(modulus.into()).norm() },
+            Some(modulus) => Stability::Computed { largest: self.full_period(modulus.into()).norm() },
             None => Stability::Unknown,
         }
     }
@@ -69,7 +69,7 @@ impl Orbit {
             Cow::<DMatrix<f64>>::Borrowed(&self.return_map)
         };
         let found = eigen::eigenvalues(&map)?;
-        let mut multipliers: Vec<Complex64> = found.into_iter().map(|value| self.over_period(value)).collect();
+        let mut multipliers: Vec<Complex64> = found.into_iter().map(|value| self.full_period(value)).collect();
         multipliers.sort_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()).then(b.im.total_cmp(&a.im)));
         Some(multipliers)
     }
@@ -84,7 +84,7 @@ impl Orbit {
     }
 
     /// Converts the multiplier of a return into that of the full period.
-    fn over_period(&self, value: Complex64) -> Complex64 {
+    fn full_period(&self, value: Complex64) -> Complex64 {
         match self.symmetry {
             // the signed half-period map is the square root of the full map
             Symmetry::HalfPeriod => value * value,

@@ -162,11 +162,11 @@ pub(crate) enum ReducedForm {
 /// Number of mistuning patterns whose modes are stored. A case is assembled several times in
 /// succession, and a campaign has a million patterns. The modes of 240 blades with five places
 /// each use 40 MB.
-const PATTERNS: usize = 16;
+const CACHED_PATTERNS: usize = 16;
 
 /// Ratio of the highest retained frequency to the highest frequency of interest. The last modes
 /// only improve those below.
-const BEYOND: f64 = 1.5;
+const MODE_MARGIN: f64 = 1.5;
 
 impl Component {
     /// Creates a component from row names and symmetric sparse matrices.
@@ -195,7 +195,7 @@ impl Component {
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
         let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
         // sizes and symmetry are already checked
-        let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
+        let whole = Whole::without_ports(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let definite = sparse_definite_in_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
@@ -306,7 +306,7 @@ impl Component {
     /// ```
     pub fn modes_below(&self, omega: f64) -> Option<usize> {
         let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
-        once(&self.0.counts, &omega, || {
+        cached(&self.0.counts, &omega, || {
             analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative())
         })
     }
@@ -318,7 +318,7 @@ impl Component {
     /// [`ReductionError`]: no place, a failure of the mode computation, or no reduction within
     /// the tolerance.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
-        once(&self.0.reductions, &(seen.to_vec(), *how), || {
+        cached(&self.0.reductions, &(seen.to_vec(), *how), || {
             self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
         })
     }
@@ -356,15 +356,15 @@ impl Component {
             Reduction::UpTo { tolerance, .. } => tolerance,
             _ => f64::INFINITY,
         };
-        let reduce = |whole: &Whole| in_few(whole, how).map(|few| (few.reduced, few.up_to));
+        let reduce = |whole: &Whole| reduce_whole(whole, how).map(|few| (few.reduced, few.up_to));
         let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
-        let Reduced { mass, damping, stiffness, ports, kind, .. } = few.rest;
+        let Reduced { mass, damping, stiffness, ports, kind, .. } = few.own;
         let damping = if self.matrices().1.is_some() { Some(sparse(&damping)?) } else { None };
         let component = Component::new(vec![String::new(); mass.nrows()], sparse(&mass)?, damping, sparse(&stiffness)?);
         let seen = ports.row_iter().map(|row| row.iter().copied().enumerate().filter(|part| part.1 != 0.0).collect());
         Ok(BetweenComponent {
             component: component.map_err(|_| ReductionError::OutOfRange)?,
-            there: sparse(&few.there.stiffness)?,
+            there: sparse(&few.other.stiffness)?,
             seen: seen.collect(),
             kind,
             error: few.deviation.error,
@@ -420,7 +420,7 @@ impl Component {
     /// Returns damping with one ratio for all modes up to a frequency (rad/s), and proportional
     /// to the stiffness above. The result is stored.
     pub(crate) fn modal_damping(&self, ratio: f64, up_to: f64) -> Damped {
-        once(&self.0.damped, &(ratio, up_to), || {
+        cached(&self.0.damped, &(ratio, up_to), || {
             let (beta, columns) = self.0.whole.modal_damping(ratio, up_to)?;
             Ok((beta, DampedModes::new(self.dofs(), Arc::new(columns))))
         })
@@ -448,7 +448,7 @@ fn sparse(dense: &DMatrix<f64>) -> Result<Matrix, ReductionError> {
 
 /// Returns a stored result, or computes it once. Concurrent identical requests wait for the
 /// first one.
-fn once<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
+fn cached<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
     let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, answer)) = known.iter().find(|(key, _)| key == asked) {
         return answer.clone();
@@ -461,7 +461,7 @@ fn once<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, compute:
 impl SectorCache {
     /// Returns the reduced sector.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
-        once(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
+        cached(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
     }
 
     fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> ReducedResult {
@@ -480,7 +480,7 @@ impl SectorCache {
 
     /// Returns the blade that consists of the rows `blade` of the component.
     pub fn blade(&self, component: &Component, blade: &[usize]) -> KeptBlade {
-        once(&self.blades, &blade.to_vec(), || {
+        cached(&self.blades, &blade.to_vec(), || {
             let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
             let (reductions, mistuned) = (Mutex::default(), Mutex::default());
             Ok(Arc::new(BladeCache { blade, entries: OnceLock::new(), reductions, mistuned }))
@@ -500,16 +500,16 @@ impl SectorCache {
         }
         // other patterns need not wait
         drop(known);
-        let answer = self.nearest(blade, deviations, seen, how)?;
+        let answer = self.best_mistuned(blade, deviations, seen, how)?;
         let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() >= PATTERNS {
+        if known.len() >= CACHED_PATTERNS {
             known.remove(0);
         }
         known.push((asked, answer.clone()));
         Ok(answer)
     }
 
-    fn nearest(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
+    fn best_mistuned(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
         // the number of modes is fixed, without blade vectors
         let (steps, enough) = match *how {
             Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
@@ -518,12 +518,12 @@ impl SectorCache {
         let mut best: Option<(Arc<ReducedRing>, MistunedModes, Deviation)> = None;
         for step in steps {
             // a later failure keeps the earlier result
-            let few = match (self.few(blade, seen, how, step), &best) {
+            let few = match (self.reduced_ring(blade, seen, how, step), &best) {
                 (Ok(few), _) => few,
                 (Err(_), Some(_)) => continue,
                 (Err(error), None) => return Err(error),
             };
-            let mixed = few.ring.mixed(deviations, EXTENTS[0])?;
+            let mixed = few.ring.mistuned_modes(deviations, EXTENTS[0])?;
             let (own, found) =
                 (few.component.deviation, few.lacking.deviation((&mixed.values, &mixed.shapes), deviations));
             let deviation = if found.error > own.error { found } else { own };
@@ -538,7 +538,7 @@ impl SectorCache {
         let (mut modes, mut left_out) = few.ring.modes(&mixed)?;
         for extent in EXTENTS.into_iter().skip(1).filter(|_| enough.is_finite()) {
             if left_out.error > enough {
-                (modes, left_out) = few.ring.modes(&few.ring.mixed(deviations, extent)?)?;
+                (modes, left_out) = few.ring.modes(&few.ring.mistuned_modes(deviations, extent)?)?;
             }
         }
         let deviation = if left_out.error > deviation.error { left_out } else { deviation };
@@ -547,14 +547,14 @@ impl SectorCache {
     }
 
     /// Reduces the sector with the blade vectors of this step; step 0 has none.
-    fn few(&self, blade: &BladeCache, seen: &[Row], how: &Reduction, step: usize) -> ReducedRingResult {
-        once(&blade.reductions, &((seen.to_vec(), *how), step), || {
+    fn reduced_ring(&self, blade: &BladeCache, seen: &[Row], how: &Reduction, step: usize) -> ReducedRingResult {
+        cached(&blade.reductions, &((seen.to_vec(), *how), step), || {
             let component = match step {
                 0 => self.reduced(seen, how)?,
                 _ => self.chosen(seen, how, Some((&blade.blade, step)))?,
             };
             let ReducedForm::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
-            let (of_blade, up_to) = (blade.blade.along(sector.n, &sector.basis), component.up_to);
+            let (of_blade, up_to) = (blade.blade.projected(sector.n, &sector.basis), component.up_to);
             let lacking = MistuningError::new((&self.sector, seen), &blade.blade, sector, up_to)?;
             let ring = NominalRing::new(sector, of_blade, self.sector.sectors, up_to)?;
             Ok(Arc::new(ReducedRing { component, ring, lacking }))
@@ -589,9 +589,9 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 }
 
 fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
-    let ReductionResult { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
+    let ReductionResult { reduced, deviation, modes, up_to, serves } = reduce_whole(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.free());
-    let form = ReducedForm::Alone(Arc::new(reduced.in_metres()));
+    let form = ReducedForm::Alone(Arc::new(reduced.scaled_to_metres()));
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
 
@@ -607,7 +607,7 @@ struct ReductionResult {
     serves: f64,
 }
 
-fn in_few(whole: &Whole, how: &Reduction) -> Result<ReductionResult, ReductionError> {
+fn reduce_whole(whole: &Whole, how: &Reduction) -> Result<ReductionResult, ReductionError> {
     Ok(match *how {
         Reduction::None { .. } => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
@@ -617,11 +617,11 @@ fn in_few(whole: &Whole, how: &Reduction) -> Result<ReductionResult, ReductionEr
         }
         Reduction::Modes { modes: count, kind, orders, up_to } => {
             let modes = whole.lowest_modes(count)?;
-            let serves = natural(&modes).last().map_or(0.0, |last| last / BEYOND);
+            let serves = natural(&modes).last().map_or(0.0, |last| last / MODE_MARGIN);
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
                 ReductionKind::Rubin => Free::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
-                ReductionKind::CraigBampton => whole.held(Wanted::Lowest(count))?,
+                ReductionKind::CraigBampton => whole.fixed_interface(Wanted::Lowest(count))?,
             };
             let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
             ReductionResult { reduced, deviation, modes, up_to, serves }

@@ -27,12 +27,12 @@ impl Structure {
     /// # Errors
     /// [`Singular`]: an undamped resonance, or a structure with free motions at `s = 0`.
     pub fn dynamic_stiffness(&self, s: Complex64) -> Result<DynamicStiffness, Singular> {
-        self.held_stiffness(s, 0.0)
+        self.shifted_dynamic_stiffness(s, 0.0)
     }
 
     /// Factors the dynamic stiffness with additional springs of `hold` (1/s²) times the mass
     /// matrix.
-    pub(crate) fn held_stiffness(&self, s: Complex64, hold: f64) -> Result<DynamicStiffness, Singular> {
+    pub(crate) fn shifted_dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<DynamicStiffness, Singular> {
         let of_mass = s * s + hold;
         let factor = match &self.0.form {
             Storage::Full(full) => {

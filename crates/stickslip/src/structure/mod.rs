@@ -18,7 +18,7 @@ pub use dynamic::DynamicStiffness;
 pub(crate) use free_vibration::free_vibrations;
 pub use modal_damping::DampedModes;
 pub use reduction::{Reduction, ReductionKind};
-pub(crate) use sector::turn;
+pub(crate) use sector::unit_root;
 pub use sector::{Sector, Wave, WaveStiffness};
 pub use sector_boundary::{Axis, BladeError, Boundary, BoundaryError};
 pub(crate) use sector_boundary::{CyclicSector, RingEntry, RingRow};
@@ -81,7 +81,7 @@ pub const MOST_IN_FULL: usize = 2000;
 /// Number of degrees of freedom from which matrices are stored sparse.
 pub const SPARSE: usize = 40;
 /// Fraction of nonzero entries above which matrices are stored full at any size.
-const FULL: f64 = 0.3;
+const FULL_FRACTION: f64 = 0.3;
 
 /// The reason why matrices do not form a valid structure.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -222,7 +222,7 @@ impl Structure {
         }
         let (analysis, full) = (OnceLock::new(), OnceLock::new());
         let form = if is_full(n, [&mass, &damping, &stiffness].map(Matrix::len)) {
-            Storage::Full(Arc::new(written_out(&mass, &damping, &stiffness)))
+            Storage::Full(Arc::new(to_full(&mass, &damping, &stiffness)))
         } else {
             let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
             Storage::Sparse { mass, damping, stiffness, modes: None, analysis, full }
@@ -254,7 +254,7 @@ impl Structure {
         };
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
-        largest[2].is_finite().then(|| Structure::kept(places, form, largest))
+        largest[2].is_finite().then(|| Structure::from_parts(places, form, largest))
     }
 
     /// Returns this structure with additional modal damping.
@@ -281,7 +281,7 @@ impl Structure {
                 Storage::Sparse { mass, damping, stiffness, modes, analysis, full }
             }
         };
-        Structure::kept(self.0.places.clone(), form, [mass, most, stiffness])
+        Structure::from_parts(self.0.places.clone(), form, [mass, most, stiffness])
     }
 
     fn checked(places: Vec<String>, form: Storage) -> Result<Self, StructureError> {
@@ -305,10 +305,10 @@ impl Structure {
                 [mass, damping, stiffness].map(Matrix::largest)
             }
         };
-        Ok(Structure::kept(places, form, largest))
+        Ok(Structure::from_parts(places, form, largest))
     }
 
-    fn kept(places: Vec<String>, form: Storage, largest: [f64; 3]) -> Self {
+    fn from_parts(places: Vec<String>, form: Storage, largest: [f64; 3]) -> Self {
         Structure(Arc::new(StructureData {
             places,
             form,
@@ -342,7 +342,7 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => full,
             Storage::Sparse { mass, damping, stiffness, modes, full, .. } => full.get_or_init(|| {
-                let mut full = written_out(mass, damping, stiffness);
+                let mut full = to_full(mass, damping, stiffness);
                 modes.iter().for_each(|modes| modes.add_to(&mut full.damping));
                 Arc::new(full)
             }),
@@ -531,10 +531,10 @@ impl Matrices {
 /// Returns whether matrices with these numbers of entries are stored full.
 fn is_full(n: usize, entries: [usize; 3]) -> bool {
     let most = entries.into_iter().max().unwrap_or(0);
-    n < SPARSE || most as f64 > FULL * (n as f64) * (n as f64)
+    n < SPARSE || most as f64 > FULL_FRACTION * (n as f64) * (n as f64)
 }
 
-fn written_out(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices {
+fn to_full(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices {
     let full = |matrix: &Matrix| {
         let mut full = DMatrix::zeros(matrix.n(), matrix.n());
         matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
@@ -600,14 +600,14 @@ mod tests {
 
     /// A full and a sparse structure give the same results.
     #[test]
-    fn the_form_does_not_matter() {
+    fn full_and_sparse_agree() {
         let n = SPARSE + 3;
         let [m, c, k] = chain(n);
         let sparse = Structure::new(numbered(n), m.clone(), c.clone(), k.clone()).unwrap();
         assert!(sparse.is_sparse());
         assert_eq!((sparse.mass(), sparse.damping(), sparse.stiffness()), (&m, &c, &k));
         let full =
-            Structure::checked(numbered(n), Form::Full(Arc::new(Matrices { mass: m, damping: c, stiffness: k })))
+            Structure::checked(numbered(n), Storage::Full(Arc::new(Matrices { mass: m, damping: c, stiffness: k })))
                 .unwrap();
         assert_eq!(sparse.largest(), full.largest());
         assert_eq!((sparse.own_mass(7), sparse.dissipates()), (full.own_mass(7), full.dissipates()));
@@ -631,7 +631,7 @@ mod tests {
 
     /// Large structures reject the same input as small ones, with the same messages.
     #[test]
-    fn wrong_entries_are_refused_as_wrong_matrices_are() {
+    fn sparse_and_full_input_have_equal_checks() {
         let n = 2 * SPARSE;
         let [m, c, k] = chain(n);
         type One<'a> = &'a mut DMatrix<f64>;

@@ -122,7 +122,7 @@ mod tests {
 
     /// Sparse and full structures give the same modal damping, that of the dense product.
     #[test]
-    fn the_form_does_not_matter() {
+    fn sparse_and_full_modal_damping_agree() {
         let n = SPARSE + 5;
         let beside = |own: f64, next: f64| DMatrix::from_fn(n, n, |i, k| [own, next, 0.0][i.abs_diff(k).min(2)]);
         let (m, c, k) = (beside(1.0, 0.2), beside(0.01, 0.0), beside(2.0, -1.0));

@@ -41,7 +41,7 @@ pub struct Wave {
 
 /// Returns `e^{j 2π k/n}`. Equivalent arguments give identical bits, and quarter turns are
 /// exact.
-pub(crate) fn turn(k: i64, n: usize) -> Complex64 {
+pub(crate) fn unit_root(k: i64, n: usize) -> Complex64 {
     let n = n as i64;
     let k = k.rem_euclid(n);
     match 4 * k {
@@ -68,7 +68,7 @@ pub(crate) fn is_real(diameter: usize, sectors: usize) -> bool {
 /// The input is (row, column, offset of the column in sectors, value) for a matrix of `rows` by
 /// `columns`. The output is (row, column, value) at twice the size, or at single size if the
 /// wave is real.
-pub(super) fn in_wave(
+pub(super) fn wave_entries(
     entries: impl Iterator<Item = (usize, usize, i64, f64)>,
     [rows, columns]: [usize; 2],
     diameter: usize,
@@ -77,7 +77,7 @@ pub(super) fn in_wave(
     let real = is_real(diameter, sectors);
     let mut triplets = Vec::new();
     for (row, column, shift, value) in entries {
-        let phase = turn(diameter as i64 * shift, sectors);
+        let phase = unit_root(diameter as i64 * shift, sectors);
         triplets.push((row, column, value * phase.re));
         if !real {
             triplets.push((rows + row, columns + column, value * phase.re));
@@ -168,7 +168,7 @@ impl Sector {
         let matrix = |kind: usize| {
             let all =
                 self.entries.iter().map(|&(row, column, shift, values)| (row, column, shift as i64, values[kind]));
-            in_wave(all.filter(|entry| entry.3 != 0.0), [n, n], diameter, self.sectors)
+            wave_entries(all.filter(|entry| entry.3 != 0.0), [n, n], diameter, self.sectors)
         };
         let triplets = [0, 1, 2].map(matrix);
         let [mass, damping, stiffness] = triplets.map(|entries| {
@@ -203,7 +203,7 @@ impl Wave {
 
     /// Returns the phase factor of a sector relative to the first one, `e^{j d θ s}`.
     pub fn phase(&self, sector: i64) -> Complex64 {
-        turn(self.diameter as i64 * sector, self.sectors)
+        unit_root(self.diameter as i64 * sector, self.sectors)
     }
 
     /// Factors `s² M_d + s C_d + K_d`, with additional springs of `hold` (1/s²) times the mass
@@ -212,7 +212,7 @@ impl Wave {
     /// # Errors
     /// [`Singular`]: an undamped resonance.
     pub fn dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<WaveStiffness, Singular> {
-        let factor = self.structure.held_stiffness(s, hold)?;
+        let factor = self.structure.shifted_dynamic_stiffness(s, hold)?;
         Ok(WaveStiffness { dofs: self.dofs, double: self.is_double(), factor })
     }
 }
@@ -308,9 +308,9 @@ mod tests {
 
     #[test]
     fn turns_are_exact_where_they_can_be() {
-        assert_eq!(turn(6, 8), Complex64::new(0.0, -1.0));
-        assert_eq!(turn(-5, 24), turn(19, 24));
-        assert_eq!(turn(5, 24), turn(19, 24).conj());
-        assert!((turn(7, 24) - Complex64::cis(TAU * 7.0 / 24.0)).norm() < 1e-15);
+        assert_eq!(unit_root(6, 8), Complex64::new(0.0, -1.0));
+        assert_eq!(unit_root(-5, 24), unit_root(19, 24));
+        assert_eq!(unit_root(5, 24), unit_root(19, 24).conj());
+        assert!((unit_root(7, 24) - Complex64::cis(TAU * 7.0 / 24.0)).norm() < 1e-15);
     }
 }

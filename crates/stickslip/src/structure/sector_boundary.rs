@@ -10,7 +10,7 @@
 //! Engng 14, 81-102.
 
 use super::reduction::{Damping, ReductionError, Row, Whole};
-use super::sector::in_wave;
+use super::sector::wave_entries;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use stickslip_numerics::sparse::{Analysis, Matrix};
@@ -33,10 +33,10 @@ use stickslip_numerics::sparse::{Analysis, Matrix};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
     /// Pairs of rows (low, high) that are equal along axes that rotate with the sectors.
-    alike: Vec<[usize; 2]>,
+    equal_rows: Vec<[usize; 2]>,
     /// Rows along x, y, z of the low and of the high side, which are rotated in the next
     /// sector.
-    turned: Vec<[[Option<usize>; 3]; 2]>,
+    rotated_rows: Vec<[[Option<usize>; 3]; 2]>,
     axis: Option<Axis>,
 }
 
@@ -123,7 +123,7 @@ impl Axis {
 
     /// Returns the rotation by `angle` (rad): it maps displacements along x, y, z of the
     /// rotated sector to fixed axes.
-    pub(super) fn turn(self, angle: f64) -> [[f64; 3]; 3] {
+    pub(super) fn rotation(self, angle: f64) -> [[f64; 3]; 3] {
         let (sin, cos) = angle.sin_cos();
         let own = self as usize;
         let (a, b) = ((own + 1) % 3, (own + 2) % 3);
@@ -164,7 +164,7 @@ impl Boundary {
                 }
             }
         }
-        let mut boundary = Boundary { alike: Vec::new(), turned: Vec::new(), axis };
+        let mut boundary = Boundary { equal_rows: Vec::new(), rotated_rows: Vec::new(), axis };
         let none = BTreeMap::new();
         for (low, high) in pairs {
             let [own, other] = [low, high].map(|node| of_node.get(node.as_str()).unwrap_or(&none));
@@ -174,7 +174,7 @@ impl Boundary {
                 (false, true) => return Err(BoundaryError::Unknown(high.clone(), low.clone())),
                 (false, false) => {}
             }
-            boundary.tie(own, other).map_err(|along| match along {
+            boundary.couple(own, other).map_err(|along| match along {
                 (along, true) => BoundaryError::Direction(format!("{high}.{along}")),
                 (along, false) => BoundaryError::Constrained { low: low.clone(), high: high.clone(), along },
             })?;
@@ -184,17 +184,17 @@ impl Boundary {
 
     /// Couples one node to another. The error is a direction that cannot be coupled, and
     /// whether its rotation is unknown.
-    fn tie(&mut self, low: &BTreeMap<&str, usize>, high: &BTreeMap<&str, usize>) -> Result<(), (String, bool)> {
+    fn couple(&mut self, low: &BTreeMap<&str, usize>, high: &BTreeMap<&str, usize>) -> Result<(), (String, bool)> {
         let all = || low.keys().chain(high.keys()).copied();
         let Some(axis) = self.axis else {
             for along in all() {
                 let (Some(&low), Some(&high)) = (low.get(along), high.get(along)) else {
                     return Err((along.to_owned(), false));
                 };
-                self.alike.push([low, high]);
+                self.equal_rows.push([low, high]);
             }
-            self.alike.sort_unstable();
-            self.alike.dedup();
+            self.equal_rows.sort_unstable();
+            self.equal_rows.dedup();
             return Ok(());
         };
         if let Some(along) = all().find(|along| !DIRECTIONS.iter().flatten().any(|known| known == along)) {
@@ -211,7 +211,7 @@ impl Boundary {
                 }
             }
             if rows[1].iter().any(Option::is_some) {
-                self.turned.push(rows);
+                self.rotated_rows.push(rows);
             }
         }
         Ok(())
@@ -219,23 +219,24 @@ impl Boundary {
 
     /// Returns the rows of the high side, which those of the next sector replace.
     pub fn high_rows(&self) -> impl Iterator<Item = usize> + '_ {
-        let turned = self.turned.iter().flat_map(|[_, high]| high.iter().flatten().copied());
-        self.alike.iter().map(|[_, high]| *high).chain(turned)
+        let turned = self.rotated_rows.iter().flat_map(|[_, high]| high.iter().flatten().copied());
+        self.equal_rows.iter().map(|[_, high]| *high).chain(turned)
     }
 
     /// Returns the rows of the low side, which the previous sector shares.
     pub fn low_rows(&self) -> impl Iterator<Item = usize> + '_ {
-        let turned = self.turned.iter().flat_map(|[low, _]| low.iter().flatten().copied());
-        self.alike.iter().map(|[low, _]| *low).chain(turned)
+        let turned = self.rotated_rows.iter().flat_map(|[low, _]| low.iter().flatten().copied());
+        self.equal_rows.iter().map(|[low, _]| *low).chain(turned)
     }
 
     /// Returns every row of the high side as a weighted sum of rows of the next sector's low
     /// side. The rotation depends on the number of sectors.
-    fn ties(&self, sectors: usize) -> Vec<(usize, Row)> {
-        let mut ties: Vec<(usize, Row)> = self.alike.iter().map(|[low, high]| (*high, vec![(*low, 1.0)])).collect();
+    fn constraints(&self, sectors: usize) -> Vec<(usize, Row)> {
+        let mut ties: Vec<(usize, Row)> =
+            self.equal_rows.iter().map(|[low, high]| (*high, vec![(*low, 1.0)])).collect();
         if let Some(axis) = self.axis {
-            let turn = axis.turn(TAU / sectors as f64);
-            for [low, high] in &self.turned {
+            let turn = axis.rotation(TAU / sectors as f64);
+            for [low, high] in &self.rotated_rows {
                 for (k, high) in high.iter().enumerate() {
                     let Some(high) = high else { continue };
                     let parts = (0..3).filter(|&i| turn[k][i] != 0.0).filter_map(|i| Some((low[i]?, turn[k][i])));
@@ -277,7 +278,7 @@ impl CyclicSector {
         sectors: usize,
     ) -> Self {
         let n = mass.n();
-        let ties: BTreeMap<usize, Row> = boundary.ties(sectors).into_iter().collect();
+        let ties: BTreeMap<usize, Row> = boundary.constraints(sectors).into_iter().collect();
         let kept: Vec<usize> = (0..n).filter(|row| !ties.contains_key(row)).collect();
         let mut new = vec![usize::MAX; n];
         kept.iter().enumerate().for_each(|(at, row)| new[*row] = at);
@@ -288,13 +289,13 @@ impl CyclicSector {
             })
             .collect();
         let part = |matrix: &Matrix| eliminated(matrix, &rows);
-        let symmetric = |matrix: &Matrix| symmetrised(part(matrix), |shift| -shift);
+        let symmetric = |matrix: &Matrix| symmetrized(part(matrix), |shift| -shift);
         let (mass, damping, stiffness) = (symmetric(mass), damping.map(part), symmetric(stiffness));
         CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness }
     }
 
     /// Returns the matrix of a sector with the adjacent sectors fixed.
-    pub fn alone(&self, entries: &[RingEntry]) -> Result<Matrix, ReductionError> {
+    pub fn with_fixed_adjacent(&self, entries: &[RingEntry]) -> Result<Matrix, ReductionError> {
         let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
         Matrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
     }
@@ -330,19 +331,19 @@ impl CyclicSector {
         let (n, sectors) = (self.dofs, self.sectors);
         let copies = if super::sector::is_real(diameter, sectors) { 1 } else { 2 };
         let matrix = |entries: &[RingEntry]| {
-            let triplets = in_wave(entries.iter().copied(), [n, n], diameter, sectors);
+            let triplets = wave_entries(entries.iter().copied(), [n, n], diameter, sectors);
             Matrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange)
         };
         let damping = match &self.damping {
             Some(damping) => Damping::Matrix(matrix(damping)?),
             None => Damping::Rayleigh { mass: 0.0, stiffness: 0.0 },
         };
-        let whole = Whole::unseen(matrix(&self.mass)?, damping, matrix(&self.stiffness)?)?;
+        let whole = Whole::without_ports(matrix(&self.mass)?, damping, matrix(&self.stiffness)?)?;
         let mut ports = vec![Row::new(); copies * seen.len()];
         for (p, row) in seen.iter().enumerate() {
             let all = self.row(row).into_iter().map(|(at, shift, weight)| (p, at, shift, weight));
             // the ports of the imaginary part follow all ports of the real part
-            for (port, at, weight) in in_wave(all, [seen.len(), n], diameter, sectors) {
+            for (port, at, weight) in wave_entries(all, [seen.len(), n], diameter, sectors) {
                 ports[port].push((at, weight));
             }
         }
@@ -464,7 +465,7 @@ impl Blade {
     }
 
     /// Returns `Vᵀ D V` over columns of length `n`, with the matrix `D` of [`Blade::entries`].
-    pub fn along(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
+    pub fn projected(&self, n: usize, basis: &[f64]) -> Vec<(usize, usize, f64)> {
         let forces: Vec<f64> = basis.chunks_exact(n).flat_map(|column| self.times(column)).collect();
         let energy = stickslip_numerics::sparse::columns::products(n, basis, &forces);
         let all = (0..energy.ncols()).flat_map(|k| (0..energy.nrows()).map(move |i| (i, k)));
@@ -499,7 +500,7 @@ fn summed(mut all: Vec<RingEntry>) -> Vec<RingEntry> {
 
 /// Returns the mean of a ring's matrix and its transpose, symmetric to the last bit. `back`
 /// returns the opposite sector offset.
-pub(super) fn symmetrised(entries: Vec<RingEntry>, back: impl Fn(i64) -> i64) -> Vec<RingEntry> {
+pub(super) fn symmetrized(entries: Vec<RingEntry>, back: impl Fn(i64) -> i64) -> Vec<RingEntry> {
     let halves = entries.into_iter().flat_map(|(i, k, shift, value)| {
         let half = 0.5 * value;
         [(i, k, shift, half), (k, i, back(shift), half)]
@@ -533,7 +534,7 @@ mod tests {
             (next[across[0]], next[across[1]]) = (angle.cos(), -angle.sin());
             let mut own = [0.0; 3];
             own[across[0]] = 1.0;
-            for (row, parts) in boundary.ties(5) {
+            for (row, parts) in boundary.constraints(5) {
                 let seen: f64 = parts.iter().map(|(at, weight)| next[*at] * weight).sum();
                 assert!((seen - own[row - 3]).abs() < 1e-15, "{axis:?}, {row}: {seen}");
             }
@@ -555,11 +556,14 @@ mod tests {
         // a direction that both sides lack is fixed
         let held = named(&["1.z", "2.z"]);
         assert_eq!(
-            Boundary::of_nodes(&held, &pairs(&[("1", "2")]), Some(Axis::Z)).unwrap().ties(7),
+            Boundary::of_nodes(&held, &pairs(&[("1", "2")]), Some(Axis::Z)).unwrap().constraints(7),
             [(1, vec![(0, 1.0)])]
         );
         let radial = named(&["1.r", "2.r"]);
         assert!(refused(&radial, &[("1", "2")], Some(Axis::Z)).contains("row `2.r`"));
-        assert_eq!(Boundary::of_nodes(&radial, &pairs(&[("1", "2")]), None).unwrap().ties(7), [(1, vec![(0, 1.0)])]);
+        assert_eq!(
+            Boundary::of_nodes(&radial, &pairs(&[("1", "2")]), None).unwrap().constraints(7),
+            [(1, vec![(0, 1.0)])]
+        );
     }
 }

@@ -14,7 +14,7 @@ pub type Node = (String, [f64; 3]);
 /// Tolerance for the distance between a node and its rotated counterpart, relative to the
 /// largest distance of a node from the axis. Meshes are written with six digits or more, and
 /// elements are larger.
-const TOGETHER: f64 = 1e-4;
+const COINCIDENT: f64 = 1e-4;
 
 /// The reason why pairs of nodes are not the two sides of a sector.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -105,7 +105,7 @@ impl<'a> Faces<'a> {
     }
 
     fn tolerance(&self) -> f64 {
-        TOGETHER * self.radius
+        COINCIDENT * self.radius
     }
 
     fn cell(&self, at: [f64; 3]) -> [i64; 3] {
@@ -118,7 +118,7 @@ impl<'a> Faces<'a> {
     /// # Errors
     /// [`FacesError::None`].
     pub fn pairs(&self) -> Result<Vec<(String, String)>, FacesError> {
-        let turn = self.axis.turn(TAU / self.sectors as f64);
+        let turn = self.axis.rotation(TAU / self.sectors as f64);
         let off_axis = self.nodes.iter().enumerate().filter(|(_, (_, at))| self.axis.radius(*at) > self.tolerance());
         let met = off_axis.filter_map(|(own, (low, at))| {
             let high = self.nearest(turned(&turn, *at))?;
@@ -135,7 +135,7 @@ impl<'a> Faces<'a> {
         let cell = self.cell(point);
         let beside = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
         let cells = beside.filter_map(|step| self.cells.get(&[0, 1, 2].map(|i| cell[i].saturating_add(step[i]))));
-        let near = cells.flatten().map(|&index| (apart(self.nodes[index].1, point), index));
+        let near = cells.flatten().map(|&index| (distance(self.nodes[index].1, point), index));
         near.filter(|(apart, _)| *apart <= self.tolerance()).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, index)| index)
     }
 
@@ -149,7 +149,7 @@ impl<'a> Faces<'a> {
         let find = |name: &String| of.get(name.as_str()).copied().ok_or_else(|| FacesError::Unknown(name.clone()));
         for (low, high) in pairs {
             let (from, to) = (find(low)?, find(high)?);
-            let apart = self.after_turn(self.axis, TAU / self.sectors as f64, from, to);
+            let apart = self.rotated_distance(self.axis, TAU / self.sectors as f64, from, to);
             if apart > self.tolerance() {
                 return Err(FacesError::Apart {
                     low: low.clone(),
@@ -176,14 +176,14 @@ impl<'a> Faces<'a> {
         }
     }
 
-    fn after_turn(&self, axis: Axis, angle: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
-        apart(turned(&axis.turn(angle), from), to)
+    fn rotated_distance(&self, axis: Axis, angle: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
+        distance(turned(&axis.rotation(angle), from), to)
     }
 
     /// Returns a suggestion that makes a pair fit.
     fn hint(&self, from: [f64; 3], to: [f64; 3]) -> Option<String> {
         let angle = TAU / self.sectors as f64;
-        let fits = |axis: Axis, angle: f64| self.after_turn(axis, angle, from, to) <= self.tolerance();
+        let fits = |axis: Axis, angle: f64| self.rotated_distance(axis, angle, from, to) <= self.tolerance();
         if fits(self.axis, -angle) {
             return Some(format!(
                 "the sides are exchanged: the low side is the start of the sector by the right-hand rule about {}",
@@ -212,7 +212,7 @@ fn turned(turn: &[[f64; 3]; 3], at: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| (0..3).map(|k| turn[i][k] * at[k]).sum())
 }
 
-fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -223,7 +223,7 @@ mod tests {
     /// Two radii and two heights on both sides of one of ten sectors, and a blade in its
     /// middle.
     fn nodes(axis: Axis) -> Vec<Node> {
-        let turn = |angle: f64, at: [f64; 3]| turned(&axis.turn(angle), at);
+        let turn = |angle: f64, at: [f64; 3]| turned(&axis.rotation(angle), at);
         let mut nodes = Vec::new();
         for (k, angle) in [0.3, 0.3 + TAU / 10.0, 0.6].into_iter().enumerate() {
             for (i, (radius, height)) in [(50.0, 0.0), (50.0, 8.0), (90.0, 0.0), (90.0, 8.0)].into_iter().enumerate() {

@@ -63,54 +63,54 @@ pub enum Reason {
 }
 /// Ratio of friction to the forces of the linear mode at which the continuation begins.
 /// Frequency and damping of the linear mode are then accurate to this ratio.
-const FAINT: f64 = 1e-4;
+const FRICTION_RATIO: f64 = 1e-4;
 /// Ratio of friction to the difference from the nearest mode at which the continuation begins.
 /// The linear shape is then accurate to one percent.
-const APART: f64 = 1e-2;
+const SEPARATION_RATIO: f64 = 1e-2;
 /// Factors on the initial amplitude, tried in this order if Newton's method does not converge
 /// from the linear mode. This happens if a joint hardly moves in the linear mode: friction alone
 /// then determines its motion and the phase of its force.
-const OTHERS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
+const START_FACTORS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
 /// Maximum number of steps, including rejected ones. The blade couples take about 100, internal
 /// resonances some hundreds.
-const MOST_STEPS: usize = 4000;
+const MAX_STEPS: usize = 4000;
 /// Maximum number of steps without a new smallest amplitude. The curve then runs in a loop, or
 /// follows another mode.
-const PATIENCE: usize = 1000;
+const MAX_STEPS_WITHOUT_PROGRESS: usize = 1000;
 /// Damping ratio above which a motion counts as overdamped, ten times critical damping.
 const OVERDAMPED: f64 = 10.0;
 /// Work limit of overdamped motions: harmonics times samples, summed over the steps; about two
 /// seconds. Following rigid friction down to a nanometre would take thousands of expensive steps
 /// without a useful result.
-const CREEPING: usize = 8_000_000;
+const OVERDAMPED_WORK: usize = 8_000_000;
 /// Work limit of laws with memory, in steps of the law; about ten seconds. A curve of one joint
 /// takes a few million.
-const MARCHED: usize = 4_000_000;
+const MEMORY_WORK: usize = 4_000_000;
 /// Longest step in arc length, see [`ModeEquations::step`]. It changes the amplitude by up to a
 /// half, or the shape by a fifth.
-const LONGEST: f64 = 0.2;
+const MAX_STEP: f64 = 0.2;
 /// First step, also after a leap.
-const FIRST: f64 = 0.02;
+const INITIAL_STEP: f64 = 0.02;
 /// A step below this is rounding: the curve ends.
-const SHORTEST: f64 = 1e-7;
+const MIN_STEP: f64 = 1e-7;
 /// Steps below this may pass a corner. The curve has kinks at the points at which a sampled
 /// joint begins to slip.
 const CORNER: f64 = 1e-3;
 /// Largest distance of a solution from the predictor, relative to such a step: a corner of up to
 /// 79 degrees.
-const BENT: f64 = 5.0;
+const MAX_CORNER: f64 = 5.0;
 /// Arc length over which the curve may jump. A sampled force is discontinuous if its reversal
 /// moves to another sample. Measured: 1e-6.
 const GAP: f64 = 1e-5;
 /// Smallest cosine between the tangents at both ends of a step.
-const STRAIGHT: f64 = 0.9;
+const MIN_TANGENT_COSINE: f64 = 0.9;
 /// Largest distance of a solution from the predictor, relative to the step.
-const OFF: f64 = 0.5;
+const MAX_PREDICTOR_ERROR: f64 = 0.5;
 /// Smallest modal assurance criterion between neighbours.
-const SHAPE: f64 = 0.9;
+const MIN_MAC: f64 = 0.9;
 /// A step that takes at most this many Newton iterations is followed by a longer one. At kinks,
 /// Newton's method takes more than the usual three without being close to failure.
-const FEW: usize = 8;
+const FEW_ITERATIONS: usize = 8;
 /// Fractions of a decade in amplitude by which a leap skips a part of the curve that cannot be
 /// followed.
 const LEAPS: [f64; 6] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.7];
@@ -122,10 +122,10 @@ const MERGING: f64 = 1.0 / 3.0;
 const PARTS: u32 = 16;
 /// Relative change of amplitude up to which a turn is an effect of the sampled force and is not
 /// reported.
-const TREMOR: f64 = 1e-3;
+const MIN_TURN: f64 = 1e-3;
 /// Relative tolerance of the amplitude with the largest damping. The damping is then accurate to
 /// its square.
-const LOCATED: f64 = 1e-3;
+const PEAK_TOLERANCE: f64 = 1e-3;
 
 /// The curve of a mode.
 pub(super) struct ModeCurve {
@@ -148,7 +148,7 @@ impl ModeCurve {
             ModeCurve { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
-        let faint = equations.faint(&modes, index, FAINT, APART);
+        let faint = equations.faint(&modes, index, FRICTION_RATIO, SEPARATION_RATIO);
         // without friction, any amplitude serves
         let faint = if faint > 0.0 { faint } else { low };
         // If the joints of a pair of modes are not alike, a travelling wave is not a motion. The
@@ -156,25 +156,25 @@ impl ModeCurve {
         let shapes = [Some(linear.clone()), linear.standing()];
         let start = shapes.into_iter().flatten().find_map(|linear| {
             equations.mixes = linear.stands.is_some();
-            let start = OTHERS.iter().find_map(|factor| {
-                if equations.marched() - begun > MARCHED {
+            let start = START_FACTORS.iter().find_map(|factor| {
+                if equations.marched() - begun > MEMORY_WORK {
                     return None;
                 }
                 let amplitude = factor * faint;
                 let guess = equations.linear(&linear, amplitude)?;
                 let state = equations.solve(&guess, amplitude, amplitude)?;
-                (equations.assurance(&guess, &state) >= SHAPE).then(|| equations.begin(&state, amplitude))?
+                (equations.assurance(&guess, &state) >= MIN_MAC).then(|| equations.begin(&state, amplitude))?
             });
             Some((linear, start?))
         });
         let Some((linear, start)) = start else { return none(Some(linear)) };
         let top = start.amplitude;
-        let mut arcs = if equations.is_unbounded() { risen(equations, &start, high) } else { Vec::new() };
+        let mut arcs = if equations.is_unbounded() { follow_upwards(equations, &start, high) } else { Vec::new() };
         arcs.push(start);
         let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
         let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, lost: None };
-        let mut length = FIRST;
-        for _ in 0..MOST_STEPS {
+        let mut length = INITIAL_STEP;
+        for _ in 0..MAX_STEPS {
             let now = &path.arcs[path.arcs.len() - 1];
             let at = now.amplitude;
             if at < low {
@@ -186,25 +186,25 @@ impl ModeCurve {
                 path.sticks = true;
                 return path;
             }
-            let step = taken(equations, now, length);
+            let step = try_step(equations, now, length);
             since += 1;
             if now.state.damping > OVERDAMPED {
                 creeping += equations.resolution();
             }
             let reason = match step {
-                _ if creeping > CREEPING => {
-                    path.lost = Some(Lost { at: path.end(), reason: Reason::Overdamped });
+                _ if creeping > OVERDAMPED_WORK => {
+                    path.lost = Some(Lost { at: path.smallest_amplitude(), reason: Reason::Overdamped });
                     return path;
                 }
-                _ if equations.marched() - begun > MARCHED => {
-                    path.lost = Some(Lost { at: path.end(), reason: Reason::Dear });
+                _ if equations.marched() - begun > MEMORY_WORK => {
+                    path.lost = Some(Lost { at: path.smallest_amplitude(), reason: Reason::Dear });
                     return path;
                 }
                 _ if at > top => Reason::Merged,
-                _ if since > PATIENCE => Reason::Turned,
+                _ if since > MAX_STEPS_WITHOUT_PROGRESS => Reason::Turned,
                 Some(step) => {
-                    if step.iterations <= FEW {
-                        length = (1.5 * length).min(LONGEST);
+                    if step.iterations <= FEW_ITERATIONS {
+                        length = (1.5 * length).min(MAX_STEP);
                     }
                     path.arcs.push(step.to);
                     if path.arcs[path.arcs.len() - 1].amplitude < path.arcs[lowest].amplitude {
@@ -212,7 +212,7 @@ impl ModeCurve {
                     }
                     continue;
                 }
-                None if length > SHORTEST => {
+                None if length > MIN_STEP => {
                     length *= 0.5;
                     continue;
                 }
@@ -224,27 +224,31 @@ impl ModeCurve {
                 return path;
             };
             path.arcs.push(next);
-            (length, lowest, since) = (FIRST, path.arcs.len() - 1, 0);
+            (length, lowest, since) = (INITIAL_STEP, path.arcs.len() - 1, 0);
         }
-        path.lost = Some(Lost { at: path.end(), reason: Reason::Steps });
+        path.lost = Some(Lost { at: path.smallest_amplitude(), reason: Reason::Steps });
         path
     }
 
     /// Follows mode `index` upwards from the modal amplitude `low`, beginning with all joints
     /// linearized for small motion. Ends above `high` or when no step succeeds. `None` if no
     /// motion is found at `low`.
-    pub(super) fn from_rest(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Option<Self> {
+    pub(super) fn from_small_amplitude(
+        equations: &mut ModeEquations<'_>,
+        index: usize,
+        (low, high): (f64, f64),
+    ) -> Option<Self> {
         equations.mixes = false;
         let guess = equations.at_rest(index, low)?;
-        let state = equations.solve(&guess, low, low).filter(|state| equations.assurance(&guess, state) >= SHAPE)?;
+        let state = equations.solve(&guess, low, low).filter(|state| equations.assurance(&guess, state) >= MIN_MAC)?;
         let start = equations.begin(&state, low)?;
-        let mut arcs = risen(equations, &start, high);
+        let mut arcs = follow_upwards(equations, &start, high);
         arcs.push(start);
         Some(ModeCurve { linear: None, arcs, sticks: false, lost: None })
     }
 
     /// Returns the largest amplitude on the curve.
-    pub(super) fn top(&self) -> f64 {
+    pub(super) fn largest_amplitude(&self) -> f64 {
         self.arcs.iter().fold(0.0, |most, arc| most.max(arc.amplitude))
     }
 
@@ -254,7 +258,7 @@ impl ModeCurve {
     }
 
     /// Returns the smallest amplitude on the curve.
-    pub(super) fn end(&self) -> f64 {
+    pub(super) fn smallest_amplitude(&self) -> f64 {
         if self.sticks {
             return 0.0;
         }
@@ -262,12 +266,12 @@ impl ModeCurve {
     }
 
     /// Returns the motion at modal amplitude `a`, at the first passage of the curve.
-    pub(super) fn at(&self, equations: &mut ModeEquations<'_>, a: f64) -> Option<ModeState> {
+    pub(super) fn state_at(&self, equations: &mut ModeEquations<'_>, a: f64) -> Option<ModeState> {
         let first = self.arcs.first()?;
         if a >= first.amplitude {
             let guess = equations.linear(self.linear.as_ref()?, a)?;
             let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
-            return (equations.assurance(&guess, &found) >= SHAPE).then_some(found);
+            return (equations.assurance(&guess, &found) >= MIN_MAC).then_some(found);
         }
         // A branch from small amplitudes begins at a requested amplitude.
         if let Some(last) = self.arcs.last().filter(|last| last.amplitude == a) {
@@ -302,15 +306,15 @@ impl ModeCurve {
     /// Returns the computed states within a range, at the first passage of each amplitude, and
     /// the states at its ends, in decreasing order of amplitude. The index is that of the
     /// preceding computed state.
-    pub(super) fn within(
+    pub(super) fn states_within(
         &self,
         equations: &mut ModeEquations<'_>,
         (low, high): (f64, f64),
     ) -> Vec<(usize, f64, ModeState)> {
-        let low = low.max(self.end());
+        let low = low.max(self.smallest_amplitude());
         let before = |a: f64| self.arcs.windows(2).position(|pair| pair[0].amplitude >= a && pair[1].amplitude < a);
         let mut all = Vec::new();
-        if let Some(state) = self.at(equations, high) {
+        if let Some(state) = self.state_at(equations, high) {
             all.push((before(high).unwrap_or(0), high, state));
         }
         let mut least = f64::INFINITY;
@@ -322,7 +326,7 @@ impl ModeCurve {
                 }
             }
         }
-        if let Some(state) = self.at(equations, low) {
+        if let Some(state) = self.state_at(equations, low) {
             all.push((before(low).unwrap_or(self.arcs.len()), low, state));
         }
         all
@@ -330,15 +334,19 @@ impl ModeCurve {
 
     /// Returns amplitude and motion with the largest damping within a range: the best computed
     /// state, then golden-section search between its neighbours.
-    pub(super) fn largest(&self, equations: &mut ModeEquations<'_>, range: (f64, f64)) -> Option<(f64, ModeState)> {
-        let all = self.within(equations, range);
+    pub(super) fn largest_damping(
+        &self,
+        equations: &mut ModeEquations<'_>,
+        range: (f64, f64),
+    ) -> Option<(f64, ModeState)> {
+        let all = self.states_within(equations, range);
         let best = (0..all.len()).max_by(|&i, &k| all[i].2.damping.total_cmp(&all[k].2.damping))?;
         let (_, amplitude, state) = &all[best];
         let mut top = (*amplitude, state.clone());
         let (low, high) = (all[(best + 1).min(all.len() - 1)].1.ln(), all[best.saturating_sub(1)].1.ln());
         // no motion counts as no damping
         let mut damping = |at: f64| {
-            let Some(found) = self.at(equations, at.exp()) else { return f64::NEG_INFINITY };
+            let Some(found) = self.state_at(equations, at.exp()) else { return f64::NEG_INFINITY };
             let damping = found.damping;
             if damping > top.1.damping {
                 top = (at.exp(), found);
@@ -346,7 +354,7 @@ impl ModeCurve {
             damping
         };
         let Ok(_) =
-            maximum((high, low), |above, below| above - below <= LOCATED, |at| Ok::<_, Infallible>(damping(at)));
+            maximum((high, low), |above, below| above - below <= PEAK_TOLERANCE, |at| Ok::<_, Infallible>(damping(at)));
         Some(top)
     }
 
@@ -383,7 +391,7 @@ impl ModeCurve {
                 up = Some(up.map_or(a, |up| up.max(a)));
             } else {
                 let turn = up.take().map(|up| Turn { at: least, up });
-                turns.extend(turn.filter(|turn| turn.up > (1.0 + TREMOR) * turn.at));
+                turns.extend(turn.filter(|turn| turn.up > (1.0 + MIN_TURN) * turn.at));
                 least = a;
             }
         }
@@ -392,33 +400,35 @@ impl ModeCurve {
 }
 
 /// Takes a step. `None` if the corrector fails or leaves the curve.
-fn taken(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<Step> {
+fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<Step> {
     let step = equations.step(now, length, length < CORNER)?;
-    let smooth = step.off <= OFF * length && step.straight >= STRAIGHT && step.to.side * now.side >= 0.0;
-    let corner = length < CORNER && step.off <= BENT * length + GAP;
-    ((smooth || corner) && equations.assurance(&now.state, &step.to.state) >= SHAPE).then_some(step)
+    let smooth = step.off <= MAX_PREDICTOR_ERROR * length
+        && step.straight >= MIN_TANGENT_COSINE
+        && step.to.side * now.side >= 0.0;
+    let corner = length < CORNER && step.off <= MAX_CORNER * length + GAP;
+    ((smooth || corner) && equations.assurance(&now.state, &step.to.state) >= MIN_MAC).then_some(step)
 }
 
 /// Follows the curve upwards from `start` to `high`, or until no step succeeds. Returns the
 /// points in decreasing order of amplitude. It is needed for forces that grow with amplitude,
 /// because the linear mode is then not a useful initial guess.
-fn risen(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
+fn follow_upwards(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
     let mut arcs = Vec::new();
-    let (mut now, mut length, mut creeping, begun) = (start.reversed(), FIRST, 0, equations.marched());
-    for _ in 0..MOST_STEPS {
-        if now.amplitude > high || length <= SHORTEST {
+    let (mut now, mut length, mut creeping, begun) = (start.reversed(), INITIAL_STEP, 0, equations.marched());
+    for _ in 0..MAX_STEPS {
+        if now.amplitude > high || length <= MIN_STEP {
             break;
         }
         if now.state.damping > OVERDAMPED {
             creeping += equations.resolution();
         }
-        if creeping > CREEPING || equations.marched() - begun > MARCHED {
+        if creeping > OVERDAMPED_WORK || equations.marched() - begun > MEMORY_WORK {
             break;
         }
-        match taken(equations, &now, length) {
+        match try_step(equations, &now, length) {
             Some(step) => {
-                if step.iterations <= FEW {
-                    length = (1.5 * length).min(LONGEST);
+                if step.iterations <= FEW_ITERATIONS {
+                    length = (1.5 * length).min(MAX_STEP);
                 }
                 now = step.to;
                 arcs.push(now.clone());
@@ -436,6 +446,6 @@ fn leap(equations: &mut ModeEquations<'_>, now: &ModeArc) -> Option<ModeArc> {
     LEAPS.iter().find_map(|part| {
         let amplitude = now.amplitude * 10f64.powf(-part);
         let state = equations.solve(&now.state, now.amplitude, amplitude)?;
-        (equations.assurance(&now.state, &state) >= SHAPE).then(|| equations.begin(&state, amplitude))?
+        (equations.assurance(&now.state, &state) >= MIN_MAC).then(|| equations.begin(&state, amplitude))?
     })
 }

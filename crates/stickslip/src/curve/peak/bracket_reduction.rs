@@ -9,29 +9,29 @@ use super::Point;
 
 /// Predicted relative rise below which a peak counts as found: a hundred times the rounding of a
 /// closed orbit. The frequency is then accurate to 1e-5 of the peak's width.
-pub(super) const RISE: f64 = 1e-10;
+pub(super) const MIN_RISE: f64 = 1e-10;
 /// A rise below `NOISE` times the estimated error of an orbit is noise, but at most
-/// `MOST_NOISE`. The transitions of a sampled series move in steps.
+/// `MAX_NOISE`. The transitions of a sampled series move in steps.
 const NOISE: f64 = 1e-4;
-const MOST_NOISE: f64 = 1e-7;
+const MAX_NOISE: f64 = 1e-7;
 /// Fraction of the predicted rise that must be reached, so that the next trial is a parabola
 /// again.
-const KEPT: f64 = 0.5;
+const CONFIRMED_FRACTION: f64 = 0.5;
 /// Number of consecutive failed predictions after which only bisection is used.
-const JUMP: usize = 15;
+const MAX_FAILED_PREDICTIONS: usize = 15;
 /// A parabolic step is not longer than this fraction of the step before the last one (R. P.
 /// Brent, Algorithms for minimization without derivatives, 1973). Otherwise parabolas would
 /// converge too slowly near a jump.
-const CREEPING: f64 = 0.5;
+const STEP_RATIO: f64 = 0.5;
 
 /// State of the bracket reduction for one quantity. Parabolas are used while their predictions
 /// are confirmed; otherwise intersecting lines and bisection.
 #[derive(Debug, Default)]
 pub(super) struct BracketReduction {
     /// Value that the last trial was predicted to reach.
-    promised: Option<f64>,
+    predicted: Option<f64>,
     /// Number of failed predictions since the last confirmed one.
-    broken: usize,
+    failed_predictions: usize,
     /// If the last trial was an intersection of two lines: its frequency and the predicted value
     /// of the interpolated function.
     kink: Option<(f64, f64)>,
@@ -48,30 +48,30 @@ impl BracketReduction {
         let value = points[best].value(quantity);
         let (rise, vertex) = parabola(points, best, quantity);
         let floor = closest.max(4.0 * f64::EPSILON * middle);
-        let enough = (NOISE * points[best].error).clamp(RISE, MOST_NOISE);
+        let enough = (NOISE * points[best].error).clamp(MIN_RISE, MAX_NOISE);
         let at_kink = self.kink.is_some_and(|(omega, promised)| {
-            omega == middle && (form(value) - promised).abs() <= enough * promised.abs()
+            omega == middle && (negative_inverse_square(value) - promised).abs() <= enough * promised.abs()
         });
-        match self.promised {
-            Some(promised) if value < promised => self.broken += 1,
-            _ => self.broken = 0,
+        match self.predicted {
+            Some(promised) if value < promised => self.failed_predictions += 1,
+            _ => self.failed_predictions = 0,
         }
         // A prediction of no further rise counts only if the previous prediction was confirmed.
-        self.found = (rise <= enough && self.broken == 0) || at_kink;
+        self.found = (rise <= enough && self.failed_predictions == 0) || at_kink;
         if self.found || right - left <= 2.0 * floor {
             return None;
         }
-        self.promised = Some(value * (1.0 + KEPT * rise));
+        self.predicted = Some(value * (1.0 + CONFIRMED_FRACTION * rise));
         self.kink = None;
         let wider = if right - middle > middle - left { 0.5 * (middle + right) } else { 0.5 * (left + middle) };
         let inside = |omega: &f64| *omega > left + floor && *omega < right - floor;
-        let creeps = |omega: &f64| self.steps[1].is_some_and(|step| (omega - middle).abs() > CREEPING * step);
+        let creeps = |omega: &f64| self.steps[1].is_some_and(|step| (omega - middle).abs() > STEP_RATIO * step);
         // a curve that fits neither form has a jump
-        let form = if self.broken < JUMP { self.broken % 3 } else { 2 };
+        let form = if self.failed_predictions < MAX_FAILED_PREDICTIONS { self.failed_predictions % 3 } else { 2 };
         let trial = match form {
             0 => vertex.filter(inside).filter(|omega| !creeps(omega)),
             1 => {
-                self.kink = crossing(points, best, quantity).filter(|(omega, _)| inside(omega));
+                self.kink = line_intersection(points, best, quantity).filter(|(omega, _)| inside(omega));
                 self.kink.map(|(omega, _)| omega)
             }
             _ => None,
@@ -88,7 +88,7 @@ impl BracketReduction {
 
 /// The interpolated function `-1/a²` of a positive quantity, which rises with the quantity.
 /// Negative infinity if the quantity is not positive.
-pub(super) fn form(value: f64) -> f64 {
+pub(super) fn negative_inverse_square(value: f64) -> f64 {
     if value > 0.0 { -1.0 / (value * value) } else { f64::NEG_INFINITY }
 }
 
@@ -97,7 +97,7 @@ pub(super) fn form(value: f64) -> f64 {
 /// (a failed neighbour, a straight line).
 pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, Option<f64>) {
     let [a, x, b] = [best - 1, best, best + 1].map(|i| points[i].omega);
-    let [fa, fx, fb] = [best - 1, best, best + 1].map(|i| form(points[i].value(quantity)));
+    let [fa, fx, fb] = [best - 1, best, best + 1].map(|i| negative_inverse_square(points[i].value(quantity)));
     let (left, right) = ((fx - fa) / (x - a), (fx - fb) / (b - x));
     let curvature = (left + right) / (b - a);
     if !(curvature.is_finite() && curvature > 0.0) {
@@ -112,8 +112,8 @@ pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, 
 
 /// Returns the intersection of the two straight lines through the points left and right of the
 /// best one, and the interpolated function there.
-fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)> {
-    let at = |i: usize| Some((points.get(i)?.omega, form(points.get(i)?.value(quantity))));
+fn line_intersection(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)> {
+    let at = |i: usize| Some((points.get(i)?.omega, negative_inverse_square(points.get(i)?.value(quantity))));
     let (before, after) = (at(best.checked_sub(2)?)?, at(best + 2)?);
     let (left, here, right) = (at(best - 1)?, at(best)?, at(best + 1)?);
     let slope = |p: (f64, f64), q: (f64, f64)| (q.1 - p.1) / (q.0 - p.0);
@@ -130,7 +130,7 @@ fn crossing(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)
 
 #[cfg(test)]
 mod tests {
-    use super::super::bracket::{CLOSEST, ORBITS, best};
+    use super::super::bracket::{MAX_ORBITS, MIN_DISTANCE, highest_inner};
     use super::*;
 
     /// Refines the middle one of three points of a given curve. Returns frequency, value and
@@ -138,16 +138,16 @@ mod tests {
     fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
         let point = |omega: f64| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 };
         let mut points = vec![point(a), point(x), point(b)];
-        let mut shrink = Shrink::default();
+        let mut shrink = BracketReduction::default();
         let mut count = 0;
-        while count < ORBITS {
-            let top = best(&points, 0);
-            let Some(omega) = shrink.next(&points, top, 0, CLOSEST * (b - a)) else { break };
+        while count < MAX_ORBITS {
+            let top = highest_inner(&points, 0);
+            let Some(omega) = shrink.next(&points, top, 0, MIN_DISTANCE * (b - a)) else { break };
             let at = points.partition_point(|point| point.omega < omega);
             points.insert(at, point(omega));
             count += 1;
         }
-        let top = &points[best(&points, 0)];
+        let top = &points[highest_inner(&points, 0)];
         (top.omega, top.value(0), count)
     }
 
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_top_closely_in_front_of_a_jump_is_found() {
+    fn a_peak_just_before_a_jump_is_found() {
         // The curve is level just before the fold, then it falls to another orbit.
         let top = |w: f64| 1.0 / (1.0 + (100.0 * (w - 1.0)).powi(2) + (60.0 * (w - 1.0)).powi(3)).sqrt();
         for fold in [1.0003, 1.001, 1.003] {
@@ -189,6 +189,6 @@ mod tests {
         // Parabolas approach the jump slowly from below, and every third step is a bisection.
         // The search ends close to the edge.
         assert!((omega - 1.05).abs() < 2e-5 * 0.3, "{omega} {count}");
-        assert!(count <= ORBITS, "{count}");
+        assert!(count <= MAX_ORBITS, "{count}");
     }
 }

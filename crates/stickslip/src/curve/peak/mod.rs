@@ -11,20 +11,20 @@ use super::branch_following;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
-use bracket::{Bracket, reach, refine};
+use bracket::{Bracket, refine, vertex_value};
 pub use point::{Peak, PeakOf, Point, Unsettled};
 use rayon::prelude::*;
 
 /// A point that exceeds its neighbours by less than this fraction is rounding, not a peak.
-const LEVEL: f64 = 1e-10;
+const MIN_PROMINENCE: f64 = 1e-10;
 /// Number of peaks at one point that share a solver and its stored data. It is small enough to
 /// keep all threads busy, and does not depend on their number.
-const TOGETHER: usize = 12;
+const PEAKS_PER_SOLVER: usize = 12;
 /// A maximum is searched only if the vertex of its parabola reaches this fraction of the highest
 /// value. Other maxima cannot contain the highest peak, unless the points are far too few. The
 /// second value applies after other quantities have added orbits.
-const CANDIDATE: f64 = 0.8;
-const LIKELY: f64 = 0.95;
+const CANDIDATE_RATIO: f64 = 0.8;
+const REFINED_CANDIDATE_RATIO: f64 = 0.95;
 
 /// Returns the highest peak of the first `wanted` quantities over a curve. `points` are in order
 /// of frequency; `solver` refines the peak between its neighbours. Each quantity is searched
@@ -63,8 +63,8 @@ pub fn highest(
         .filter_map(|i| {
             let near = &points[i - 1..=i + 1];
             let mut here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-            here.sort_by(|&a, &b| reach(near, b).total_cmp(&reach(near, a)));
-            Some((reach(near, *here.first()?), i, here))
+            here.sort_by(|&a, &b| vertex_value(near, b).total_cmp(&vertex_value(near, a)));
+            Some((vertex_value(near, *here.first()?), i, here))
         })
         .collect();
     // The most promising maximum comes first, because its value excludes other maxima.
@@ -73,13 +73,13 @@ pub fn highest(
         let mut bracket = Bracket::new(&points[i - 1..=i + 1]);
         for quantity in here {
             // orbits that others added predict the peak better than the points of the curve
-            let share = if bracket.points.len() > 3 { LIKELY } else { CANDIDATE };
-            if bracket.reach(quantity) >= share * peak.value {
+            let share = if bracket.points.len() > 3 { REFINED_CANDIDATE_RATIO } else { CANDIDATE_RATIO };
+            if bracket.vertex_value(quantity) >= share * peak.value {
                 bracket.refine(solver, quantity, quantities);
                 peak = higher(peak, bracket.peak(quantity).peak);
             }
         }
-        bracket.refine_overtaken(solver, quantities);
+        bracket.repeat_overtaken(solver, quantities);
         let refined: Vec<usize> = bracket.ended.keys().copied().collect();
         peak = refined.into_iter().map(|quantity| bracket.peak(quantity).peak).fold(peak, higher);
     }
@@ -93,7 +93,7 @@ fn higher(one: Peak, other: Peak) -> Peak {
 
 /// Amplitudes below this fraction of the response of a single mass to the loads are rounding:
 /// friction holds the mass.
-const HELD: f64 = 1e-10;
+const HELD_RATIO: f64 = 1e-10;
 
 /// Returns the amplitude (m) below which a place counts as held at a frequency: a fraction of
 /// the largest `F / (k + Ω²m)`.
@@ -102,7 +102,7 @@ pub fn held(system: &System, omega: f64) -> f64 {
     let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
     let loads = system.excitation(omega);
     let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
-    HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
+    HELD_RATIO * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }
 
 /// Returns all local maxima of the first `wanted` quantities among the inner `points`, refined,
@@ -136,7 +136,7 @@ pub fn all(
     let tops = (1..points.len().saturating_sub(1)).flat_map(|i| {
         let near = &points[i - 1..=i + 1];
         let here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-        here.chunks(TOGETHER).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
+        here.chunks(PEAKS_PER_SOLVER).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
     });
     let tops: Vec<(&[Point], Vec<usize>)> = tops.collect();
     let found: Vec<Result<Vec<PeakOf>, MethodError>> = tops
@@ -157,12 +157,12 @@ pub fn all(
 fn is_maximum(near: &[Point], quantity: usize) -> bool {
     let [left, here, right] = [0, 1, 2].map(|i| near[i].value(quantity));
     let known = near.iter().all(|point| !point.values.is_empty());
-    known && here >= left && here > right && here - left.min(right) > LEVEL * here.abs()
+    known && here >= left && here > right && here - left.min(right) > MIN_PROMINENCE * here.abs()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::bracket_reduction::RISE;
+    use super::bracket_reduction::MIN_RISE;
     use super::*;
     use crate::method::event_driven::EventDriven;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
@@ -179,7 +179,7 @@ mod tests {
     /// narrow one of 9.1 mm. The 13 points, five half-widths apart, show the narrow one as 1.8
     /// mm, below the wide one.
     #[test]
-    fn a_narrow_top_between_two_points_counts_beside_a_wide_one() {
+    fn a_narrow_peak_between_points_is_found() {
         let mut model = Model::default();
         for (name, stiffness, damping) in [("wide", 1e4, 4.0), ("narrow", 1.21e4, 1.0)] {
             model.masses.push(Mass::new(name, 1.0));
@@ -194,13 +194,13 @@ mod tests {
         let peak = highest(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
         // F / (c √(k/m - c²/4m²))
         let expected = 1.0 / f64::sqrt(1.21e4 - 0.25);
-        assert!((peak.value / expected - 1.0).abs() < RISE && peak.unsettled.is_none(), "{peak:?}");
+        assert!((peak.value / expected - 1.0).abs() < MIN_RISE && peak.unsettled.is_none(), "{peak:?}");
     }
 
     /// Without damping, a slider of 2 N cannot bound the response to 10 N, since 4/π·2 N < 10 N.
     /// With sufficient damping the peak is found.
     #[test]
-    fn a_peak_without_a_bound_is_open() {
+    fn an_unbounded_peak_is_unresolved() {
         let peak = |damping: f64| {
             let mut model = Model::default();
             model.masses.push(Mass::new("m", 1.0));
@@ -228,7 +228,7 @@ mod tests {
     /// off and `ω'` on the stop. The branch is lost before. With damping the curve has a maximum
     /// before its fold.
     #[test]
-    fn a_peak_that_is_lost_on_its_way_up_is_open() {
+    fn a_peak_whose_branch_is_lost_is_unresolved() {
         let peak = |damping: f64, points: usize| {
             let mut model = Model::default();
             model.masses.push(Mass::new("m", 1.0));

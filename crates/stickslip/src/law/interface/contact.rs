@@ -21,9 +21,9 @@ pub enum Contact {
 
 /// A smooth law never sticks completely. It counts as slipping while its force exceeds this
 /// fraction of its limit.
-pub(crate) const SLIPS_ABOVE: f64 = 0.95;
+pub(crate) const SMOOTH_SLIP_FRACTION: f64 = 0.95;
 /// A law with stick carries its limit during slip, up to accumulated rounding.
-const AT: f64 = 1.0 - 1e-9;
+const AT_LIMIT: f64 = 1.0 - 1e-9;
 
 impl Contact {
     /// Returns the sign of the slip velocity in one direction: +1, -1, or 0.
@@ -56,15 +56,15 @@ impl Contact {
     /// Returns the state of a smooth law from its force relative to its limit, over all
     /// directions. With a limit of zero the faces slip in the direction of the velocity.
     pub fn by_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
-        Contact::above(SLIPS_ABOVE, limit, velocity, force)
+        Contact::from_fraction(SMOOTH_SLIP_FRACTION, limit, velocity, force)
     }
 
     /// Returns the state of a law that sticks below its limit.
     pub fn at_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
-        Contact::above(AT, limit, velocity, force)
+        Contact::from_fraction(AT_LIMIT, limit, velocity, force)
     }
 
-    fn above(fraction: f64, limit: f64, velocity: &[f64], force: &[f64]) -> Self {
+    fn from_fraction(fraction: f64, limit: f64, velocity: &[f64], force: &[f64]) -> Self {
         let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
         if limit.is_infinite() || size < fraction * limit {
             return Contact::Stick;

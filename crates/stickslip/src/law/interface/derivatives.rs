@@ -4,9 +4,9 @@
 use stickslip_numerics::dual::{Dual, partials, variable};
 
 /// Number of derivatives per pass for laws with many arguments.
-pub(in crate::law) const WIDTH: usize = 8;
+pub(in crate::law) const PASS_WIDTH: usize = 8;
 /// Largest number of internal states that are stored on the stack.
-pub(in crate::law) const FEW: usize = 8;
+pub(in crate::law) const STACK_STATES: usize = 8;
 
 /// One row per force, then one row per state (or per state rate). The columns are two vectors in
 /// all directions, then the states.
@@ -41,14 +41,14 @@ impl Derivatives {
     }
 
     /// Returns the rows of the forces and the rows of the states.
-    pub fn parts_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+    pub fn force_and_state_mut(&mut self) -> (&mut [f64], &mut [f64]) {
         self.values.split_at_mut(self.directions * self.arguments)
     }
 
     /// Stores the derivatives of one pass, from argument `first` on, in a row. The rows of the
     /// states follow those of the forces.
     #[inline]
-    pub fn keep<const N: usize>(&mut self, row: usize, first: usize, value: &Dual<N>) {
+    pub fn store<const N: usize>(&mut self, row: usize, first: usize, value: &Dual<N>) {
         let width = N.min(self.arguments - first);
         let kept = &mut self.values[row * self.arguments + first..];
         match kept.first_chunk_mut::<N>() {
@@ -61,7 +61,7 @@ impl Derivatives {
 /// Returns an argument as a dual number. It carries a derivative if the pass that starts at
 /// `first` contains it.
 #[inline]
-pub(in crate::law) fn seeded<const N: usize>(value: f64, argument: usize, first: usize) -> Dual<N> {
+pub(in crate::law) fn dual_argument<const N: usize>(value: f64, argument: usize, first: usize) -> Dual<N> {
     match argument.checked_sub(first) {
         Some(at) if at < N => variable(value, at),
         _ => Dual::from(value),

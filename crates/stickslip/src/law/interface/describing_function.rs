@@ -17,11 +17,11 @@ const CYCLES: usize = 3;
 const ITERATIONS: usize = 8;
 /// Penalty times velocity amplitude. The resolvent then evaluates the law at a velocity that
 /// differs by `λ / STEEP` of the velocity amplitude.
-const STEEP: f64 = 1e6;
+const SCALED_PENALTY: f64 = 1e6;
 
 /// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
 /// first available view, in the order of the arguments.
-pub(in crate::law) fn stiffness(
+pub(in crate::law) fn complex_stiffness(
     pieces: Option<Vec<Piece>>,
     rate: Option<&dyn Rate>,
     step: Option<&dyn Step>,
@@ -32,10 +32,10 @@ pub(in crate::law) fn stiffness(
     // scale of the law.
     let a = if amplitude > 0.0 { amplitude } else { f64::MIN_POSITIVE.sqrt() };
     if let Some(pieces) = pieces {
-        return pieces.iter().map(|piece| of_piece(piece, amplitude)).sum();
+        return pieces.iter().map(|piece| slider_or_stop(piece, amplitude)).sum();
     }
     if let Some(rate) = rate {
-        return of_rate(rate, a, omega);
+        return rate_law(rate, a, omega);
     }
     if let Some(step) = step {
         let mut z = vec![0.0; step.states()];
@@ -48,7 +48,7 @@ pub(in crate::law) fn stiffness(
         });
     }
     let Some(prox) = prox else { return ZERO };
-    let penalty = STEEP / (a * omega);
+    let penalty = SCALED_PENALTY / (a * omega);
     let rigid = first_harmonic(a, |theta| {
         let y = -penalty * a * omega * theta.sin();
         let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
@@ -60,7 +60,7 @@ pub(in crate::law) fn stiffness(
 }
 
 /// Returns the complex stiffness of one ideal part in closed form.
-pub(in crate::law) fn of_piece(piece: &Piece, amplitude: f64) -> Complex64 {
+pub(in crate::law) fn slider_or_stop(piece: &Piece, amplitude: f64) -> Complex64 {
     match *piece {
         Piece::Slider(Slider { limit: 0.0, .. }) => ZERO,
         Piece::Slider(Slider { stiffness: None, limit, .. }) => Complex64::new(0.0, 4.0 * limit / (PI * amplitude)),
@@ -98,7 +98,7 @@ fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex6
 }
 
 /// Integrates the states by the implicit Euler method, which is stable for any stiffness.
-fn of_rate(rate: &dyn Rate, amplitude: f64, omega: f64) -> Complex64 {
+fn rate_law(rate: &dyn Rate, amplitude: f64, omega: f64) -> Complex64 {
     let states = rate.states();
     let length = TAU / (omega * SAMPLES as f64);
     let mut z = vec![0.0; states];

@@ -38,7 +38,7 @@ impl Piece {
     }
 
     /// Tells whether the part never carries a force.
-    pub(crate) fn is_nothing(&self) -> bool {
+    pub(crate) fn carries_no_force(&self) -> bool {
         match self {
             Piece::Slider(slider) => slider.static_limit == 0.0,
             Piece::Stop { stiffness, .. } => *stiffness == 0.0,
@@ -47,4 +47,4 @@ impl Piece {
 }
 
 /// A slip limit that no force reaches, N.
-pub(in crate::law) const STUCK: f64 = 1e15;
+pub(in crate::law) const UNREACHABLE_LIMIT: f64 = 1e15;

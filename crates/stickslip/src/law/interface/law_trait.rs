@@ -149,7 +149,7 @@ pub trait Law: Debug + Send + Sync {
     /// the first direction. Methods build initial guesses from it.
     fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
         let directions = self.directions();
-        describing_function::stiffness(
+        describing_function::complex_stiffness(
             self.pieces(),
             self.rate(),
             self.step(),
@@ -207,7 +207,7 @@ impl dyn Law + '_ {
             Piece::Slider(slider) => Some(*slider),
             Piece::Stop { .. } => None,
         };
-        self.pieces()?.iter().filter(|piece| !piece.is_nothing()).map(slider).collect()
+        self.pieces()?.iter().filter(|piece| !piece.carries_no_force()).map(slider).collect()
     }
 
     /// Returns the value of a parameter, SI.

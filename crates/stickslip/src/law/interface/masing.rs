@@ -32,18 +32,23 @@ pub trait Masing: Debug + Send + Sync {
 
 /// Number of legs in a state. A motion with more nested return points, such as a long decay, is
 /// stored with fewer legs that carry the same force.
-pub(in crate::law) const LEGS: usize = 16;
+pub(in crate::law) const MAX_LEGS: usize = 16;
 
 /// A loop closes when a leg reaches this fraction of the previous leg. The margin to 1 covers
 /// rounding: a periodic motion repeats its return points only up to rounding, and must close its
 /// loops each time.
-const CLOSES: f64 = 1.0 - 1e-9;
+const LOOP_CLOSURE: f64 = 1.0 - 1e-9;
 
-/// Adds a displacement `way` to the legs of a history of a law that slips at `slips_at`. `force`
-/// returns the contribution of a leg from its index and length, see [`share`].
-pub(in crate::law) fn advance<S: Real>(legs: &mut [S], way: S, slips_at: f64, force: impl Fn(usize, f64) -> f64) {
-    let mut count = counted(legs);
-    while let Some(k) = first_that_goes_on(&legs[..count]) {
+/// Adds a displacement `increment` to the legs of a history of a law that slips at `slips_at`.
+/// `force` returns the contribution of a leg from its index and length, see [`leg_force`].
+pub(in crate::law) fn advance_legs<S: Real>(
+    legs: &mut [S],
+    increment: S,
+    slips_at: f64,
+    force: impl Fn(usize, f64) -> f64,
+) {
+    let mut count = leg_count(legs);
+    while let Some(k) = first_unreversed_leg(&legs[..count]) {
         // Two consecutive legs may have the same sign after an extrapolation between two step
         // sizes.
         let joined = legs[k];
@@ -51,25 +56,25 @@ pub(in crate::law) fn advance<S: Real>(legs: &mut [S], way: S, slips_at: f64, fo
         legs[k..count].rotate_left(1);
         count -= 1;
     }
-    if count == 0 || way.re() * legs[count - 1].re() >= 0.0 {
+    if count == 0 || increment.re() * legs[count - 1].re() >= 0.0 {
         count = count.max(1);
-        legs[count - 1] += way;
+        legs[count - 1] += increment;
     } else {
         if count == legs.len() {
-            forget(legs, force);
+            merge_legs(legs, force);
             count -= 2;
         }
-        legs[count] = way;
+        legs[count] = increment;
         count += 1;
     }
     loop {
         let length = |k: usize| legs[k].re().abs();
-        if count > 2 && length(count - 1) >= CLOSES * length(count - 2) {
+        if count > 2 && length(count - 1) >= LOOP_CLOSURE * length(count - 2) {
             let beyond = legs[count - 2] + legs[count - 1];
             legs[count - 3] += beyond;
             (legs[count - 2], legs[count - 1]) = (S::from(0.0), S::from(0.0));
             count -= 2;
-        } else if count == 2 && length(1) >= CLOSES * 2.0 * length(0) {
+        } else if count == 2 && length(1) >= LOOP_CLOSURE * 2.0 * length(0) {
             // the motion exceeds the first leg on the opposite side: first loading again
             let end = legs[0] + legs[1];
             (legs[0], legs[1]) = (end, S::from(0.0));
@@ -85,12 +90,12 @@ pub(in crate::law) fn advance<S: Real>(legs: &mut [S], way: S, slips_at: f64, fo
 }
 
 /// Counts the legs in use; the others are zero.
-pub(in crate::law) fn counted<S: Real>(legs: &[S]) -> usize {
+pub(in crate::law) fn leg_count<S: Real>(legs: &[S]) -> usize {
     legs.iter().position(|leg| leg.re() == 0.0).unwrap_or(legs.len())
 }
 
 /// Returns the index of the first leg that has the same sign as the leg before it.
-pub(in crate::law) fn first_that_goes_on<S: Real>(legs: &[S]) -> Option<usize> {
+pub(in crate::law) fn first_unreversed_leg<S: Real>(legs: &[S]) -> Option<usize> {
     (1..legs.len()).find(|&k| legs[k].re() * legs[k - 1].re() > 0.0)
 }
 
@@ -98,7 +103,7 @@ pub(in crate::law) fn first_that_goes_on<S: Real>(legs: &[S]) -> Option<usize> {
 /// least in length. The two legs have the same total displacement and the same total force as
 /// the four, so the force does not jump. Their lengths lie between those that they replace.
 /// `force` returns the contribution of a leg from its index and length.
-fn forget<S: Real>(legs: &mut [S], force: impl Fn(usize, f64) -> f64) {
+fn merge_legs<S: Real>(legs: &mut [S], force: impl Fn(usize, f64) -> f64) {
     let apart = |k: usize| 1.0 - (legs[k + 2].re() / legs[k].re()).abs();
     let Some(first) = (1..legs.len() - 3).min_by(|a, b| apart(*a).total_cmp(&apart(*b))) else { return };
     let four = [0, 1, 2, 3].map(|k| legs[first + k].re());
@@ -124,19 +129,19 @@ fn forget<S: Real>(legs: &mut [S], force: impl Fn(usize, f64) -> f64) {
 
 /// Returns the contribution of a leg to the force. The leg at place 0 is first loading; the
 /// others are branches.
-pub(in crate::law) fn share<S: Real>(place: usize, leg: S, backbone: impl Fn(S) -> S) -> S {
+pub(in crate::law) fn leg_force<S: Real>(place: usize, leg: S, backbone: impl Fn(S) -> S) -> S {
     let scale = if place == 0 { 1.0 } else { 2.0 };
     let force = backbone(leg.abs() / scale) * scale;
     if leg.re() < 0.0 { -force } else { force }
 }
 
-/// Number of quadrature panels over the half period in [`stiffness`].
+/// Number of quadrature panels over the half period in [`complex_stiffness`].
 const PANELS: u32 = 8;
 
 /// Returns the complex stiffness (N/m) of the first harmonic of the periodic force under
 /// `u = amplitude cos θ`. In the half period of decreasing u the force is
 /// `B(a) - 2 B((a - u)/2)`; the other half mirrors it.
-pub(in crate::law) fn stiffness(law: &dyn Masing, amplitude: f64) -> Complex64 {
+pub(in crate::law) fn complex_stiffness(law: &dyn Masing, amplitude: f64) -> Complex64 {
     let top = law.backbone(amplitude).0;
     let mut sum = Complex64::ZERO;
     for panel in 0..PANELS {
@@ -160,11 +165,11 @@ mod tests {
     }
 
     fn force(legs: &[f64], backbone: fn(f64) -> f64) -> f64 {
-        legs.iter().enumerate().map(|(k, leg)| share(k, *leg, backbone)).sum()
+        legs.iter().enumerate().map(|(k, leg)| leg_force(k, *leg, backbone)).sum()
     }
 
-    fn run(legs: &mut [f64], way: f64, backbone: fn(f64) -> f64, slips_at: f64) -> f64 {
-        advance(legs, way, slips_at, |k, leg| share(k, leg, backbone));
+    fn run(legs: &mut [f64], increment: f64, backbone: fn(f64) -> f64, slips_at: f64) -> f64 {
+        advance_legs(legs, increment, slips_at, |k, leg| leg_force(k, leg, backbone));
         force(legs, backbone)
     }
 
@@ -175,18 +180,18 @@ mod tests {
     /// Four parallel sliders with different springs and limits have the force history of their
     /// backbone.
     #[test]
-    fn sliders_side_by_side_are_their_backbone() {
+    fn parallel_sliders_follow_their_backbone() {
         const SLIDERS: [(f64, f64); 4] = [(1.0, 0.3), (2.0, 0.7), (0.5, 1.1), (0.8, 1.6)];
         fn backbone(u: f64) -> f64 {
             SLIDERS.iter().map(|(k, reach)| k * u.min(*reach)).sum()
         }
-        let (mut legs, mut held) = ([0.0; LEGS], [0.0; 4]);
+        let (mut legs, mut held) = ([0.0; MAX_LEGS], [0.0; 4]);
         for k in 0..5000 {
             // The amplitude changes slowly, so that loops are nested deeply.
-            let way = 1.5 * noise(k) * (0.6 + 0.5 * (0.037 * k as f64).sin());
-            let found = run(&mut legs, way, backbone, 1.6);
+            let increment = 1.5 * noise(k) * (0.6 + 0.5 * (0.037 * k as f64).sin());
+            let found = run(&mut legs, increment, backbone, 1.6);
             for (f, (k, reach)) in held.iter_mut().zip(SLIDERS) {
-                *f = (*f + k * way).clamp(-k * reach, k * reach);
+                *f = (*f + k * increment).clamp(-k * reach, k * reach);
             }
             let expected: f64 = held.iter().sum();
             assert!((found - expected).abs() < 1e-11, "{k}: {found} {expected}");
@@ -195,10 +200,10 @@ mod tests {
 
     /// A closed inner loop is deleted, and macro-slip erases the history.
     #[test]
-    fn loops_close_and_are_forgotten() {
-        let mut legs = [0.0; LEGS];
-        for way in [0.7, -0.5, 0.2, -0.1, 0.1, -0.2] {
-            run(&mut legs, way, jenkins, 1.0);
+    fn closed_loops_are_deleted() {
+        let mut legs = [0.0; MAX_LEGS];
+        for increment in [0.7, -0.5, 0.2, -0.1, 0.1, -0.2] {
+            run(&mut legs, increment, jenkins, 1.0);
         }
         assert!((legs[1] + 0.5).abs() < 1e-15 && legs[2] == 0.0, "{legs:?}");
         run(&mut legs, -9.0, jenkins, 1.0);
@@ -213,9 +218,9 @@ mod tests {
         fn smooth(u: f64) -> f64 {
             u - 0.5 * u.min(1.0) * u.min(1.0)
         }
-        let (mut few, mut many) = ([0.0; LEGS], [0.0; 400]);
-        let mut both = |way: f64| {
-            let forces = [run(&mut few, way, smooth, 1.0), run(&mut many, way, smooth, 1.0)];
+        let (mut few, mut many) = ([0.0; MAX_LEGS], [0.0; 400]);
+        let mut both = |increment: f64| {
+            let forces = [run(&mut few, increment, smooth, 1.0), run(&mut many, increment, smooth, 1.0)];
             (forces[0] - forces[1]).abs()
         };
         let turn = |k: i32| if k % 2 == 0 { 1.0 } else { -1.0 };
@@ -241,11 +246,11 @@ mod tests {
         }
         const WAYS: [f64; 6] = [0.8, -0.9, 0.4, -0.2, 0.5, -0.3];
         fn end<S: Real>(ways: [S; 6]) -> S {
-            let mut legs = [S::from(0.0); LEGS];
-            for way in ways {
-                advance(&mut legs, way, 2.0, |_, _| 0.0);
+            let mut legs = [S::from(0.0); MAX_LEGS];
+            for increment in ways {
+                advance_legs(&mut legs, increment, 2.0, |_, _| 0.0);
             }
-            legs.iter().enumerate().map(|(k, leg)| share(k, *leg, smooth)).sum()
+            legs.iter().enumerate().map(|(k, leg)| leg_force(k, *leg, smooth)).sum()
         }
         let found = partials(&end(std::array::from_fn(|k| -> Dual<6> { variable(WAYS[k], k) })));
         for k in 0..6 {

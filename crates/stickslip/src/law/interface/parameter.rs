@@ -133,7 +133,7 @@ impl Parameter {
 }
 
 /// Returns the dimension in words; "number" if it is dimensionless.
-fn measured(dimension: Dimension) -> String {
+fn dimension_text(dimension: Dimension) -> String {
     if dimension == Dimension::NONE { "number".to_owned() } else { dimension.to_string() }
 }
 
@@ -141,7 +141,7 @@ fn measured(dimension: Dimension) -> String {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LawError {
     /// A value is out of range.
-    #[error("{law}: `{key}` is {value}; it must be a finite {}, {range}", measured(*.dimension))]
+    #[error("{law}: `{key}` is {value}; it must be a finite {}, {range}", dimension_text(*.dimension))]
     Value {
         /// Name of the law.
         law: &'static str,

@@ -1,6 +1,6 @@
 //! The rate view: force and rates of the internal states, as smooth functions of the motion.
 
-use super::derivatives::{Derivatives, FEW, WIDTH, seeded};
+use super::derivatives::{Derivatives, PASS_WIDTH, STACK_STATES, dual_argument};
 use super::relative_motion::{MOST_DIRECTIONS, Relative};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
@@ -97,13 +97,13 @@ impl<L: RateLaw + Debug + Send + Sync> Rate for L {
     }
     fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint) {
         match 2 * directions + z.len() {
-            0..=2 => pass::<2, L>(self, directions, motion, z, 0, point),
-            3 => pass::<3, L>(self, directions, motion, z, 0, point),
-            4 => pass::<4, L>(self, directions, motion, z, 0, point),
-            5 | 6 => pass::<6, L>(self, directions, motion, z, 0, point),
+            0..=2 => dual_pass::<2, L>(self, directions, motion, z, 0, point),
+            3 => dual_pass::<3, L>(self, directions, motion, z, 0, point),
+            4 => dual_pass::<4, L>(self, directions, motion, z, 0, point),
+            5 | 6 => dual_pass::<6, L>(self, directions, motion, z, 0, point),
             arguments => {
-                for first in (0..arguments).step_by(WIDTH) {
-                    pass::<WIDTH, L>(self, directions, motion, z, first, point);
+                for first in (0..arguments).step_by(PASS_WIDTH) {
+                    dual_pass::<PASS_WIDTH, L>(self, directions, motion, z, first, point);
                 }
             }
         }
@@ -112,7 +112,7 @@ impl<L: RateLaw + Debug + Send + Sync> Rate for L {
 
 /// Computes the derivatives with respect to `N` arguments, starting at argument `first`.
 #[inline]
-fn pass<const N: usize, L: RateLaw>(
+fn dual_pass<const N: usize, L: RateLaw>(
     law: &L,
     directions: usize,
     motion: &Relative<f64>,
@@ -120,16 +120,16 @@ fn pass<const N: usize, L: RateLaw>(
     first: usize,
     point: &mut RatePoint,
 ) {
-    let seeded = |value: f64, argument: usize| -> Dual<N> { seeded(value, argument, first) };
+    let seeded = |value: f64, argument: usize| -> Dual<N> { dual_argument(value, argument, first) };
     let mut moving = Relative::along(Dual::from(0.0), Dual::from(0.0));
     for a in 0..directions {
         moving.displacement[a] = seeded(motion.displacement[a], a);
         moving.velocity[a] = seeded(motion.velocity[a], directions + a);
     }
     let zero = Dual::<N>::from(0.0);
-    let mut few = [zero; 2 * FEW];
-    let mut many = vec![zero; if z.len() > FEW { 2 * z.len() } else { 0 }];
-    let both = if z.len() > FEW { &mut many[..] } else { &mut few[..2 * z.len()] };
+    let mut few = [zero; 2 * STACK_STATES];
+    let mut many = vec![zero; if z.len() > STACK_STATES { 2 * z.len() } else { 0 }];
+    let both = if z.len() > STACK_STATES { &mut many[..] } else { &mut few[..2 * z.len()] };
     let (state, rate) = both.split_at_mut(z.len());
     for (s, (dual, &value)) in state.iter_mut().zip(z).enumerate() {
         *dual = seeded(value, 2 * directions + s);
@@ -137,10 +137,10 @@ fn pass<const N: usize, L: RateLaw>(
     let force = law.evaluate(&moving, state, rate);
     for a in 0..directions {
         point.force[a] = force[a].re;
-        point.slopes.keep(a, first, &force[a]);
+        point.slopes.store(a, first, &force[a]);
     }
     for (s, rate) in rate.iter().enumerate() {
         point.rate[s] = rate.re;
-        point.slopes.keep(directions + s, first, rate);
+        point.slopes.store(directions + s, first, rate);
     }
 }

@@ -1,7 +1,7 @@
 //! The step view (return map): the force at the end of a step, from the displacements at both
 //! ends and the state before it.
 
-use super::derivatives::{Derivatives, FEW, WIDTH, seeded};
+use super::derivatives::{Derivatives, PASS_WIDTH, STACK_STATES, dual_argument};
 use super::relative_motion::MOST_DIRECTIONS;
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
@@ -100,7 +100,7 @@ pub trait Step: Debug + Send + Sync {
     fn around(
         &self,
         directions: usize,
-        way: &[Vec<f64>; MOST_DIRECTIONS],
+        path: &[Vec<f64>; MOST_DIRECTIONS],
         states: (&mut [f64], &mut [f64]),
         force: &mut [Vec<f64>; MOST_DIRECTIONS],
         rows: Option<&mut [f64]>,
@@ -167,18 +167,18 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
         point: &mut StepPoint,
     ) {
         point.state.copy_from_slice(z);
-        let (force, state) = point.slopes.parts_mut();
+        let (force, state) = point.slopes.force_and_state_mut();
         let slopes = StepSlopes { directions, force, state };
         if let Some(force) = self.tangent(from, to, &mut point.state, slopes) {
             point.force = force;
             return;
         }
         match 2 * directions + z.len() {
-            0..=3 => pass::<3, L>(self, directions, (from, to), z, 0, point),
-            4 | 5 => pass::<5, L>(self, directions, (from, to), z, 0, point),
+            0..=3 => dual_pass::<3, L>(self, directions, (from, to), z, 0, point),
+            4 | 5 => dual_pass::<5, L>(self, directions, (from, to), z, 0, point),
             arguments => {
-                for first in (0..arguments).step_by(WIDTH) {
-                    pass::<WIDTH, L>(self, directions, (from, to), z, first, point);
+                for first in (0..arguments).step_by(PASS_WIDTH) {
+                    dual_pass::<PASS_WIDTH, L>(self, directions, (from, to), z, first, point);
                 }
             }
         }
@@ -186,39 +186,40 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
     fn around(
         &self,
         directions: usize,
-        way: &[Vec<f64>; MOST_DIRECTIONS],
-        (z, trail): (&mut [f64], &mut [f64]),
+        path: &[Vec<f64>; MOST_DIRECTIONS],
+        (z, previous_states): (&mut [f64], &mut [f64]),
         force: &mut [Vec<f64>; MOST_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) {
-        let n = way[0].len();
-        let at = |i: usize| std::array::from_fn(|a| if a < directions { way[a][i] } else { 0.0 });
-        let mut keep = |i: usize, now: [f64; MOST_DIRECTIONS]| {
+        let n = path[0].len();
+        let at = |i: usize| std::array::from_fn(|a| if a < directions { path[a][i] } else { 0.0 });
+        let mut store = |i: usize, now: [f64; MOST_DIRECTIONS]| {
             force.iter_mut().zip(now).take(directions).for_each(|(force, now)| force[i] = now);
         };
         let Some(rows) = rows else {
             match z.len() {
-                1 => values::<1, L>(self, (n, at), (z, trail), keep),
-                2 => values::<2, L>(self, (n, at), (z, trail), keep),
+                1 => cycle_without_derivatives::<1, L>(self, (n, at), (z, previous_states), store),
+                2 => cycle_without_derivatives::<2, L>(self, (n, at), (z, previous_states), store),
                 _ => {
                     let mut from = at(0);
                     for step in 1..=n {
                         let i = step % n;
                         let to = at(i);
-                        keep(i, self.advance(&from, &to, z));
+                        store(i, self.advance(&from, &to, z));
                         from = to;
-                        let (end, here) = (&trail[..z.len()], &trail[i * z.len()..(i + 1) * z.len()]);
+                        let (end, here) =
+                            (&previous_states[..z.len()], &previous_states[i * z.len()..(i + 1) * z.len()]);
                         if !z.is_empty() && here == z {
                             z.copy_from_slice(end);
                             return;
                         }
-                        trail[i * z.len()..(i + 1) * z.len()].copy_from_slice(z);
+                        previous_states[i * z.len()..(i + 1) * z.len()].copy_from_slice(z);
                     }
                 }
             }
             return;
         };
-        trail.fill(f64::NAN);
+        previous_states.fill(f64::NAN);
         let (states, width) = (z.len(), 2 * directions + z.len());
         let mut point = StepPoint::new(directions, states);
         let mut from = at(0);
@@ -230,13 +231,13 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
             let own = StepSlopes { directions, force: &mut *slopes, state: &mut *state };
             let now = self.tangent(&from, &to, z, own).unwrap_or_else(|| {
                 self.linearise(directions, &from, &to, z, &mut point);
-                let (of_forces, of_states) = point.slopes.parts_mut();
+                let (of_forces, of_states) = point.slopes.force_and_state_mut();
                 slopes.copy_from_slice(of_forces);
                 state.copy_from_slice(of_states);
                 z.copy_from_slice(&point.state);
                 point.force
             });
-            keep(i, now);
+            store(i, now);
             from = to;
         }
     }
@@ -247,31 +248,31 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
 
 /// Performs the steps of [`Step::around`] without derivatives, for a fixed number of states.
 /// Most laws have one or two.
-fn values<const STATES: usize, L: StepLaw>(
+fn cycle_without_derivatives<const STATES: usize, L: StepLaw>(
     law: &L,
     (n, at): (usize, impl Fn(usize) -> [f64; MOST_DIRECTIONS]),
-    (z, trail): (&mut [f64], &mut [f64]),
-    mut keep: impl FnMut(usize, [f64; MOST_DIRECTIONS]),
+    (z, previous_states): (&mut [f64], &mut [f64]),
+    mut store: impl FnMut(usize, [f64; MOST_DIRECTIONS]),
 ) {
     let mut now: [f64; STATES] = std::array::from_fn(|s| z[s]);
-    let (trail, _) = trail.as_chunks_mut::<STATES>();
+    let (previous_states, _) = previous_states.as_chunks_mut::<STATES>();
     let mut from = at(0);
     for step in 1..=n {
         let i = if step == n { 0 } else { step };
         let to = at(i);
-        keep(i, law.advance(&from, &to, &mut now));
+        store(i, law.advance(&from, &to, &mut now));
         from = to;
-        if trail[i] == now {
-            now = trail[0];
+        if previous_states[i] == now {
+            now = previous_states[0];
             break;
         }
-        trail[i] = now;
+        previous_states[i] = now;
     }
     z.copy_from_slice(&now);
 }
 
 /// Computes the derivatives with respect to `N` arguments, starting at argument `first`.
-fn pass<const N: usize, L: StepLaw>(
+fn dual_pass<const N: usize, L: StepLaw>(
     law: &L,
     directions: usize,
     (from, to): (&[f64; MOST_DIRECTIONS], &[f64; MOST_DIRECTIONS]),
@@ -279,26 +280,26 @@ fn pass<const N: usize, L: StepLaw>(
     first: usize,
     point: &mut StepPoint,
 ) {
-    let seeded = |value: f64, argument: usize| -> Dual<N> { seeded(value, argument, first) };
+    let seeded = |value: f64, argument: usize| -> Dual<N> { dual_argument(value, argument, first) };
     let zero = Dual::<N>::from(0.0);
     let (mut before, mut after) = ([zero; MOST_DIRECTIONS], [zero; MOST_DIRECTIONS]);
     for a in 0..directions {
         before[a] = seeded(from[a], a);
         after[a] = seeded(to[a], directions + a);
     }
-    let mut few = [zero; FEW];
-    let mut many = vec![zero; if z.len() > FEW { z.len() } else { 0 }];
-    let state = if z.len() > FEW { &mut many[..] } else { &mut few[..z.len()] };
+    let mut few = [zero; STACK_STATES];
+    let mut many = vec![zero; if z.len() > STACK_STATES { z.len() } else { 0 }];
+    let state = if z.len() > STACK_STATES { &mut many[..] } else { &mut few[..z.len()] };
     for (s, (dual, &value)) in state.iter_mut().zip(z).enumerate() {
         *dual = seeded(value, 2 * directions + s);
     }
     let force = law.advance(&before, &after, state);
     for a in 0..directions {
         point.force[a] = force[a].re;
-        point.slopes.keep(a, first, &force[a]);
+        point.slopes.store(a, first, &force[a]);
     }
     for (s, state) in state.iter().enumerate() {
         point.state[s] = state.re;
-        point.slopes.keep(directions + s, first, state);
+        point.slopes.store(directions + s, first, state);
     }
 }

@@ -19,7 +19,7 @@ pub(in crate::law) fn sign(x: f64) -> f64 {
 }
 
 /// Returns `|x|`. Its derivative is the sign, zero at zero.
-pub(in crate::law) fn size<S: Real>(x: S) -> S {
+pub(in crate::law) fn abs<S: Real>(x: S) -> S {
     x * sign(x.re())
 }
 
@@ -29,7 +29,7 @@ const TINY: f64 = 1e-60;
 
 /// Returns `|x|` raised to a power of one or more.
 pub(in crate::law) fn power<S: Real>(x: S, exponent: f64) -> S {
-    let size = size(x);
+    let size = abs(x);
     if exponent == 1.0 {
         size
     } else if size.re() < TINY {

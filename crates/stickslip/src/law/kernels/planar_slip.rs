@@ -19,22 +19,22 @@ pub(in crate::law) fn dot<S: Real>(a: [S; 2], b: [S; 2]) -> S {
 }
 
 /// `a + s b`.
-fn beyond<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
+fn axpy<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
     [a[0] + b[0] * s, a[1] + b[1] * s]
 }
 
 /// Relative tolerance between the squared force and the squared limit at which the force counts
 /// as being at the limit. It covers the rounding of the previous step.
-const ROUNDED: f64 = 1e-14;
+const LIMIT_ROUNDING: f64 = 1e-14;
 
 /// Returns the direction of a force that slipped in the previous step and continues to slip. `b`
 /// is the growth of the force along the path, `c` its distance from the limit, see [`step`].
 /// The force is normalized by the limit instead of its length. The square roots and the
 /// exponential of a step then do not wait for the result of the previous step.
 #[inline]
-fn slips_on<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Option<[S; 2]> {
+fn continued_slip_direction<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Option<[S; 2]> {
     let square = first.re() * first.re();
-    let on = b.re() > 0.0 && square >= f64::MIN_POSITIVE && c.re().abs() <= ROUNDED * square;
+    let on = b.re() > 0.0 && square >= f64::MIN_POSITIVE && c.re().abs() <= LIMIT_ROUNDING * square;
     on.then(|| {
         let inverse = first.recip();
         // 1 / |force| to first order in the rounding error
@@ -45,17 +45,17 @@ fn slips_on<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Option<[S; 2]> {
 
 /// Below this difference of the limits, relative to their sum, the logarithm is replaced by its
 /// series. The ninth term is then below rounding.
-const FLAT: f64 = 0.1;
+const LOG_SERIES_BELOW: f64 = 0.1;
 /// Below this relative change of the limit, the derivative is replaced by its series. The fifth
 /// term is then below rounding.
-const FLATTER: f64 = 1e-3;
+const SLOPE_SERIES_BELOW: f64 = 1e-3;
 
 /// `ln(to / from) / (to - from)`: the reciprocal of the logarithmic mean.
 #[inline]
 fn inverse_mean<S: Real>(from: S, to: S) -> S {
     let sum = to + from;
     let change = (to - from) / sum;
-    if change.re().abs() < FLAT {
+    if change.re().abs() < LOG_SERIES_BELOW {
         // ln((1 + x) / (1 - x)) / 2x
         let square = change * change;
         let high = ((square * (1.0 / 15.0) + 1.0 / 13.0) * square + 1.0 / 11.0) * square + 1.0 / 9.0;
@@ -65,36 +65,36 @@ fn inverse_mean<S: Real>(from: S, to: S) -> S {
     (to / from).ln() / (to - from)
 }
 
-/// Returns the force (N) of a spring-slider after a straight path `way` (m), from the `force`
-/// before it. Meanwhile the slip limit changes linearly from the first to the second of `limits`
-/// (N, not negative). The initial force does not exceed the first limit.
+/// Returns the force (N) of a spring-slider after a straight step `increment` (m), from the
+/// `force` before it. Meanwhile the slip limit changes linearly from the first to the second of
+/// `limits` (N, not negative). The initial force does not exceed the first limit.
 #[inline]
-pub(in crate::law) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, limits: [S; 2]) -> [S; 2] {
+pub(in crate::law) fn step<S: Real>(force: [S; 2], increment: [S; 2], stiffness: f64, limits: [S; 2]) -> [S; 2] {
     let [first, last] = limits;
     let zero = S::from(0.0);
     if last.re() <= 0.0 {
         return [zero; 2];
     }
-    let trial = [force[0] + way[0] * stiffness, force[1] + way[1] * stiffness];
+    let trial = [force[0] + increment[0] * stiffness, force[1] + increment[1] * stiffness];
     let beyond_limit = dot(trial, trial) - last * last;
     if beyond_limit.re() <= 0.0 {
         return trial;
     }
-    if dot(way, way).re() == 0.0 {
+    if dot(increment, increment).re() == 0.0 {
         // the limit falls below the force of a joint that does not move
         let size = dot(trial, trial).sqrt();
         return [trial[0] * last / size, trial[1] * last / size];
     }
-    // |force + stiffness s way| reaches the limit at the fraction s of the path. It solves a s²
+    // |force + stiffness s increment| reaches the limit at the fraction s of the path. It solves a s²
     // + b s + c = 0 with c <= 0 and a + b + c > 0.
     let change = last - first;
-    let a = dot(way, way) * (stiffness * stiffness) - change * change;
-    let b = (dot(force, way) * stiffness - first * change) * 2.0;
+    let a = dot(increment, increment) * (stiffness * stiffness) - change * change;
+    let b = (dot(force, increment) * stiffness - first * change) * 2.0;
     let c = dot(force, force) - first * first;
-    let length = dot(way, way).sqrt();
-    let ahead = [way[0] / length, way[1] / length];
+    let length = dot(increment, increment).sqrt();
+    let ahead = [increment[0] / length, increment[1] / length];
     // A pass with derivatives always solves for the beginning of slip.
-    let on = if S::NDERIV == 0 { slips_on(force, first, b, c) } else { None };
+    let on = if S::NDERIV == 0 { continued_slip_direction(force, first, b, c) } else { None };
     let (share, size, direction) = match on {
         Some(direction) => (zero, first, direction),
         None => {
@@ -106,7 +106,7 @@ pub(in crate::law) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, 
             } else {
                 (discriminant.sqrt() - b) / (a * 2.0)
             };
-            let held = beyond(force, share * stiffness, way);
+            let held = axpy(force, share * stiffness, increment);
             let size = dot(held, held).sqrt();
             if size.re() <= 0.0 {
                 // contact that begins here slips along the motion
@@ -128,8 +128,8 @@ pub(in crate::law) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, 
     }
     let along = (plus - minus * factor * factor) / denominator;
     let turned = factor * 2.0 / denominator;
-    let across = beyond(direction, -cosine, ahead);
-    let out = beyond([ahead[0] * along, ahead[1] * along], turned, across);
+    let across = axpy(direction, -cosine, ahead);
+    let out = axpy([ahead[0] * along, ahead[1] * along], turned, across);
     [out[0] * last, out[1] * last]
 }
 
@@ -138,13 +138,13 @@ pub(in crate::law) fn step<S: Real>(force: [S; 2], way: [S; 2], stiffness: f64, 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::law) struct PlanarDerivatives {
     pub(in crate::law) by_force: [[f64; 2]; 2],
-    pub(in crate::law) by_way: [[f64; 2]; 2],
+    pub(in crate::law) by_increment: [[f64; 2]; 2],
     pub(in crate::law) by_limits: [[f64; 2]; 2],
 }
 
 impl PlanarDerivatives {
     pub(in crate::law) const NONE: PlanarDerivatives =
-        PlanarDerivatives { by_force: [[0.0; 2]; 2], by_way: [[0.0; 2]; 2], by_limits: [[0.0; 2]; 2] };
+        PlanarDerivatives { by_force: [[0.0; 2]; 2], by_increment: [[0.0; 2]; 2], by_limits: [[0.0; 2]; 2] };
 }
 
 /// Derivatives of a scalar with respect to the components of the force, those of the path, and
@@ -152,19 +152,19 @@ impl PlanarDerivatives {
 #[derive(Debug, Clone, Copy)]
 struct ScalarGradient {
     force: [f64; 2],
-    way: [f64; 2],
+    increment: [f64; 2],
     limits: [f64; 2],
 }
 
 impl ScalarGradient {
-    const NONE: ScalarGradient = ScalarGradient { force: [0.0; 2], way: [0.0; 2], limits: [0.0; 2] };
+    const NONE: ScalarGradient = ScalarGradient { force: [0.0; 2], increment: [0.0; 2], limits: [0.0; 2] };
 
     /// `a self + b other`.
     fn combined(self, a: f64, other: ScalarGradient, b: f64) -> ScalarGradient {
         let pair = |x: [f64; 2], y: [f64; 2]| [a * x[0] + b * y[0], a * x[1] + b * y[1]];
         ScalarGradient {
             force: pair(self.force, other.force),
-            way: pair(self.way, other.way),
+            increment: pair(self.increment, other.increment),
             limits: pair(self.limits, other.limits),
         }
     }
@@ -172,11 +172,14 @@ impl ScalarGradient {
 
 /// `radial δsize + size across δangle`, for a force `size radial`.
 #[inline]
-fn turning(radial: [f64; 2], last: f64, angle: ScalarGradient) -> PlanarDerivatives {
+fn force_derivatives(radial: [f64; 2], last: f64, angle: ScalarGradient) -> PlanarDerivatives {
     let across = [-radial[1] * last, radial[0] * last];
     let outer = |by: [f64; 2]| across.map(|across| [across * by[0], across * by[1]]);
-    let mut slopes =
-        PlanarDerivatives { by_force: outer(angle.force), by_way: outer(angle.way), by_limits: outer(angle.limits) };
+    let mut slopes = PlanarDerivatives {
+        by_force: outer(angle.force),
+        by_increment: outer(angle.increment),
+        by_limits: outer(angle.limits),
+    };
     for (slope, radial) in slopes.by_limits.iter_mut().zip(radial) {
         slope[1] += radial;
     }
@@ -189,7 +192,7 @@ fn turning(radial: [f64; 2], last: f64, angle: ScalarGradient) -> PlanarDerivati
 #[inline]
 pub(in crate::law) fn step_with_slopes(
     force: [f64; 2],
-    way: [f64; 2],
+    increment: [f64; 2],
     stiffness: f64,
     limits: [f64; 2],
 ) -> ([f64; 2], PlanarDerivatives) {
@@ -197,34 +200,35 @@ pub(in crate::law) fn step_with_slopes(
     if last <= 0.0 {
         return ([0.0; 2], PlanarDerivatives::NONE);
     }
-    let trial = beyond(force, stiffness, way);
+    let trial = axpy(force, stiffness, increment);
     if dot(trial, trial) <= last * last {
         let one = [[1.0, 0.0], [0.0, 1.0]];
         return (
             trial,
             PlanarDerivatives {
                 by_force: one,
-                by_way: one.map(|row| row.map(|x| stiffness * x)),
+                by_increment: one.map(|row| row.map(|x| stiffness * x)),
                 ..PlanarDerivatives::NONE
             },
         );
     }
-    let length = dot(way, way).sqrt();
+    let length = dot(increment, increment).sqrt();
     if length == 0.0 {
         let size = dot(trial, trial).sqrt();
         let radial = [trial[0] / size, trial[1] / size];
         let by_force = [-radial[1] / size, radial[0] / size];
-        let angle = ScalarGradient { force: by_force, way: by_force.map(|x| stiffness * x), ..ScalarGradient::NONE };
-        return ([radial[0] * last, radial[1] * last], turning(radial, last, angle));
+        let angle =
+            ScalarGradient { force: by_force, increment: by_force.map(|x| stiffness * x), ..ScalarGradient::NONE };
+        return ([radial[0] * last, radial[1] * last], force_derivatives(radial, last, angle));
     }
-    let ahead = [way[0] / length, way[1] / length];
-    let heading = ScalarGradient { way: [-ahead[1] / length, ahead[0] / length], ..ScalarGradient::NONE };
+    let ahead = [increment[0] / length, increment[1] / length];
+    let heading = ScalarGradient { increment: [-ahead[1] / length, ahead[0] / length], ..ScalarGradient::NONE };
     // beginning of slip
     let change = last - first;
     let a = length * length * (stiffness * stiffness) - change * change;
-    let b = (dot(force, way) * stiffness - first * change) * 2.0;
+    let b = (dot(force, increment) * stiffness - first * change) * 2.0;
     let c = dot(force, force) - first * first;
-    let (share, root, held, size, direction) = match slips_on(force, first, b, c) {
+    let (share, root, held, size, direction) = match continued_slip_direction(force, first, b, c) {
         Some(direction) => (0.0, b, force, first, direction),
         None => {
             let root = (b * b - a * c * 4.0).max(0.0).sqrt();
@@ -235,10 +239,10 @@ pub(in crate::law) fn step_with_slopes(
             } else {
                 (root - b) / (a * 2.0)
             };
-            let held = beyond(force, share * stiffness, way);
+            let held = axpy(force, share * stiffness, increment);
             let size = dot(held, held).sqrt();
             if size <= 0.0 {
-                return ([ahead[0] * last, ahead[1] * last], turning(ahead, last, heading));
+                return ([ahead[0] * last, ahead[1] * last], force_derivatives(ahead, last, heading));
             }
             (share, root, held, size, [held[0] / size, held[1] / size])
         }
@@ -248,7 +252,7 @@ pub(in crate::law) fn step_with_slopes(
         let by = -2.0 / root;
         ScalarGradient {
             force: [by * held[0], by * held[1]],
-            way: held.map(|x| by * share * stiffness * x),
+            increment: held.map(|x| by * share * stiffness * x),
             limits: [-by * size * (1.0 - share), -by * size * share],
         }
     } else {
@@ -256,8 +260,9 @@ pub(in crate::law) fn step_with_slopes(
     };
     // derivatives of a component of `held`
     let of_held = |along: [f64; 2]| {
-        let own = ScalarGradient { force: along, way: along.map(|x| share * stiffness * x), ..ScalarGradient::NONE };
-        own.combined(1.0, begins, stiffness * dot(way, along))
+        let own =
+            ScalarGradient { force: along, increment: along.map(|x| share * stiffness * x), ..ScalarGradient::NONE };
+        own.combined(1.0, begins, stiffness * dot(increment, along))
     };
     let turns = of_held([-direction[1] / size, direction[0] / size]);
     let (mean, by_last) = inverse_mean_with_slope(size, last);
@@ -268,23 +273,23 @@ pub(in crate::law) fn step_with_slopes(
     let (plus, minus) = ((1.0 + cosine).max(0.0), (1.0 - cosine).max(0.0));
     let denominator = plus + minus * factor * factor;
     if denominator <= 0.0 {
-        return ([direction[0] * last, direction[1] * last], turning(direction, last, turns));
+        return ([direction[0] * last, direction[1] * last], force_derivatives(direction, last, turns));
     }
     let along = (plus - minus * factor * factor) / denominator;
     let turned = factor * 2.0 / denominator;
-    let across = beyond(direction, -cosine, ahead);
-    let out = beyond([ahead[0] * along, ahead[1] * along], turned, across);
+    let across = axpy(direction, -cosine, ahead);
+    let out = axpy([ahead[0] * along, ahead[1] * along], turned, across);
     // signed sine of the angle from the motion to the force
     let sine = ahead[0] * out[1] - ahead[1] * out[0];
     let of_rest = ScalarGradient {
-        way: ahead.map(|x| (1.0 - share) * stiffness * mean * x),
+        increment: ahead.map(|x| (1.0 - share) * stiffness * mean * x),
         limits: [0.0, rest * by_last],
         ..ScalarGradient::NONE
     };
     let exponent =
         of_rest.combined(1.0, begins, -length * stiffness * mean).combined(1.0, of_held(direction), rest * by_size);
     let angle = heading.combined(1.0 - turned, turns, turned).combined(1.0, exponent, -sine);
-    ([out[0] * last, out[1] * last], turning(out, last, angle))
+    ([out[0] * last, out[1] * last], force_derivatives(out, last, angle))
 }
 
 /// Returns [`inverse_mean`] and its derivative with respect to `to`. The derivative with respect
@@ -293,7 +298,7 @@ pub(in crate::law) fn step_with_slopes(
 fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     let change = to / from - 1.0;
     let mean = inverse_mean(from, to);
-    let slope = if change.abs() < FLATTER {
+    let slope = if change.abs() < SLOPE_SERIES_BELOW {
         (((change * 0.8 - 0.75) * change + 2.0 / 3.0) * change - 0.5) / (from * from)
     } else {
         (1.0 / to - mean) / (to - from)
@@ -337,26 +342,26 @@ mod tests {
             let start = [0.0, 0.5, 1.0][k % 3] * limits[0];
             let turn = 3.0 * noise(4);
             let force = [start * turn.cos(), start * turn.sin()];
-            let way = match k % 11 {
+            let increment = match k % 11 {
                 0 => [0.0; 2],
                 1 => force.map(|f| 2.0 * f),
                 _ => [3.0 * noise(5), 3.0 * noise(6)],
             };
             let stiffness = 0.7;
-            let (found, slopes) = step_with_slopes(force, way, stiffness, limits);
+            let (found, slopes) = step_with_slopes(force, increment, stiffness, limits);
             let seeded = |x: f64, i: usize| -> Dual<6> { variable(x, i) };
             let dual = step(
                 [seeded(force[0], 0), seeded(force[1], 1)],
-                [seeded(way[0], 2), seeded(way[1], 3)],
+                [seeded(increment[0], 2), seeded(increment[1], 3)],
                 stiffness,
                 [seeded(limits[0], 4), seeded(limits[1], 5)],
             );
-            let value = step(force, way, stiffness, limits);
+            let value = step(force, increment, stiffness, limits);
             assert!((value[0] - found[0]).hypot(value[1] - found[1]) <= 1e-13, "{k}: {value:?} {found:?}");
             slid += usize::from(found[0].hypot(found[1]) > 0.999_999 * limits[1] && limits[1] > 0.0);
             for a in 0..2 {
                 assert!((dual[a].re - found[a]).abs() <= 1e-13, "{k}: {found:?}");
-                let by_hand = [slopes.by_force[a], slopes.by_way[a], slopes.by_limits[a]].concat();
+                let by_hand = [slopes.by_force[a], slopes.by_increment[a], slopes.by_limits[a]].concat();
                 let exact = partials(&dual[a]);
                 if exact.iter().any(|x| !x.is_finite()) {
                     continue; // the square root of zero has no derivative
@@ -373,10 +378,16 @@ mod tests {
     }
 
     /// Radial return in many small steps, a first-order method.
-    fn in_small_steps(mut force: [f64; 2], way: [f64; 2], stiffness: f64, limits: [f64; 2], steps: u32) -> [f64; 2] {
+    fn in_small_steps(
+        mut force: [f64; 2],
+        increment: [f64; 2],
+        stiffness: f64,
+        limits: [f64; 2],
+        steps: u32,
+    ) -> [f64; 2] {
         for k in 1..=steps {
             let limit = limits[0] + (limits[1] - limits[0]) * f64::from(k) / f64::from(steps);
-            force = beyond(force, stiffness / f64::from(steps), way);
+            force = axpy(force, stiffness / f64::from(steps), increment);
             let size = dot(force, force).sqrt();
             if size > limit {
                 force = [force[0] * limit / size, force[1] * limit / size];
@@ -393,10 +404,10 @@ mod tests {
             let limits = [[1.0, 1.0], [1.0, 0.4], [0.5, 1.3], [1.0, 0.0], [0.02, 1.0]][k as usize % 5];
             let start = [0.3, 1.0, 0.99][k as usize % 3] * limits[0];
             let force = [start * turn.cos(), start * turn.sin()];
-            let way = [0.2 + 0.05 * f64::from(k), 0.1];
-            let found = step(force, way, 0.9, limits);
+            let increment = [0.2 + 0.05 * f64::from(k), 0.1];
+            let found = step(force, increment, 0.9, limits);
             for (worst, steps) in worst.iter_mut().zip([2000, 8000]) {
-                let small = in_small_steps(force, way, 0.9, limits, steps);
+                let small = in_small_steps(force, increment, 0.9, limits, steps);
                 *worst = worst.max((found[0] - small[0]).hypot(found[1] - small[1]));
             }
         }
@@ -408,10 +419,11 @@ mod tests {
         for k in 0..40 {
             let turn = 1.3 * f64::from(k);
             let limits = [0.2 + 0.1 * f64::from(k % 7), 0.1 + 0.2 * f64::from(k % 5)];
-            let (force, way) = ([limits[0] * turn.cos(), limits[0] * turn.sin()], [0.4, -0.3]);
+            let (force, increment) = ([limits[0] * turn.cos(), limits[0] * turn.sin()], [0.4, -0.3]);
             let middle = 0.5 * (limits[0] + limits[1]);
             let half = step(force, [0.2, -0.15], 3.0, [limits[0], middle]);
-            let (twice, once) = (step(half, [0.2, -0.15], 3.0, [middle, limits[1]]), step(force, way, 3.0, limits));
+            let (twice, once) =
+                (step(half, [0.2, -0.15], 3.0, [middle, limits[1]]), step(force, increment, 3.0, limits));
             assert!((twice[0] - once[0]).hypot(twice[1] - once[1]) < 1e-13, "{k}: {twice:?} {once:?}");
         }
     }

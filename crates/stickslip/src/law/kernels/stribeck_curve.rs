@@ -5,13 +5,13 @@
 use stickslip_numerics::dual::Real;
 
 /// `Fc + (Fs - Fc) exp(-(v/vs)²)`, N.
-pub(in crate::law) fn falling<S: Real>(v: S, limit: f64, static_limit: f64, velocity: f64) -> S {
+pub(in crate::law) fn stribeck_force<S: Real>(v: S, limit: f64, static_limit: f64, velocity: f64) -> S {
     let share = v / velocity;
     (-(share * share)).exp() * (static_limit - limit) + limit
 }
 
 /// Checks that the static limit is not below the dynamic limit.
-pub(in crate::law) fn limits_fit(limit: f64, static_limit: f64) -> Result<(), String> {
+pub(in crate::law) fn check_limits(limit: f64, static_limit: f64) -> Result<(), String> {
     if static_limit >= limit {
         return Ok(());
     }

@@ -53,7 +53,7 @@ impl dyn Law + '_ {
                 format!("`state_scale` is {size}; the scale of the internal states must be finite and positive");
             return Err(LawError::Inconsistent { law: self.name(), message });
         }
-        if self.is_odd() && odd_symmetry::is_broken(self) {
+        if self.is_odd() && odd_symmetry::violates_odd_symmetry(self) {
             let message = "`is_odd` returns true, but a mirrored motion does not give the mirrored force; `is_odd` \
                            must return false";
             return Err(LawError::Inconsistent { law: self.name(), message: message.to_owned() });

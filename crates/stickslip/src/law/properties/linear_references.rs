@@ -1,24 +1,24 @@
 //! The linear references of a law: the joint without friction, and the stuck joint.
 
 use super::linear_springs::LinearSprings;
-use crate::law::interface::ideal_elements::STUCK;
+use crate::law::interface::ideal_elements::UNREACHABLE_LIMIT;
 use crate::law::interface::parameter::{LIMIT, STATIC_LIMIT};
 use crate::law::{Law, SharedLaw};
 
 /// Indices into the stiffnesses of [`Law::springs`].
 const FREE: usize = 0;
-const HELD: usize = 1;
+const STUCK: usize = 1;
 
 impl dyn Law + '_ {
     /// Returns the law with another slip limit (N), dynamic and static; `None` if it has no slip
     /// limit.
-    fn limited(&self, limit: f64) -> Option<SharedLaw> {
+    fn with_slip_limit(&self, limit: f64) -> Option<SharedLaw> {
         let law = self.with(LIMIT, limit)?;
         Some(law.with(STATIC_LIMIT, limit).unwrap_or(law))
     }
 
     /// Returns the joint as linear springs, if the law defines them. `which` is `FREE` or
-    /// `HELD`.
+    /// `STUCK`.
     fn as_springs(&self, which: usize) -> Option<SharedLaw> {
         self.springs().map(|springs| LinearSprings::shared(&springs[which]))
     }
@@ -28,7 +28,7 @@ impl dyn Law + '_ {
     pub fn free(&self) -> Option<SharedLaw> {
         match self.closed() {
             Some(along) => Some(LinearSprings::shared(&vec![0.0; along.len()])),
-            None => self.as_springs(FREE).or_else(|| self.limited(0.0)),
+            None => self.as_springs(FREE).or_else(|| self.with_slip_limit(0.0)),
         }
     }
 
@@ -38,7 +38,7 @@ impl dyn Law + '_ {
     pub fn stuck(&self) -> Option<SharedLaw> {
         match self.closed() {
             Some(along) => Some(LinearSprings::shared(&along)),
-            None => self.as_springs(HELD).or_else(|| self.limited(STUCK)),
+            None => self.as_springs(STUCK).or_else(|| self.with_slip_limit(UNREACHABLE_LIMIT)),
         }
     }
 }

@@ -5,7 +5,7 @@
 //! [`crate::law::Law::closed`].
 
 use crate::dimension::Dimension;
-use crate::law::interface::ideal_elements::STUCK;
+use crate::law::interface::ideal_elements::UNREACHABLE_LIMIT;
 use crate::law::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -64,7 +64,7 @@ impl Law for LinearSprings {
     fn pieces(&self) -> Option<Vec<Piece>> {
         match (self.directions, self.stiffness[0]) {
             (1, 0.0) => Some(Vec::new()),
-            (1, stiffness) => Some(vec![Piece::slider(Some(stiffness), STUCK)]),
+            (1, stiffness) => Some(vec![Piece::slider(Some(stiffness), UNREACHABLE_LIMIT)]),
             _ => None,
         }
     }
@@ -88,7 +88,7 @@ mod tests {
     use crate::law::{FrictionContact, Gap};
 
     #[test]
-    fn faces_that_stay_together_are_their_springs() {
+    fn references_of_contacts_are_linear_springs() {
         let contact = FrictionContact { tangential: 3.0, normal: 5.0, friction: 0.1, preload: 1.0, tangents: 1 };
         let law: &dyn Law = &contact;
         let (stuck, free) = (law.stuck().unwrap(), law.free().unwrap());

@@ -10,27 +10,31 @@ use crate::law::{Law, MOST_DIRECTIONS, Piece, Prox, Rate, Relative, Step};
 /// Magnitudes of the displacements, as powers of ten in metres.
 const DECADES: std::ops::RangeInclusive<i32> = -9..=0;
 /// Ratio of velocities to displacements, 1/s.
-const PACE: f64 = 1e3;
+const VELOCITY_RATIO: f64 = 1e3;
 /// Arguments of the resolvent, relative to the law's force scale.
 const FORCES: [f64; 4] = [0.3, 0.9, 1.5, 10.0];
 /// Difference relative to the largest force that is larger than rounding.
-const APART: f64 = 1e-9;
+const DIFFERENCE: f64 = 1e-9;
 /// One history in every direction, in relative units, with reversals and varying amplitude.
-const WAY: [[f64; MOST_DIRECTIONS]; 6] =
+const HISTORY: [[f64; MOST_DIRECTIONS]; 6] =
     [[0.3, 0.2, -0.1], [1.0, -0.4, 0.6], [0.4, -1.0, 1.0], [-0.2, -0.7, 0.3], [-0.9, 0.5, -0.8], [-0.1, 0.8, -0.3]];
 
 type ForceVector = [f64; MOST_DIRECTIONS];
 
 /// Tells whether any view of the law violates the symmetry.
-pub(in crate::law) fn is_broken(law: &dyn Law) -> bool {
+pub(in crate::law) fn violates_odd_symmetry(law: &dyn Law) -> bool {
     // Contacts and one-sided stops are not odd by construction.
     let one_sided = |pieces: Vec<Piece>| pieces.iter().any(|piece| matches!(piece, Piece::Stop { .. }));
     let directions = law.directions();
     law.normal().is_some()
         || law.pieces().is_some_and(one_sided)
-        || law.rate().is_some_and(|rate| DECADES.into_iter().any(|k| differ(|sign| by_rate(rate, sign * size(k)))))
-        || law.step().is_some_and(|step| DECADES.into_iter().any(|k| differ(|sign| by_step(step, sign * size(k)))))
-        || law.prox().is_some_and(|prox| differ(|sign| by_force(prox, directions, sign * newton(law))))
+        || law
+            .rate()
+            .is_some_and(|rate| DECADES.into_iter().any(|k| forces_differ(|sign| by_rate(rate, sign * size(k)))))
+        || law
+            .step()
+            .is_some_and(|step| DECADES.into_iter().any(|k| forces_differ(|sign| by_step(step, sign * size(k)))))
+        || law.prox().is_some_and(|prox| forces_differ(|sign| by_force(prox, directions, sign * force_scale(law))))
 }
 
 fn size(decade: i32) -> f64 {
@@ -38,49 +42,49 @@ fn size(decade: i32) -> f64 {
 }
 
 /// Returns the force scale of a law, N; 1 N if it is unbounded.
-fn newton(law: &dyn Law) -> f64 {
+fn force_scale(law: &dyn Law) -> f64 {
     Some(law.scale()).filter(|scale| scale.is_finite()).unwrap_or(1.0)
 }
 
 /// NaN counts as no difference; solvers stop at NaN.
-fn differ(forces: impl Fn(f64) -> Vec<ForceVector>) -> bool {
+fn forces_differ(forces: impl Fn(f64) -> Vec<ForceVector>) -> bool {
     let (there, back) = (forces(1.0), forces(-1.0));
     let all = || there.iter().flatten();
     let largest = all().fold(0.0f64, |most, force| most.max(force.abs()));
-    all().zip(back.iter().flatten()).any(|(a, b)| (a + b).abs() > APART * largest)
+    all().zip(back.iter().flatten()).any(|(a, b)| (a + b).abs() > DIFFERENCE * largest)
 }
 
 fn by_rate(rate: &dyn Rate, size: f64) -> Vec<ForceVector> {
     let (mut z, mut rates) = (vec![0.0; rate.states()], vec![0.0; rate.states()]);
     let mut before = [0.0; MOST_DIRECTIONS];
-    let along = |way: &ForceVector| {
-        let displacement = way.map(|u| u * size);
-        let velocity = std::array::from_fn(|a| PACE * (displacement[a] - before[a]));
+    let along = |point: &ForceVector| {
+        let displacement = point.map(|u| u * size);
+        let velocity = std::array::from_fn(|a| VELOCITY_RATIO * (displacement[a] - before[a]));
         before = displacement;
         let force = rate.value(&Relative { displacement, velocity }, &z, &mut rates);
-        z.iter_mut().zip(&rates).for_each(|(z, rate)| *z += rate / PACE);
+        z.iter_mut().zip(&rates).for_each(|(z, rate)| *z += rate / VELOCITY_RATIO);
         force
     };
-    WAY.iter().map(along).collect()
+    HISTORY.iter().map(along).collect()
 }
 
 fn by_step(step: &dyn Step, size: f64) -> Vec<ForceVector> {
     let mut z = vec![0.0; step.states()];
     let mut before = [0.0; MOST_DIRECTIONS];
-    let along = |way: &ForceVector| {
-        let to = way.map(|u| u * size);
+    let along = |point: &ForceVector| {
+        let to = point.map(|u| u * size);
         let force = step.value(&before, &to, &mut z);
         before = to;
         force
     };
-    WAY.iter().map(along).collect()
+    HISTORY.iter().map(along).collect()
 }
 
 fn by_force(prox: &dyn Prox, directions: usize, size: f64) -> Vec<ForceVector> {
     let penalty = 2.0 * prox.least_penalty().max(0.5);
-    let asked = FORCES.iter().zip(&WAY).map(|(share, way)| {
+    let asked = FORCES.iter().zip(&HISTORY).map(|(share, point)| {
         let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
-        let y = way.map(|part| share * part * size);
+        let y = point.map(|part| share * part * size);
         prox.resolve(&y[..directions], penalty, &mut force[..directions], &mut slope[..directions * directions]);
         force
     });
@@ -94,10 +98,10 @@ mod tests {
 
     /// The test finds exactly the laws that declare themselves not odd.
     #[test]
-    fn laws_are_odd_or_say_that_they_are_not() {
+    fn declared_symmetry_is_correct() {
         for row in TABLE {
             let law = row.sample();
-            assert_eq!(is_broken(&*law), !law.is_odd(), "{}", row.name);
+            assert_eq!(violates_odd_symmetry(&*law), !law.is_odd(), "{}", row.name);
         }
     }
 }

@@ -12,7 +12,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 impl dyn Law + '_ {
     /// Returns the factor between the forces of this law and those of `other`, equal in every
     /// motion. `None` if the laws are not proportional.
-    pub(crate) fn times(&self, other: &dyn Law) -> Option<f64> {
+    pub(crate) fn force_ratio(&self, other: &dyn Law) -> Option<f64> {
         if !std::ptr::eq(self.info(), other.info()) {
             return None;
         }
@@ -43,11 +43,11 @@ mod tests {
     use crate::law::{Coulomb2d, CoulombArctan, JenkinsArctan, Law, Stribeck, TABLE};
 
     fn times(one: &dyn Law, other: &dyn Law) -> Option<f64> {
-        one.times(other)
+        one.force_ratio(other)
     }
 
     #[test]
-    fn what_has_force_in_it_goes_along() {
+    fn force_parameters_scale_together() {
         let near =
             |found: Option<f64>, expected: f64| assert!((found.unwrap() / expected - 1.0).abs() < 1e-15, "{found:?}");
         near(times(&Coulomb2d { limit: 1e-9 }, &Coulomb2d { limit: 3.0 }), 1e-9 / 3.0);
@@ -66,7 +66,7 @@ mod tests {
 
     /// Each law has the factor 1 to itself.
     #[test]
-    fn every_law_is_itself() {
+    fn every_law_has_ratio_one_to_itself() {
         for row in TABLE {
             assert_eq!(times(&*row.sample(), &*row.sample()), Some(1.0), "{}", row.name);
         }

@@ -192,7 +192,7 @@ impl Gathered {
 
     fn push_rigid(&mut self, slider: Slider) {
         let (share, limits) = (self.shares.len(), (slider.limit, slider.static_limit));
-        let found = self.groups.iter().enumerate().find_map(|(i, group)| Some((i, slider.line.along(&group.line)?)));
+        let found = self.groups.iter().enumerate().find_map(|(i, group)| Some((i, slider.line.ratio_to(&group.line)?)));
         let (group, factor) = found.unwrap_or((self.groups.len(), 1.0));
         if let Some(group) = self.groups.get(group) {
             self.shares.push(Share::whole(slider.joint, group.part));

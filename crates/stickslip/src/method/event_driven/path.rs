@@ -8,8 +8,8 @@ use crate::method::Breakdown;
 use crate::method::periodic::{Closed, norm};
 use crate::method::vibration;
 use crate::model::{Axis, System};
-use crate::orbit::postprocess::{ContactFractions, ContactSummary, NO_WORK, PathSignals, measure};
-use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
+use crate::orbit::postprocess::{CONSERVATIVE_WORK, ContactFractions, ContactSummary, PathSignals, results};
+use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -56,7 +56,7 @@ pub(super) fn orbit(
 ) -> Result<Orbit, Breakdown> {
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
-    let measured = measure(system, &Measuring::new(&path), omega, (symmetry, period))?;
+    let measured = results(system, &Measuring::new(&path), omega, (symmetry, period))?;
     let rest = NEAR_REST * flow.energy_scale;
     let share = vibration::share(&path, (symmetry, period), &closed.state, (weights, rest));
     let stored = share * norm(weights, &closed.state).powi(2);
@@ -68,14 +68,14 @@ pub(super) fn orbit(
         start: closed.state,
         evidence: Evidence {
             residual: closed.residual,
-            energy_gap: measured.energy_gap(f64::max(NO_WORK * rest * rest, STORED * stored)),
+            energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, STORED * stored)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             harmonics: None,
             truncation: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
-            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+            history: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
             found_by: NAME,
@@ -354,7 +354,7 @@ impl PathSignals for Measuring<'_> {
         sum
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Breakdown> {
-        self.range_of(&self.seen(place))
+        self.range_of(&self.place_displacement(place))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
         self.range_of(&self.relative(axis))
@@ -381,7 +381,7 @@ impl PathSignals for Measuring<'_> {
             return ContactSummary {
                 shares: ContactFractions { slip: 1.0, ..ContactFractions::default() },
                 switches: 0,
-                rests: false,
+                sticks_throughout: false,
             };
         }
         let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
@@ -394,8 +394,8 @@ impl PathSignals for Measuring<'_> {
             let (first, last) = (&first.segment.contacts, &last.segment.contacts);
             switches += parts().filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
-        let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
-        ContactSummary { shares, switches, rests }
+        let sticks_throughout = !path.pieces.iter().any(|piece| slips(&piece.segment));
+        ContactSummary { shares, switches, sticks_throughout }
     }
 }
 

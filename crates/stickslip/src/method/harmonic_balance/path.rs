@@ -6,8 +6,10 @@ use super::rest::Rest;
 use crate::law::{Contact, MOST_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, measure, sticks};
-use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results, sticks};
+use crate::orbit::{
+    Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws,
+};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -151,7 +153,7 @@ pub(super) fn orbit(
         halves: if odd { 2 } else { 1 },
         level: RefCell::new(level),
     };
-    let Ok(mut measured) = measure(system, &measuring, omega, (symmetry, period));
+    let Ok(mut measured) = results(system, &measuring, omega, (symmetry, period));
     for (place, axis) in measured.places.iter_mut().zip(system.seen()) {
         place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| axis.along_complex(&x[k]));
     }
@@ -191,7 +193,7 @@ pub(super) fn orbit(
                 Some(_) => Accuracy::Truncated,
                 None => Accuracy::Unchecked,
             },
-            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+            history: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
             found_by: motion.found_by.name(),
@@ -348,7 +350,7 @@ impl PathSignals for Measuring<'_> {
         self.x.iter().map(|x| x[row]).collect()
     }
     // with modal coordinates, there is one row for each mode
-    fn seen(&self, place: &Axis) -> Vec<Complex64> {
+    fn place_displacement(&self, place: &Axis) -> Vec<Complex64> {
         self.x.iter().map(|x| place.along_complex(x)).collect()
     }
     fn velocity(&self, row: usize) -> Vec<Complex64> {
@@ -391,7 +393,7 @@ impl PathSignals for Measuring<'_> {
         self.harmonic(omega).map_or(ZERO, |k| signal[k] * (share * self.length()))
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(&self.seen(place)))
+        Ok(self.range_of(&self.place_displacement(place)))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))
@@ -403,7 +405,7 @@ impl PathSignals for Measuring<'_> {
         ContactSummary {
             shares: ContactFractions::of(runs.into_iter()),
             switches: changes / self.halves,
-            rests: sticks(contact.iter().copied()),
+            sticks_throughout: sticks(contact.iter().copied()),
         }
     }
 }

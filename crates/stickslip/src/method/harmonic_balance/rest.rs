@@ -505,7 +505,8 @@ impl Rest {
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        let factor = self.structure.held_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
+        let factor =
+            self.structure.shifted_dynamic_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
         let bytes = |factor: &Result<Arc<DynamicStiffness>, Resonant>| factor.as_ref().map_or(0, |f| f.bytes());
         while !factors.is_empty()
             && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > KEPT

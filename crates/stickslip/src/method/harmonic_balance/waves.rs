@@ -3,7 +3,7 @@
 use super::hold::soft_spring;
 use super::uncoupled::Resonant;
 use crate::model::Cyclic;
-use crate::structure::{DynamicStiffness, Sector, Structure, Wave, WaveStiffness, turn};
+use crate::structure::{DynamicStiffness, Sector, Structure, Wave, WaveStiffness, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -74,7 +74,7 @@ impl Waves {
 
     /// Returns the phase of a sector in a wave.
     fn phase(&self, diameter: usize, sector: usize) -> Complex64 {
-        turn((diameter * sector) as i64, self.cyclic.sectors)
+        unit_root((diameter * sector) as i64, self.cyclic.sectors)
     }
 
     /// Returns the receptance of the axes in a wave, q × q.

@@ -89,7 +89,7 @@ const PER_PIECE: f64 = 7e5;
 pub fn orbit_work(system: &System) -> f64 {
     let pieces = system.joints().iter().flat_map(|joint| joint.law().pieces().unwrap_or_default());
     let (mut count, mut rigid) = (0.0, false);
-    for piece in pieces.filter(|piece| !piece.is_nothing()) {
+    for piece in pieces.filter(|piece| !piece.carries_no_force()) {
         count += 1.0;
         rigid |= matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
     }

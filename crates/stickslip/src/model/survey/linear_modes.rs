@@ -26,17 +26,17 @@ pub(super) struct LinearStructure {
     pub(super) shapes: Option<DMatrix<f64>>,
     /// True if the damping has a gyroscopic part. Modes are then those of free vibration;
     /// shapes are those without that part.
-    pub(super) turning: bool,
+    pub(super) gyroscopic: bool,
 }
 
 /// Relative eigenvalue below which fewer than six digits are significant. For modes below it,
 /// the stiffest springs count as rigid. Symmetric QR has errors of about 1e-15 of the largest
 /// eigenvalue.
-const FEW_DIGITS: f64 = 1e-9;
+const RESOLVED_EIGENVALUE: f64 = 1e-9;
 /// Relative eigenvalue below which the value is rounding.
 const ROUNDING: f64 = 1e-13;
 /// Springs above this fraction of the stiffest spring determine the highest modes.
-const STIFFEST: f64 = 1e-4;
+const STIFF_LEVEL: f64 = 1e-4;
 /// For matrix structures: eigenvalues below this fraction of the median are free motions. This
 /// suits matrices with ten digits.
 const FREE: f64 = 1e-10;
@@ -46,7 +46,7 @@ const LEVELS: usize = 4;
 const ZERO: f64 = 1e-12;
 /// Largest number of degrees of freedom for which modes are computed; more would take longer
 /// than a second. Measured: 0.35 s at 500, growing with the third power.
-pub(super) const LARGEST: usize = 700;
+pub(super) const MAX_DOFS: usize = 700;
 
 /// A structure in its undamped modes, `q'' + D q' + Λ q`.
 struct ModalStructure {
@@ -96,12 +96,12 @@ impl ModalStructure {
     fn linear(self) -> LinearStructure {
         let elastic = (self.free..self.squares.len()).map(|k| self.mode(k)).collect();
         let modes = Modes { elastic, rigid: self.free, lost: 0 };
-        LinearStructure { modes, shapes: Some(self.elastic_shapes()), turning: false }
+        LinearStructure { modes, shapes: Some(self.elastic_shapes()), gyroscopic: false }
     }
 
     /// Returns the modes of free vibration if the damping has a gyroscopic part, otherwise
     /// `None`. Only the 200 lowest modes include that part.
-    fn turning(&self) -> Option<Vec<LinearMode>> {
+    fn gyroscopic_modes(&self) -> Option<Vec<LinearMode>> {
         let n = self.squares.len().min(200);
         let found = free_vibrations(&self.squares[..n], &self.damping.view((0, 0), (n, n)).into_owned())?;
         let found = found.into_iter().map(|one| LinearMode { omega: one.omega, damping: one.damping });
@@ -116,10 +116,10 @@ impl LinearStructure {
     /// With a gyroscopic matrix, they are the modes of free vibration.
     pub(super) fn of_matrices(full: &Matrices, links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> LinearStructure {
         let Some(modal) = ModalStructure::new(full, links, rigid) else { return LinearStructure::unknown(full) };
-        match modal.turning() {
+        match modal.gyroscopic_modes() {
             Some(elastic) => {
                 let modes = Modes { elastic, rigid: modal.free, lost: 0 };
-                LinearStructure { modes, shapes: Some(modal.elastic_shapes()), turning: true }
+                LinearStructure { modes, shapes: Some(modal.elastic_shapes()), gyroscopic: true }
             }
             None => modal.linear(),
         }
@@ -132,7 +132,11 @@ impl LinearStructure {
     }
 
     fn unknown(full: &Matrices) -> LinearStructure {
-        LinearStructure { modes: Modes { lost: full.mass.nrows(), ..Modes::default() }, shapes: None, turning: false }
+        LinearStructure {
+            modes: Modes { lost: full.mass.nrows(), ..Modes::default() },
+            shapes: None,
+            gyroscopic: false,
+        }
     }
 
     /// Returns the modes of masses with springs and constraints `Σ w x = 0`. A place without
@@ -146,7 +150,7 @@ impl LinearStructure {
             let shapes = total.shapes(expected);
             let lowest = elastic.len() - expected; // rounding can give a rigid motion a frequency
             let modes = Modes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, lost: 0 };
-            return LinearStructure { modes, shapes: Some(shapes), turning: false };
+            return LinearStructure { modes, shapes: Some(shapes), gyroscopic: false };
         }
         // some modes are too far below the stiffest springs; those springs count as rigid for
         // these modes
@@ -155,7 +159,7 @@ impl LinearStructure {
         for _ in 0..LEVELS {
             let stiffest = links.iter().map(|link| link.stiffness).fold(0.0, f64::max);
             let (above, below): (Vec<&SpringDamper>, Vec<&SpringDamper>) =
-                links.iter().partition(|link| link.stiffness > STIFFEST * stiffest);
+                links.iter().partition(|link| link.stiffness > STIFF_LEVEL * stiffest);
             if below.is_empty() {
                 break;
             }
@@ -182,7 +186,7 @@ impl LinearStructure {
             }
         }
         let lost = expected - high.len();
-        LinearStructure { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None, turning: false }
+        LinearStructure { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None, gyroscopic: false }
     }
 }
 
@@ -203,7 +207,7 @@ impl CondensedModes {
     }
 
     fn elastic(&self) -> Vec<LinearMode> {
-        self.above(FEW_DIGITS)
+        self.above(RESOLVED_EIGENVALUE)
     }
 
     fn shapes(&self, count: usize) -> DMatrix<f64> {
@@ -219,14 +223,14 @@ fn rigid_motions(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]
     let mut groups = DisjointSets::new(n + 1); // place n is the ground
     for at in &held {
         match at {
-            [(a, _)] => groups.join((*a, n)),
-            [(a, p), (b, q)] if a != b && p + q == 0.0 => groups.join((*a, *b)),
+            [(a, _)] => groups.union((*a, n)),
+            [(a, p), (b, q)] if a != b && p + q == 0.0 => groups.union((*a, *b)),
             // along an oblique direction or in a wave, the rank of all directions decides
-            _ => return unresisted(mass, &held),
+            _ => return unrestrained_dimension(mass, &held),
         }
     }
-    let ground = groups.of(n);
-    let mut bodies: Vec<usize> = (0..n).filter(|i| mass[*i] > 0.0).map(|i| groups.of(i)).collect();
+    let ground = groups.find(n);
+    let mut bodies: Vec<usize> = (0..n).filter(|i| mass[*i] > 0.0).map(|i| groups.find(i)).collect();
     bodies.sort_unstable();
     bodies.dedup();
     bodies.into_iter().filter(|body| *body != ground).count()
@@ -234,7 +238,7 @@ fn rigid_motions(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]
 
 /// Returns this number for arbitrary directions: the dimension that they leave free, minus that
 /// of the places without mass alone.
-fn unresisted(mass: &[f64], held: &[&[(usize, f64)]]) -> usize {
+fn unrestrained_dimension(mass: &[f64], held: &[&[(usize, f64)]]) -> usize {
     let (light, heavy): (Vec<usize>, Vec<usize>) = (0..mass.len()).partition(|i| mass[*i] == 0.0);
     let all = [light.as_slice(), &heavy].concat();
     ConstraintBasis::new(mass.len(), &all, held).kept.len() - ConstraintBasis::new(mass.len(), &light, held).kept.len()
@@ -424,7 +428,7 @@ mod tests {
     fn constraints_remove_places_without_mass_first() {
         // place 1 has no mass; the constraint 0 = 1 occurs twice
         let at = [(0, 1.0), (1, -1.0)];
-        let basis = Basis::new(3, &[1, 0, 2], &[&at, &at]);
+        let basis = ConstraintBasis::new(3, &[1, 0, 2], &[&at, &at]);
         assert_eq!(basis.kept, [0, 2]);
         assert_eq!(basis.rows, [vec![(0, 1.0)], vec![(0, 1.0)], vec![(1, 1.0)]]);
         assert!(basis.along(&at).is_empty());
@@ -433,10 +437,11 @@ mod tests {
     /// A mass in a plane: one inclined spring leaves one motion, two springs leave none unless
     /// they are parallel. A place without mass adds no motion.
     #[test]
-    fn inclined_springs_resist_what_they_span() {
-        let link = |at: &[(usize, f64)]| Link { at: at.to_vec(), stiffness: 1.0, damping: 0.0 };
+    fn inclined_springs_restrain_their_span() {
+        let link = |at: &[(usize, f64)]| SpringDamper { at: at.to_vec(), stiffness: 1.0, damping: 0.0 };
         let along = |angle: f64| link(&[(0, angle.cos()), (1, angle.sin())]);
-        let motions = |mass: &[f64], links: &[Link]| rigid_motions(mass, &links.iter().collect::<Vec<_>>(), &[]);
+        let motions =
+            |mass: &[f64], links: &[SpringDamper]| rigid_motions(mass, &links.iter().collect::<Vec<_>>(), &[]);
         assert_eq!(motions(&[1.0, 1.0], &[along(0.6)]), 1);
         assert_eq!(motions(&[1.0, 1.0], &[along(0.6), along(2.0)]), 0);
         assert_eq!(motions(&[1.0, 1.0], &[along(0.6), along(0.6)]), 1);
@@ -445,7 +450,7 @@ mod tests {
         assert_eq!(motions(&[1.0, 1.0, 1.0], &chained), 1);
         assert_eq!(motions(&[1.0, 1.0, 0.0], &chained[..1]), 1);
         assert_eq!(motions(&[1.0, 1.0, 1.0], &chained[..1]), 2);
-        let elastic = Linear::new(&[1.0, 1.0], &[&along(0.6), &along(2.0)], &[]).modes;
+        let elastic = LinearStructure::new(&[1.0, 1.0], &[&along(0.6), &along(2.0)], &[]).modes;
         // two unit springs at an angle of 1.4: 1 ± cos 1.4
         let squares: Vec<f64> = elastic.elastic.iter().map(|mode| mode.omega * mode.omega).collect();
         assert!((squares[0] - 1.0 + 1.4f64.cos()).abs() < 1e-12 && (squares[1] - 1.0 - 1.4f64.cos()).abs() < 1e-12);

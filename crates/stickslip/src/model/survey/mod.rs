@@ -21,7 +21,7 @@ pub use wave_modes::WaveModes;
 
 use super::{Model, ModelError, System, SystemJoint};
 use crate::law::{MOST_DIRECTIONS, SharedLaw};
-use linear_modes::{LARGEST, LinearStructure, SpringDamper};
+use linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
 use std::collections::HashMap;
 use stuck_joint::{StuckAxis, StuckState};
 
@@ -94,7 +94,7 @@ impl Model {
         forces: &dyn Fn(&System) -> Option<Vec<[f64; MOST_DIRECTIONS]>>,
     ) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
-        let forces = if system.dofs() > LARGEST { None } else { forces(&system) };
+        let forces = if system.dofs() > MAX_DOFS { None } else { forces(&system) };
         // contact force and law of joints without preload that the constant loads press
         // together
         let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {
@@ -107,17 +107,17 @@ impl Model {
         };
         let joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
         let loose = self.loose(&system, &joints);
-        let mut at_rest = preload::carried(&system, &joints);
+        let mut at_rest = preload::equilibrium_forces(&system, &joints);
         for (stuck, carried) in joints.iter().zip(&mut at_rest).filter(|(stuck, _)| stuck.pressed.is_some()) {
             if let Some((force, _)) = pressed(stuck.joint, &system.joints()[stuck.joint]) {
                 *carried = Some(force);
             }
         }
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
-        if system.dofs() > LARGEST {
+        if system.dofs() > MAX_DOFS {
             let lost = system.dofs();
             let unknown =
-                || LinearStructure { modes: Modes { lost, ..Modes::default() }, shapes: None, turning: false };
+                || LinearStructure { modes: Modes { lost, ..Modes::default() }, shapes: None, gyroscopic: false };
             let (free, stuck) = (unknown(), unknown());
             return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
         }
@@ -127,12 +127,12 @@ impl Model {
             .map(|joint| SpringDamper { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
             .collect();
         let moving = || joints.iter().filter(|joint| !joint.at.is_empty());
-        let held: Vec<SpringDamper> = moving().filter_map(StuckAxis::held).collect();
-        let dampers: Vec<SpringDamper> = moving().filter_map(StuckAxis::free).collect();
+        let held: Vec<SpringDamper> = moving().filter_map(StuckAxis::stuck_link).collect();
+        let dampers: Vec<SpringDamper> = moving().filter_map(StuckAxis::free_link).collect();
         let dampers: Vec<&SpringDamper> = dampers.iter().collect();
         let rigid: Vec<&[(usize, f64)]> = joints
             .iter()
-            .filter(|joint| matches!(joint.hold, StuckState::Rigid { .. }) && !joint.at.is_empty())
+            .filter(|joint| matches!(joint.state, StuckState::Rigid { .. }) && !joint.at.is_empty())
             .map(|joint| joint.at.as_slice())
             .collect();
         if self.substructure.is_some() || self.moves_bodies() {
@@ -190,7 +190,7 @@ impl Survey {
     /// Returns whether the model has too many degrees of freedom for its modes. All modes then
     /// count as lost.
     pub fn is_too_large(&self) -> bool {
-        self.dofs() > LARGEST
+        self.dofs() > MAX_DOFS
     }
 
     /// Returns the modes with all joints free.
@@ -217,9 +217,9 @@ impl Survey {
 
     /// Returns the onset of slip of each joint, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
-        let rigid = self.joints.iter().any(|joint| matches!(joint.hold, StuckState::Rigid { .. }));
+        let rigid = self.joints.iter().any(|joint| matches!(joint.state, StuckState::Rigid { .. }));
         let one = |(joint, carried): (&StuckAxis, &Option<f64>)| {
-            let (limit, displacement) = match joint.hold {
+            let (limit, displacement) = match joint.state {
                 StuckState::Nothing => (0.0, None),
                 StuckState::Spring { limit, displacement, .. } => (limit, Some(displacement)),
                 StuckState::Rigid { limit } => (limit, None),

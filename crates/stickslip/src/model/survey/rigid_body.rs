@@ -30,7 +30,7 @@ impl Model {
         }
         let mut bodies = DisjointSets::new(component + 1);
         for body in self.bodies.iter().map(Body::places) {
-            body.windows(2).for_each(|pair| bodies.join((index[&pair[0]], index[&pair[1]])));
+            body.windows(2).for_each(|pair| bodies.union((index[&pair[0]], index[&pair[1]])));
         }
         for place in &self.places {
             // a second view of a node belongs to the body of the node
@@ -38,15 +38,20 @@ impl Model {
             let body = || self.bodies.iter().find(|body| place.of.as_ref() == Some(&body.name)).map(Body::places);
             let node = mass.or_else(body);
             let node: Vec<usize> = node.unwrap_or_default().iter().map(|name| index[name]).collect();
-            node.windows(2).for_each(|pair| bodies.join((pair[0], pair[1])));
+            node.windows(2).for_each(|pair| bodies.union((pair[0], pair[1])));
             if let Some(first) = node.first() {
                 index.extend(place.places().into_iter().map(|name| (name, *first)));
             }
         }
         let ends = |between: &[String; 2]| Some((*index.get(&between[0])?, *index.get(&between[1])?));
-        self.springs.iter().filter(|s| s.stiffness > 0.0).filter_map(|s| ends(&s.between)).for_each(|e| bodies.join(e));
+        self.springs
+            .iter()
+            .filter(|s| s.stiffness > 0.0)
+            .filter_map(|s| ends(&s.between))
+            .for_each(|e| bodies.union(e));
         let (mut gripped, mut held) = (bodies.clone(), bodies.clone());
-        let carry: BTreeSet<usize> = joints.iter().filter(|j| j.hold != StuckState::Nothing).map(|j| j.joint).collect();
+        let carry: BTreeSet<usize> =
+            joints.iter().filter(|j| j.state != StuckState::Nothing).map(|j| j.joint).collect();
         let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
         // joints with faces at each body: with contact force (touched) and without
         let (mut touched, mut beside) = (Vec::<(usize, &str)>::new(), Vec::<(usize, &str)>::new());
@@ -61,10 +66,10 @@ impl Model {
                 let Some(e) = ends(&between) else { continue };
                 let carries = carry.contains(&number);
                 if carries {
-                    gripped.join(e);
+                    gripped.union(e);
                 }
                 if carries || joint.law.scale().is_infinite() && joint.law.closed().is_none() {
-                    held.join(e);
+                    held.union(e);
                 }
                 if faces.contains(&number) {
                     let found = if carries { &mut touched } else { &mut beside };
@@ -76,19 +81,19 @@ impl Model {
         let mut known: HashMap<usize, usize> = HashMap::new();
         for place in &places {
             let at = index[place];
-            let body = bodies.of(at);
-            if body == bodies.of(0) {
+            let body = bodies.find(at);
+            if body == bodies.find(0) {
                 continue;
             }
             match known.get(&body) {
                 Some(one) => loose[*one].masses.push(place.clone()),
                 None => {
-                    let held_by_friction = gripped.of(at) == gripped.of(0);
-                    let held_in_motion = !held_by_friction && held.of(at) == held.of(0);
+                    let held_by_friction = gripped.find(at) == gripped.find(0);
+                    let held_in_motion = !held_by_friction && held.find(at) == held.find(0);
                     known.insert(body, loose.len());
                     let of_body = |found: &[(usize, &str)]| {
                         let mut names: Vec<String> = Vec::new();
-                        for (_, name) in found.iter().filter(|(end, _)| bodies.of(*end) == body) {
+                        for (_, name) in found.iter().filter(|(end, _)| bodies.find(*end) == body) {
                             if names.last().is_none_or(|last| last != name) {
                                 names.push((*name).to_owned());
                             }
@@ -122,15 +127,15 @@ impl DisjointSets {
     }
 
     /// Returns the lowest member of the group of `i`.
-    pub(super) fn of(&self, mut i: usize) -> usize {
+    pub(super) fn find(&self, mut i: usize) -> usize {
         while self.parent[i] != i {
             i = self.parent[i];
         }
         i
     }
 
-    pub(super) fn join(&mut self, (a, b): (usize, usize)) {
-        let (a, b) = (self.of(a), self.of(b));
+    pub(super) fn union(&mut self, (a, b): (usize, usize)) {
+        let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b)] = a.min(b);
     }
 }

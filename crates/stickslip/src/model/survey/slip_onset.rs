@@ -13,9 +13,9 @@ const WORK: f64 = 2.5e7;
 /// Number of frequencies sampled in a range, in addition to those around its modes.
 const FREQUENCIES: usize = 200;
 /// Smallest number of frequencies; fewer would miss maxima between modes.
-const FEWEST: usize = 24;
+const MIN_FREQUENCIES: usize = 24;
 /// Sample points around a mode, in units of its damping ratio times its frequency.
-const AROUND: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+const MODE_OFFSETS: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 /// Instants per period of the highest harmonic, if there are several harmonics. The largest
 /// value has a relative error of (π/64)²/2, about 0.1 %.
 const INSTANTS: usize = 64;
@@ -26,14 +26,14 @@ const MOST_INSTANTS: usize = 4096;
 const HALVINGS: usize = 40;
 /// Tolerance for the frequency of the largest load, relative to two steps. The load is flat
 /// there.
-const LOCATED: f64 = 1e-5;
+const PEAK_TOLERANCE: f64 = 1e-5;
 /// Compliance of a rigid joint, relative to that of the structure. It distributes the load over
 /// redundant joints.
 const COMPLIANCE: f64 = 1e-10;
 /// Lower bound of the factor on that compliance for joints with larger limits. A joint with a
 /// larger limit carries a larger part of a shared load. Joints along one line carry the load in
 /// proportion to their limits and slip together.
-const STIFFEST: f64 = 1e-3;
+const MIN_COMPLIANCE_FACTOR: f64 = 1e-3;
 /// Relative distance of frequencies up to which two modes form a pair.
 const EQUAL: f64 = 1e-9;
 
@@ -60,7 +60,7 @@ impl Survey {
         if self.joints.is_empty() {
             return Some(Vec::new());
         }
-        let shares: Vec<Vec<f64>> = omegas.iter().map(|omega| self.shares(*omega)).collect::<Option<_>>()?;
+        let shares: Vec<Vec<f64>> = omegas.iter().map(|omega| self.relative_loads(*omega)).collect::<Option<_>>()?;
         if shares.iter().flatten().any(|share| share.is_nan()) {
             return None;
         }
@@ -102,7 +102,7 @@ impl Survey {
         let members = if equal.len() == 2 { equal } else { vec![index] };
         let mut squares = vec![0.0; self.joints.len()];
         for &member in &members {
-            for (square, share) in squares.iter_mut().zip(self.mode_shares(member)?) {
+            for (square, share) in squares.iter_mut().zip(self.relative_modal_loads(member)?) {
                 *square += share * share / members.len() as f64;
             }
         }
@@ -112,9 +112,9 @@ impl Survey {
 
     /// Returns the loads of all joints in mode `index` at a modal amplitude of one, relative to
     /// their stick limits.
-    fn mode_shares(&self, index: usize) -> Option<Vec<f64>> {
+    fn relative_modal_loads(&self, index: usize) -> Option<Vec<f64>> {
         // with gyroscopic damping, the shapes of free vibration differ from these
-        let shapes = self.stuck.shapes.as_ref().filter(|_| !self.stuck.turning)?;
+        let shapes = self.stuck.shapes.as_ref().filter(|_| !self.stuck.gyroscopic)?;
         let omega = self.stuck.modes.elastic.get(index)?.omega;
         let shape = shapes.column(index).into_owned();
         let motion = |joint: &StuckAxis| joint.at.iter().map(|(i, w)| w * shape[*i]).sum::<f64>();
@@ -123,7 +123,7 @@ impl Survey {
         let mut rest =
             self.system.structure().mass() * &shape * (omega * omega) - self.system.structure().stiffness() * &shape;
         for joint in &self.joints {
-            if let StuckState::Spring { stiffness, .. } = joint.hold {
+            if let StuckState::Spring { stiffness, .. } = joint.state {
                 let force = stiffness * motion(joint);
                 joint.at.iter().for_each(|(i, w)| rest[*i] -= w * force);
             }
@@ -134,7 +134,7 @@ impl Survey {
         }
         let normal = w.transpose() * &w + DMatrix::from_diagonal(&DVector::from_vec(self.compliances(&rigid)));
         let forces = Cholesky::new(normal)?.solve(&(w.transpose() * rest));
-        let share = |(index, joint): (usize, &StuckAxis)| match joint.hold {
+        let share = |(index, joint): (usize, &StuckAxis)| match joint.state {
             StuckState::Nothing => 0.0,
             // any motion causes partial slip
             StuckState::Spring { .. } if joint.gradual => {
@@ -154,16 +154,16 @@ impl Survey {
 
     /// Returns the compliances of rigid joints, relative to that of the structure.
     fn compliances(&self, rigid: &[usize]) -> Vec<f64> {
-        let limit = |joint: &usize| match self.joints[*joint].hold {
+        let limit = |joint: &usize| match self.joints[*joint].state {
             StuckState::Rigid { limit } => limit,
             StuckState::Nothing | StuckState::Spring { .. } => f64::INFINITY,
         };
         let least = rigid.iter().map(limit).fold(f64::INFINITY, f64::min);
-        rigid.iter().map(|joint| COMPLIANCE * (least / limit(joint)).max(STIFFEST)).collect()
+        rigid.iter().map(|joint| COMPLIANCE * (least / limit(joint)).max(MIN_COMPLIANCE_FACTOR)).collect()
     }
 
     fn rigid(&self) -> Vec<usize> {
-        let rigid = |joint: &StuckAxis| matches!(joint.hold, StuckState::Rigid { .. }) && !joint.at.is_empty();
+        let rigid = |joint: &StuckAxis| matches!(joint.state, StuckState::Rigid { .. }) && !joint.at.is_empty();
         (0..self.joints.len()).filter(|j| rigid(&self.joints[*j])).collect()
     }
 
@@ -183,7 +183,7 @@ impl Survey {
             return (affordable > 0).then(|| vec![from]);
         }
         let count = FREQUENCIES.min(affordable / 2);
-        if count < FEWEST {
+        if count < MIN_FREQUENCIES {
             return None;
         }
         let mut omegas: Vec<f64> =
@@ -192,7 +192,7 @@ impl Survey {
         for mode in &self.stuck.modes.elastic {
             let width = mode.damping.clamp(1e-6, 0.1) * mode.omega;
             for h in &harmonics {
-                let points = AROUND.iter().flat_map(|a| [mode.omega - a * width, mode.omega + a * width]);
+                let points = MODE_OFFSETS.iter().flat_map(|a| [mode.omega - a * width, mode.omega + a * width]);
                 around.extend(points.map(|w| w / f64::from(*h)).filter(|w| (from..=to).contains(w)));
             }
         }
@@ -215,7 +215,7 @@ impl Survey {
 
     /// Returns the largest load over limit of every joint in one period at the excitation
     /// frequency `omega`, all joints stuck.
-    fn shares(&self, omega: f64) -> Option<Vec<f64>> {
+    fn relative_loads(&self, omega: f64) -> Option<Vec<f64>> {
         let harmonics = self.harmonics();
         let loads = harmonics.iter().map(|h| self.joint_loads(*h, omega)).collect::<Option<Vec<_>>>()?;
         let largest = |joint: usize| match &loads[..] {
@@ -258,7 +258,7 @@ impl Survey {
             system.joints()[joint].axes()[axis].imposed_at(h)
         };
         for (index, joint) in self.joints.iter().enumerate() {
-            if let Some(SpringDamper { stiffness, damping, .. }) = joint.held() {
+            if let Some(SpringDamper { stiffness, damping, .. }) = joint.stuck_link() {
                 let stiffness = Complex64::new(stiffness, w * damping);
                 for (i, wi) in &joint.at {
                     b[*i] -= imposed(index) * (stiffness * *wi);
@@ -278,7 +278,7 @@ impl Survey {
             b[n + row] = -imposed(*joint);
         }
         let x = if n + rigid.len() == 0 { b } else { a.lu().solve(&b)? };
-        let share = |(index, joint): (usize, &StuckAxis)| match joint.hold {
+        let share = |(index, joint): (usize, &StuckAxis)| match joint.state {
             StuckState::Nothing => Some(Complex64::ZERO),
             StuckState::Spring { displacement, .. } => {
                 Some((joint.at.iter().map(|(i, w)| x[*i] * *w).sum::<Complex64>() + imposed(index)) / displacement)
@@ -296,7 +296,7 @@ impl Survey {
 
     /// Returns the onset of one joint from the samples, with refined maximum and borders.
     fn onset_of(&self, joint: usize, omegas: &[f64], shares: &[Vec<f64>]) -> Option<Onset> {
-        let at = |omega: f64| Some(self.shares(omega)?[joint]);
+        let at = |omega: f64| Some(self.relative_loads(omega)?[joint]);
         let value = |i: usize| shares[i][joint];
         let top = (0..omegas.len()).max_by(|&a, &b| value(a).total_cmp(&value(b)))?;
         let mut best = (omegas[top], value(top));
@@ -305,7 +305,7 @@ impl Survey {
         let refined = (self.dofs() + self.joints.len()) <= REFINED;
         if refined && omegas.len() > 1 && best.1.is_finite() {
             let (low, high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
-            let close = |a: f64, b: f64| b - a <= LOCATED * (high - low);
+            let close = |a: f64, b: f64| b - a <= PEAK_TOLERANCE * (high - low);
             let found = maximum((low, high), close, |omega| at(omega).ok_or(())).ok()?;
             if found.1 > best.1 {
                 best = found;

@@ -13,7 +13,7 @@ pub(super) struct StuckAxis {
     pub(super) name: String,
     /// The direction `W`, as its entries.
     pub(super) at: Vec<(usize, f64)>,
-    pub(super) hold: StuckState,
+    pub(super) state: StuckState,
     /// Stiffness of open faces after they close and stick, N/m; zero for all other joints.
     pub(super) closed: f64,
     /// For a normal direction: the force that presses the faces together at zero displacement,
@@ -21,7 +21,7 @@ pub(super) struct StuckAxis {
     pub(super) pressed: Option<f64>,
     /// Viscous damping in small motion, without friction and in the stuck state, kg/s.
     pub(super) damping: [f64; 2],
-    /// True if the joint slips gradually. `hold` then contains the limit of complete slip.
+    /// True if the joint slips gradually. `state` then contains the limit of complete slip.
     pub(super) gradual: bool,
 }
 
@@ -31,15 +31,16 @@ impl StuckAxis {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
             let pressed = (law.normal() == Some(axis)).then(|| force_at_rest(law, axis));
-            let hold = pressed.map_or_else(|| StuckState::of(law, axis), |force| StuckState::pressed(law, axis, force));
-            let closed = match hold {
+            let state =
+                pressed.map_or_else(|| StuckState::of(law, axis), |force| StuckState::pressed(law, axis, force));
+            let closed = match state {
                 StuckState::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
                 StuckState::Spring { .. } | StuckState::Rigid { .. } => 0.0,
             };
-            let held = if matches!(hold, StuckState::Rigid { .. }) { 0.0 } else { small_damping(law, axis) };
+            let held = if matches!(state, StuckState::Rigid { .. }) { 0.0 } else { small_damping(law, axis) };
             let damping = [law.free().map_or(0.0, |free| small_damping(&*free, axis)), held];
             let gradual = law.macro_slip().is_some();
-            StuckAxis { joint: index, axis, name, at: along.rows().to_vec(), hold, closed, pressed, damping, gradual }
+            StuckAxis { joint: index, axis, name, at: along.rows().to_vec(), state, closed, pressed, damping, gradual }
         })
         .collect()
     }
@@ -47,14 +48,14 @@ impl StuckAxis {
 
 impl StuckAxis {
     /// Returns the spring and damper of the stuck joint, if it has any.
-    pub(super) fn held(&self) -> Option<SpringDamper> {
-        let stiffness = if let StuckState::Spring { stiffness, .. } = self.hold { stiffness } else { 0.0 };
+    pub(super) fn stuck_link(&self) -> Option<SpringDamper> {
+        let stiffness = if let StuckState::Spring { stiffness, .. } = self.state { stiffness } else { 0.0 };
         let damping = self.damping[1];
         (stiffness > 0.0 || damping > 0.0).then(|| SpringDamper { at: self.at.clone(), stiffness, damping })
     }
 
     /// Returns the damper of the joint without friction, if it has one.
-    pub(super) fn free(&self) -> Option<SpringDamper> {
+    pub(super) fn free_link(&self) -> Option<SpringDamper> {
         let damping = self.damping[0];
         (damping > 0.0).then(|| SpringDamper { at: self.at.clone(), stiffness: 0.0, damping })
     }
@@ -126,7 +127,7 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
         return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
     }
     if law.pieces().is_some() {
-        return law.linearised(SMALL, 1.0).re;
+        return law.linearised(LINEAR_AMPLITUDE, 1.0).re;
     }
     let (count, rest) = (law.directions(), [0.0; MOST_DIRECTIONS]);
     if let Some(step) = law.step() {
@@ -168,7 +169,7 @@ fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
 }
 
 /// An amplitude (m) at which no law slips. Its square is still a normal number.
-const SMALL: f64 = 1e-150;
+const LINEAR_AMPLITUDE: f64 = 1e-150;
 
 #[cfg(test)]
 mod tests {
@@ -176,27 +177,29 @@ mod tests {
     use crate::law::{Coulomb, CoulombArctan, Gap, Iwan, Jenkins, JenkinsArctan};
 
     #[test]
-    fn laws_hold_as_they_do_in_small_motion() {
-        let spring = Hold::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
-        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
-        assert_eq!(Hold::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
+    fn stuck_state_is_that_of_small_motion() {
+        let spring = StuckState::Spring { stiffness: 1e4, limit: 2.0, displacement: 2e-4 };
+        assert_eq!(StuckState::of(&Jenkins { stiffness: 1e4, limit: 2.0 }, 0), spring);
+        assert_eq!(StuckState::of(&JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 }, 0), spring);
         // micro-slip from the first motion is not the limit: complete slip begins at FS (1 +
         // β)/(KT (β + (χ + 1)/(χ + 2)))
         let iwan = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
-        let Hold::Spring { stiffness, limit, displacement } = Hold::of(&iwan, 0) else { panic!("{iwan:?}") };
+        let StuckState::Spring { stiffness, limit, displacement } = StuckState::of(&iwan, 0) else {
+            panic!("{iwan:?}")
+        };
         let macro_slip = 2.0 * 1.3 / (1e4 * (0.3 + 0.5 / 1.5));
         assert!(stiffness == 1e4 && limit == 2.0 && (displacement / macro_slip - 1.0).abs() < 1e-12, "{displacement}");
-        assert_eq!(Hold::of(&Coulomb { limit: 2.0 }, 0), Hold::Rigid { limit: 2.0 });
-        assert_eq!(Hold::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), Hold::Rigid { limit: 2.0 });
+        assert_eq!(StuckState::of(&Coulomb { limit: 2.0 }, 0), StuckState::Rigid { limit: 2.0 });
+        assert_eq!(StuckState::of(&CoulombArctan { limit: 2.0, alpha: 25e3 }, 0), StuckState::Rigid { limit: 2.0 });
         // a stop carries force when it is pressed, but not when it only touches
         let stop = |gap: f64| {
             let law = Gap { gap, stiffness: 1e4 };
-            Hold::pressed(&law, 0, force_at_rest(&law, 0))
+            StuckState::pressed(&law, 0, force_at_rest(&law, 0))
         };
-        assert!(matches!(stop(-1e-3), Hold::Spring { stiffness: 1e4, .. }), "{:?}", stop(-1e-3));
-        assert_eq!([0.0, 1e-3].map(stop), [Hold::Nothing; 2]);
+        assert!(matches!(stop(-1e-3), StuckState::Spring { stiffness: 1e4, .. }), "{:?}", stop(-1e-3));
+        assert_eq!([0.0, 1e-3].map(stop), [StuckState::Nothing; 2]);
         // without a limit, the joint is free
-        assert_eq!(Hold::of(&Jenkins { stiffness: 1e4, limit: 0.0 }, 0), Hold::Nothing);
-        assert_eq!(Hold::of(&Coulomb { limit: 0.0 }, 0), Hold::Nothing);
+        assert_eq!(StuckState::of(&Jenkins { stiffness: 1e4, limit: 0.0 }, 0), StuckState::Nothing);
+        assert_eq!(StuckState::of(&Coulomb { limit: 0.0 }, 0), StuckState::Nothing);
     }
 }

@@ -6,11 +6,11 @@
 //! sectors becomes two springs: one along the real part and one along the imaginary part of its
 //! elongation. The modes then occur in pairs, one for each direction of travel.
 
-use super::linear_modes::{LARGEST, LinearStructure, SpringDamper};
+use super::linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
 use super::stuck_joint::{StuckAxis, StuckState};
 use super::{LinearMode, Model, ModelError, Modes, System};
 use crate::model::{Body, Mass, Place};
-use crate::structure::{Sector, Structure, turn};
+use crate::structure::{Sector, Structure, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
@@ -55,7 +55,7 @@ impl WaveRows {
         let mut parts = [BTreeMap::new(), BTreeMap::new()];
         for &(row, weight) in at {
             let (i, sector) = (row % self.dofs, row / self.dofs);
-            let phase = turn((self.diameter * sector) as i64, self.sectors) * weight;
+            let phase = unit_root((self.diameter * sector) as i64, self.sectors) * weight;
             let entries = [[(i, phase.re), (self.dofs + i, -phase.im)], [(i, phase.im), (self.dofs + i, phase.re)]];
             for (part, entries) in parts.iter_mut().zip(entries) {
                 for (i, weight) in entries {
@@ -72,7 +72,7 @@ impl WaveRows {
 
     /// Combines the modes of both joint states, with shapes at the places.
     fn modes(&self, free: SelectedModes, stuck: SelectedModes, places: &[Row]) -> WaveModes {
-        let at_places = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.seen(shape, places)).collect();
+        let at_places = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.at_places(shape, places)).collect();
         WaveModes {
             diameter: self.diameter,
             free_shapes: at_places(&free.shapes),
@@ -88,7 +88,7 @@ impl WaveRows {
     /// A mode `x` of a travelling wave has the partner `jx`. The eigenvalue solution returns
     /// two directions of their plane. For several equal modes, it returns directions of a
     /// larger space. This function splits that space into orthogonal complex shapes.
-    fn once(
+    fn select_modes(
         &self,
         mut modes: Modes,
         shapes: Option<DMatrix<f64>>,
@@ -127,7 +127,7 @@ impl WaveRows {
                 break;
             }
             let mut shape = shapes.column(column).into_owned();
-            let near = |other: &&usize| mode.omega - elastic[**other].omega <= NEAR * mode.omega;
+            let near = |other: &&usize| mode.omega - elastic[**other].omega <= EQUAL_FREQUENCY * mode.omega;
             let first = kept.len() - kept.iter().rev().take_while(near).count();
             for [own, weighed, turned, turned_weighed] in &found[first..] {
                 let (along, across) = (weighed.dot(&shape), turned_weighed.dot(&shape));
@@ -136,10 +136,10 @@ impl WaveRows {
             }
             let weighed = weigh(&shape);
             let left = weighed.dot(&shape);
-            if left >= APART {
+            if left >= INDEPENDENT_NORM {
                 let (shape, weighed) = (shape / left.sqrt(), weighed / left.sqrt());
-                let turned = self.quarter(&shape);
-                let turned_weighed = self.quarter(&weighed);
+                let turned = self.times_j(&shape);
+                let turned_weighed = self.times_j(&weighed);
                 kept.push(column);
                 found.push([shape, weighed, turned, turned_weighed]);
             }
@@ -149,21 +149,21 @@ impl WaveRows {
 
     /// Returns `j (a + jb)`, the same motion a quarter of a period earlier. The mass matrix of
     /// the wave is invariant under this shift.
-    fn quarter(&self, shape: &DVector<f64>) -> DVector<f64> {
+    fn times_j(&self, shape: &DVector<f64>) -> DVector<f64> {
         let n = self.dofs;
         DVector::from_fn(2 * n, |i, _| if i < n { -shape[n + i] } else { shape[i - n] })
     }
 
     /// Returns a sector's shape with `aᵀMa + bᵀMb = 1` at the places, normalized as in
     /// [`WaveModes`].
-    fn seen(&self, shape: &DVector<f64>, places: &[Row]) -> Vec<Complex64> {
+    fn at_places(&self, shape: &DVector<f64>, places: &[Row]) -> Vec<Complex64> {
         let n = self.dofs;
         let whole = |i: usize| Complex64::new(shape[i], if self.double { shape[n + i] } else { 0.0 });
         // the squares of a cosine over the sectors sum to half their number
         let scale = (if self.double { 2.0 } else { 1.0 } / self.sectors as f64).sqrt();
         let at = |place: &Row| -> Complex64 {
             let term = |(row, weight): &(usize, f64)| {
-                whole(row % n) * turn((self.diameter * (row / n)) as i64, self.sectors) * (*weight * scale)
+                whole(row % n) * unit_root((self.diameter * (row / n)) as i64, self.sectors) * (*weight * scale)
             };
             place.iter().map(term).sum()
         };
@@ -184,11 +184,11 @@ struct SelectedModes {
 /// Relative frequency distance within which modes can share an eigenspace. More distant modes
 /// are orthogonal up to rounding. Modes of one pair differ by at most 1e-6, even where
 /// frequencies have few significant digits.
-const NEAR: f64 = 1e-3;
+const EQUAL_FREQUENCY: f64 = 1e-3;
 /// Fraction of a shape's square that remains after projection on the earlier shapes and marks a
 /// new shape. For the partner in a pair, only rounding remains. Of up to six equal modes, some
 /// shape always has more.
-const APART: f64 = 0.25;
+const INDEPENDENT_NORM: f64 = 0.25;
 
 impl Model {
     /// Returns the `lowest` modes of a ring of equal sectors by nodal diameter.
@@ -224,7 +224,7 @@ impl Model {
         if self.substructure.is_some() || self.moves_bodies() {
             return Ok(of_matrices(&system, sectors, lowest, &self.sector_axes(&system)));
         }
-        if n == 0 || 2 * n > LARGEST {
+        if n == 0 || 2 * n > MAX_DOFS {
             return Ok(None);
         }
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
@@ -249,19 +249,19 @@ impl Model {
             let springs: Vec<SpringDamper> =
                 springs.iter().flat_map(|s| link(&ends(&s.between), s.stiffness, s.damping)).collect();
             let of = |one: SpringDamper| link(&one.at, one.stiffness, one.damping);
-            let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free).flat_map(of).collect();
+            let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free_link).flat_map(of).collect();
             let (mut held, mut rigid) = (Vec::new(), Vec::new());
             for joint in &stuck {
-                match joint.hold {
+                match joint.state {
                     StuckState::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
                     StuckState::Nothing | StuckState::Spring { .. } => {
-                        held.extend(joint.held().into_iter().flat_map(of))
+                        held.extend(joint.stuck_link().into_iter().flat_map(of))
                     }
                     StuckState::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
                 }
             }
             let weigh = |x: &DVector<f64>| x.component_mul(&DVector::from_column_slice(&mass));
-            let once = |linear: LinearStructure| turned.once(linear.modes, linear.shapes, lowest, &weigh);
+            let once = |linear: LinearStructure| turned.select_modes(linear.modes, linear.shapes, lowest, &weigh);
             let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
             let free_ones = once(LinearStructure::new(&mass, &springs.iter().chain(&dampers).collect::<Vec<_>>(), &[]));
             let stuck_ones =
@@ -303,28 +303,30 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
             turned.rows(at).into_iter().map(|at| SpringDamper { at, stiffness, damping }).collect()
         };
         let of = |one: SpringDamper| link(&one.at, one.stiffness, one.damping);
-        let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free).flat_map(of).collect();
+        let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free_link).flat_map(of).collect();
         let (mut held, mut rigid) = (Vec::new(), Vec::new());
         for joint in &stuck {
-            match joint.hold {
+            match joint.state {
                 StuckState::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
-                StuckState::Nothing | StuckState::Spring { .. } => held.extend(joint.held().into_iter().flat_map(of)),
+                StuckState::Nothing | StuckState::Spring { .. } => {
+                    held.extend(joint.stuck_link().into_iter().flat_map(of))
+                }
                 StuckState::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
             }
         }
         let modes = |links: &[SpringDamper], rigid: &[Row]| -> Option<SelectedModes> {
-            if structure.dofs() <= LARGEST {
+            if structure.dofs() <= MAX_DOFS {
                 let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
                 let LinearStructure { modes, shapes, .. } =
                     LinearStructure::of_wave(structure.full(), &links.iter().collect::<Vec<_>>(), &rigid);
-                return Some(turned.once(modes, shapes, lowest, &|x| &structure.full().mass * x));
+                return Some(turned.select_modes(modes, shapes, lowest, &|x| &structure.full().mass * x));
             }
             if !rigid.is_empty() {
                 return None;
             }
             let (mass, modes, shapes) =
                 of_large(structure, links, if double { lowest.saturating_mul(2) } else { lowest })?;
-            Some(turned.once(modes, Some(shapes), lowest, &|x| DVector::from_vec(mass.times(x.as_slice()))))
+            Some(turned.select_modes(modes, Some(shapes), lowest, &|x| DVector::from_vec(mass.times(x.as_slice()))))
         };
         Some(turned.modes(modes(&dampers, &[])?, modes(&held, &rigid)?, places))
     };
@@ -349,7 +351,7 @@ fn of_large(structure: &Structure, links: &[SpringDamper], count: usize) -> Opti
     let mass = part(0, Vec::new())?;
     let (damping, stiffness) = (part(1, along(|link| link.damping))?, part(2, along(|link| link.stiffness))?);
     // free motions come on top of the requested elastic modes
-    let wanted = Wanted::Lowest((count.saturating_add(FREE_AT_MOST)).min(n));
+    let wanted = Wanted::Lowest((count.saturating_add(MAX_FREE_MODES)).min(n));
     let found = NaturalModes::new(&Analysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
     let free = found.free();
     let mode = |k: usize| {
@@ -364,13 +366,13 @@ fn of_large(structure: &Structure, links: &[SpringDamper], count: usize) -> Opti
 }
 
 /// Largest number of free motions: six of a body, twice for both directions of travel.
-const FREE_AT_MOST: usize = 12;
+const MAX_FREE_MODES: usize = 12;
 
 #[cfg(test)]
 mod tests {
     use crate::law::{Coulomb, Jenkins, SharedLaw};
     use crate::model::{Disk, Joint, Mass, Model, Spring};
-    use crate::structure::turn;
+    use crate::structure::unit_root;
     use nalgebra::{DMatrix, DVector};
     use std::sync::Arc;
 
@@ -501,8 +503,8 @@ mod tests {
                                 for quarter in 0..if 2 * other.diameter % sectors == 0 { 1 } else { 2 } {
                                     let at = |row: usize| {
                                         let place = row % shape.len();
-                                        let turned =
-                                            shape[place] * turn((other.diameter * (row / shape.len())) as i64, sectors);
+                                        let turned = shape[place]
+                                            * unit_root((other.diameter * (row / shape.len())) as i64, sectors);
                                         [turned.re, turned.im][quarter]
                                     };
                                     let whole = DVector::from_fn(n, |row, _| at(row));

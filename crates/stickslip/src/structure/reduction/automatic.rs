@@ -13,21 +13,21 @@ const EXTENTS_OF_MANY: [f64; 2] = [3.0, 6.0];
 /// Number of times that the last multiple is doubled for a requested Craig-Bampton reduction,
 /// up to 600 modes or all modes. Its error decreases slowly. Measured on bricks of 144 rows up
 /// to 5 kHz: 2e-3 at 48 times that frequency, with 53 modes.
-const DOUBLED: i32 = 12;
+const MAX_DOUBLINGS: i32 = 12;
 /// Fractions of each multiple that are tried.
 const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
 /// Number of ports above which more modes are tried before more orders, and all modes are used
 /// at once. Compared with hundreds of residual vectors, fewer modes save little.
-const MANY: usize = 96;
+const MANY_PORTS: usize = 96;
 /// Largest order of residual vectors.
 const ORDERS: usize = 3;
 /// Limit on the numbers in all residual vectors: 1 GB.
-const NUMBERS: usize = 1 << 27;
+const MAX_RESIDUAL_NUMBERS: usize = 1 << 27;
 
 /// Returns the largest order of residual vectors, reduced for large structures with many ports
 /// to limit memory.
 fn orders(whole: &Whole) -> usize {
-    (NUMBERS / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, ORDERS)
+    (MAX_RESIDUAL_NUMBERS / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, ORDERS)
 }
 
 /// Parameters of an automatic reduction.
@@ -68,7 +68,7 @@ struct Attempt {
     extent: f64,
     orders: RangeInclusive<usize>,
     /// True if later attempts use other options than more modes.
-    early: bool,
+    has_alternative: bool,
 }
 
 /// A reduction with its error.
@@ -101,10 +101,10 @@ impl Reduce {
         }
         let mut best: Option<(Deviation, usize)> = None;
         let (mut reference, mut last) = (None, None);
-        for Attempt { extent, orders, early } in self.attempts(whole) {
+        for Attempt { extent, orders, has_alternative } in self.attempts(whole) {
             let modes = match whole.modes(extent * self.up_to) {
                 // too many modes; a later attempt uses fewer modes with more orders
-                Err(ReductionError::Modes(ModesError::TooMany { .. })) if early => continue,
+                Err(ReductionError::Modes(ModesError::TooMany { .. })) if has_alternative => continue,
                 modes => modes?,
             };
             let reference = match &mut reference {
@@ -133,7 +133,7 @@ impl Reduce {
                     }
                 }
             }
-            if self.kind == Some(ReductionKind::Rubin) || early {
+            if self.kind == Some(ReductionKind::Rubin) || has_alternative {
                 continue;
             }
             match whole.craig_bampton(extent * self.up_to) {
@@ -149,7 +149,7 @@ impl Reduce {
             last = Some(modes);
         }
         if let (Some(ReductionKind::CraigBampton), Some(reference), Some(modes)) = (self.kind, reference, last) {
-            for doubled in 1..=DOUBLED {
+            for doubled in 1..=MAX_DOUBLINGS {
                 let extent = EXTENTS[EXTENTS.len() - 1] * 2.0f64.powi(doubled);
                 let reduced = match whole.craig_bampton(extent * self.up_to) {
                     Ok(reduced) => reduced,
@@ -176,10 +176,13 @@ impl Reduce {
     /// Returns the attempts, the cheapest first.
     fn attempts(self, whole: &Whole) -> Vec<Attempt> {
         let all = orders(whole);
-        let many = whole.ports().len() > MANY && self.kind != Some(ReductionKind::CraigBampton);
+        let many = whole.ports().len() > MANY_PORTS && self.kind != Some(ReductionKind::CraigBampton);
         let first = EXTENTS_OF_MANY.into_iter().filter(|_| many).map(|extent| (extent, 1..=1, true));
         let usual = EXTENTS.into_iter().map(|extent| (extent, if many { 2 } else { 1 }..=all, false));
-        first.chain(usual).map(|(extent, orders, early)| Attempt { extent, orders, early }).collect()
+        first
+            .chain(usual)
+            .map(|(extent, orders, has_alternative)| Attempt { extent, orders, has_alternative })
+            .collect()
     }
 
     /// Returns the numbers of modes and orders of residual vectors to try, the smallest total
@@ -195,7 +198,7 @@ impl Reduce {
             let bound = (share * extent * self.up_to).powi(2);
             if share < 1.0 { modes.values.partition_point(|value| *value <= bound) } else { modes.count() }
         };
-        let shares = if ports > MANY { &SHARES[SHARES.len() - 1..] } else { &SHARES[..] };
+        let shares = if ports > MANY_PORTS { &SHARES[SHARES.len() - 1..] } else { &SHARES[..] };
         let mut sizes: Vec<(usize, usize)> =
             orders.flat_map(|order| shares.iter().map(move |share| (count(*share), order))).collect();
         sizes.sort_by_key(|&(count, order)| (count + order * ports, order));

@@ -15,15 +15,15 @@ use nalgebra::DMatrix;
 use stickslip_numerics::sparse::{Matrix, columns};
 
 /// Values of s at which a basis is compared with the whole structure.
-const HELD: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+const CHECKED_FRACTIONS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
 /// A structure with both stiffnesses in the same coordinates.
 #[derive(Debug, Clone)]
 pub(in crate::structure) struct CommonBasis {
     /// With its own stiffness.
-    pub rest: Reduced,
+    pub own: Reduced,
     /// With the other stiffness.
-    pub there: Reduced,
+    pub other: Reduced,
     /// Largest error at both ends and between, and its frequency.
     pub deviation: Deviation,
     /// Upper end of the frequency range in which the error holds, rad/s.
@@ -45,9 +45,9 @@ impl Whole {
         if there.n() != n {
             return Err(ReductionError::Size { matrix: "other stiffness", rows: there.n(), n });
         }
-        let wholes = HELD.map(|share| self.with_share(there, share));
+        let wholes = CHECKED_FRACTIONS.map(|share| self.with_share(there, share));
         let wholes: Vec<Whole> = wholes.into_iter().collect::<Result<_, _>>()?;
-        let last = HELD.len() - 1;
+        let last = CHECKED_FRACTIONS.len() - 1;
         let (mut vectors, mut up_to, mut taken) = (Vec::new(), f64::INFINITY, Vec::new());
         let mut take = |at: usize| -> Result<_, ReductionError> {
             let (reduced, own) = reduce(&wholes[at])?;
@@ -74,8 +74,9 @@ impl Whole {
             }
             let (deviation, at) = worst;
             if deviation.error <= tolerance {
-                let (rest, there) = (project(&wholes[0])?.in_metres(), project(&wholes[last])?.in_metres());
-                return Ok(CommonBasis { rest, there, deviation, up_to });
+                let (own, other) =
+                    (project(&wholes[0])?.scaled_to_metres(), project(&wholes[last])?.scaled_to_metres());
+                return Ok(CommonBasis { own, other, deviation, up_to });
             }
             if taken.contains(&at) {
                 let (Deviation { error: best, omega: at }, dofs) = (deviation, basis.len() / n.max(1));

@@ -7,7 +7,7 @@
 //!
 //! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
 
-use super::{MOST_MODES, Reduced, ReductionError, Whole};
+use super::{MAX_MODES, Reduced, ReductionError, Whole};
 use stickslip_numerics::sparse::{Analysis, Matrix, NaturalModes, Wanted};
 
 impl Whole {
@@ -17,11 +17,11 @@ impl Whole {
     /// # Errors
     /// [`ReductionError`]: free motions remain with fixed ports, or the mode computation fails.
     pub fn craig_bampton(&self, omega: f64) -> Result<Reduced, ReductionError> {
-        self.held(Wanted::UpTo { value: omega * omega, most: MOST_MODES })
+        self.fixed_interface(Wanted::UpTo { value: omega * omega, most: MAX_MODES })
     }
 
     /// Reduces the structure with the modes that `wanted` specifies.
-    pub(in crate::structure) fn held(&self, wanted: Wanted) -> Result<Reduced, ReductionError> {
+    pub(in crate::structure) fn fixed_interface(&self, wanted: Wanted) -> Result<Reduced, ReductionError> {
         let n = self.dofs();
         let mut boundary: Vec<usize> = self.ports.iter().flatten().map(|(at, _)| *at).collect();
         boundary.sort_unstable();

@@ -9,9 +9,9 @@
 //! diameters. The number of diameters follows from the required error.
 //!
 //! Differences between sectors use the same basis, `Vᵀ ΔA V`: the nominal modes of the ring
-//! approximately span the space of the mistuned ring (`nominal_modes`, `mistuning_error`). If that is not
-//! accurate enough, the basis also receives residual vectors of the forces `D φ`, which a
-//! deviating blade exerts in the modes φ.
+//! approximately span the space of the mistuned ring (`nominal_modes`, `mistuning_error`). If
+//! that is not accurate enough, the basis also receives residual vectors of the forces `D φ`,
+//! which a deviating blade exerts in the modes φ.
 //!
 //! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of
 //! nominal system modes", J. Eng. Gas Turbines Power 123, 893-900.
@@ -20,9 +20,9 @@ use super::{
     Damping, Deviation, Free, Reduced, Reduction, ReductionError, ReductionKind, Reference, Row, Whole, damping,
     residual_flexibility,
 };
-use crate::structure::sector::{in_wave, is_real};
-use crate::structure::sector_boundary::{Blade, symmetrised};
-use crate::structure::{CyclicSector, RingEntry, turn};
+use crate::structure::sector::{is_real, wave_entries};
+use crate::structure::sector_boundary::{Blade, symmetrized};
+use crate::structure::{CyclicSector, RingEntry, unit_root};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
@@ -97,7 +97,7 @@ struct WaveCollection<'a> {
     seen: &'a [Row],
     /// For different blades: the blade, and the highest frequency of interest.
     blade: Option<(&'a Blade, f64)>,
-    met: Vec<ComputedWave>,
+    computed: Vec<ComputedWave>,
 }
 
 impl CyclicSector {
@@ -112,7 +112,7 @@ impl CyclicSector {
         if seen.is_empty() {
             return Err(ReductionError::NoPorts);
         }
-        let mut waves = WaveCollection { sector: self, seen, blade: None, met: Vec::new() };
+        let mut waves = WaveCollection { sector: self, seen, blade: None, computed: Vec::new() };
         match *how {
             Reduction::None { .. } => Err(ReductionError::NoPorts),
             Reduction::UpTo { up_to, tolerance, kind } => {
@@ -135,9 +135,9 @@ impl CyclicSector {
 impl WaveCollection<'_> {
     /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
     /// of interest.
-    fn meet(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
+    fn compute(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
         for &diameter in diameters {
-            match self.met.iter_mut().find(|wave| wave.diameter == diameter) {
+            match self.computed.iter_mut().find(|wave| wave.diameter == diameter) {
                 Some(wave) if wave.extent >= extent => {}
                 Some(wave) => {
                     wave.modes = wave.whole.modes(extent * up_to)?;
@@ -146,8 +146,8 @@ impl WaveCollection<'_> {
                 None => {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
-                    let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
-                    self.met.push(ComputedWave { diameter, whole, modes, extent, reference });
+                    let reference = Reference::with_samples(&whole, &modes, up_to, SAMPLES)?;
+                    self.computed.push(ComputedWave { diameter, whole, modes, extent, reference });
                 }
             }
         }
@@ -176,7 +176,7 @@ impl WaveCollection<'_> {
             loop {
                 let taken = self.sector.diameters(level);
                 let between = self.sector.diameters(level + 1);
-                self.meet(&between, up_to, extent)?;
+                self.compute(&between, up_to, extent)?;
                 let reduced = self.basis(&taken, size, kind)?;
                 let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
                 let (own, all) = (at(&taken)?, at(&between)?);
@@ -219,8 +219,8 @@ impl WaveCollection<'_> {
         serves /= BEYOND;
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
-            let reference = Reference::few(&whole, &modes, up_to, SAMPLES)?;
-            self.met.push(ComputedWave { diameter, whole, modes, extent: BEYOND, reference });
+            let reference = Reference::with_samples(&whole, &modes, up_to, SAMPLES)?;
+            self.computed.push(ComputedWave { diameter, whole, modes, extent: BEYOND, reference });
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
@@ -229,7 +229,7 @@ impl WaveCollection<'_> {
 
     fn chosen(&self, reduced: ReducedSector, deviation: Deviation, (up_to, serves): (f64, f64)) -> SectorReduction {
         let (mut frequencies, mut free) = (Vec::new(), 0);
-        for wave in &self.met {
+        for wave in &self.computed {
             let step = if is_real(wave.diameter, self.sector.sectors) { 1 } else { 2 };
             frequencies.extend(wave.modes.values.iter().step_by(step).map(|value| value.max(0.0).sqrt()));
             free += wave.modes.free() / step;
@@ -247,19 +247,19 @@ impl WaveCollection<'_> {
     ) -> Result<ReducedSector, ReductionError> {
         let n = self.sector.dofs;
         let mut vectors: Vec<f64> = Vec::new();
-        let taken = || self.met.iter().filter(|wave| diameters.contains(&wave.diameter));
+        let taken = || self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
         for wave in taken() {
             let basis = match kind {
                 ReductionKind::Rubin => Free::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
                 ReductionKind::CraigBampton => {
                     let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
-                    let wanted = Wanted::UpTo { value: omega * omega, most: super::MOST_MODES };
-                    Arc::unwrap_or_clone(wave.whole.held(wanted)?.basis)
+                    let wanted = Wanted::UpTo { value: omega * omega, most: super::MAX_MODES };
+                    Arc::unwrap_or_clone(wave.whole.fixed_interface(wanted)?.basis)
                 }
             };
             vectors.extend(basis);
             if let Some((blade, up_to)) = self.blade {
-                vectors.extend(self.relieved(wave, blade, up_to, order)?);
+                vectors.extend(self.blade_vectors(wave, blade, up_to, order)?);
             }
         }
         let modes = taken().map(|wave| wave.modes.count()).max().unwrap_or(0);
@@ -277,7 +277,7 @@ impl WaveCollection<'_> {
 
     /// Returns residual vectors of a wave for the forces of a deviating blade, in its modes up
     /// to a frequency. Both parts of the wave are included.
-    fn relieved(
+    fn blade_vectors(
         &self,
         wave: &ComputedWave,
         blade: &Blade,
@@ -303,8 +303,12 @@ impl WaveCollection<'_> {
     /// displacement at the port that moves most.
     fn independent(&self, vectors: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.sector.dofs;
-        let (mass, stiffness) = (self.sector.alone(&self.sector.mass)?, self.sector.alone(&self.sector.stiffness)?);
-        let highest = self.met.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
+        let (mass, stiffness) = (
+            self.sector.with_fixed_adjacent(&self.sector.mass)?,
+            self.sector.with_fixed_adjacent(&self.sector.stiffness)?,
+        );
+        let highest =
+            self.computed.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
         let mut energies = columns::products(n, vectors, &stiffness.times_columns(vectors));
         energies += columns::products(n, vectors, &mass.times_columns(vectors)) * highest;
         let size: Vec<f64> = energies.diagonal().iter().map(|e| e.max(0.0).sqrt()).collect();
@@ -338,7 +342,7 @@ impl WaveCollection<'_> {
     fn projected(&self, kind: String, basis: Vec<f64>, n: usize) -> ReducedSector {
         let sector = self.sector;
         let project = |entries: &Vec<RingEntry>| projected(entries, n, &basis);
-        let symmetric = |entries: &Vec<RingEntry>| symmetrised(project(entries), |shift| -shift);
+        let symmetric = |entries: &Vec<RingEntry>| symmetrized(project(entries), |shift| -shift);
         let mut ports = Vec::new();
         for (port, row) in self.seen.iter().enumerate() {
             for (k, column) in basis.chunks_exact(n.max(1)).enumerate() {
@@ -366,7 +370,7 @@ impl WaveCollection<'_> {
     /// Returns the error of the waves of these diameters relative to the whole ring.
     fn deviation(&self, reduced: &ReducedSector, diameters: &[usize], up_to: f64) -> Result<Deviation, ReductionError> {
         let mut worst = Deviation { error: 0.0, omega: 0.0 };
-        for wave in self.met.iter().filter(|wave| diameters.contains(&wave.diameter)) {
+        for wave in self.computed.iter().filter(|wave| diameters.contains(&wave.diameter)) {
             let small = reduced.wave(wave.diameter, self.sector.sectors)?;
             let deviation = wave.reference.deviation(&small);
             let own = small.frequencies().unwrap_or_default();
@@ -430,7 +434,7 @@ impl ReducedSector {
             let real = is_real(diameter, sectors);
             let share = if real { 1.0 } else { 2.0 } / sectors as f64;
             for (shift, sum) in between.iter_mut().enumerate() {
-                let phase = turn(-((diameter * shift) as i64), sectors);
+                let phase = unit_root(-((diameter * shift) as i64), sectors);
                 *sum += own.view((0, 0), (r, r)) * (phase.re * share);
                 if !real {
                     *sum -= own.view((r, 0), (r, r)) * (phase.im * share);
@@ -442,7 +446,7 @@ impl ReducedSector {
             at.map(|at| (at.0, at.1, shift as i64, matrix[at])).collect::<Vec<_>>()
         });
         let back = |shift: i64| (sectors as i64 - shift) % sectors as i64;
-        Ok(symmetrised(all.collect(), back))
+        Ok(symmetrized(all.collect(), back))
     }
 
     /// Returns the reduced structure in a wave.
@@ -451,7 +455,7 @@ impl ReducedSector {
         let copies = if is_real(diameter, sectors) { 1 } else { 2 };
         let matrix = |entries: &[RingEntry], rows: usize| {
             let mut sum = DMatrix::zeros(copies * rows, copies * r);
-            for (row, column, value) in in_wave(entries.iter().copied(), [rows, r], diameter, sectors) {
+            for (row, column, value) in wave_entries(entries.iter().copied(), [rows, r], diameter, sectors) {
                 sum[(row, column)] += value;
             }
             sum

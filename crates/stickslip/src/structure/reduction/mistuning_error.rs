@@ -23,7 +23,7 @@ use super::cyclic_basis::HALF_WIDTH;
 use super::{Deviation, ReducedSector, ReductionError, Row, Whole};
 use crate::structure::sector::is_real;
 use crate::structure::sector_boundary::{Blade, CyclicSector};
-use crate::structure::turn;
+use crate::structure::unit_root;
 use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::columns;
@@ -118,7 +118,7 @@ impl MistuningError {
         DMatrix::from_fn(sectors, 4 * (sectors / 2 + 1), |s, column| {
             let (diameter, part) = (column / 4, column % 4);
             let share = if is_real(diameter, sectors) { 1.0 } else { 2.0 } / sectors as f64;
-            let phase = turn(-((diameter * s) as i64), sectors) * share.sqrt();
+            let phase = unit_root(-((diameter * s) as i64), sectors) * share.sqrt();
             let weight = if part < 2 { 1.0 } else { deviations[s] };
             weight * if part % 2 == 0 { phase.re } else { phase.im }
         })

@@ -10,13 +10,13 @@
 //!   displacements of the ports.
 //!
 //! Harmonic balance needs receptances only and can also use modes and a series of residuals
-//! (`residual_series`). Residual vectors of J orders make the first 2 J terms of this series exact in
-//! any method.
+//! (`residual_series`). Residual vectors of J orders make the first 2 J terms of this series
+//! exact in any method.
 //!
 //! The other files:
 //!
-//! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does this for a
-//!   ring with different blades.
+//! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does
+//!   this for a ring with different blades.
 //! - `automatic`: [`Reduce`] uses as many modes as a given error requires.
 //! - `cyclic_basis` reduces a sector for all waves of its ring at once.
 //! - `common_basis` builds one basis for two stiffnesses and all between them.
@@ -60,12 +60,12 @@ pub type Row = Vec<(usize, f64)>;
 
 /// Ratio of a frequency to the highest `√(k_ii/m_ii)` above which the frequency is a mistake:
 /// no mode is near.
-const ABOVE_ALL: f64 = 100.0;
+const MAX_FREQUENCY_RATIO: f64 = 100.0;
 /// Largest number of modes; each needs one number per degree of freedom.
-const MOST_MODES: usize = 600;
+const MAX_MODES: usize = 600;
 /// Number of columns of full length processed at once. More would exhaust the memory for
 /// thousands of columns.
-const AT_ONCE: usize = 64;
+const COLUMN_BLOCK: usize = 64;
 /// Kinetic energy of a reduced mode relative to its stiffness, in units of the largest, below
 /// which the mode has no frequency.
 const MASSLESS: f64 = 1e-14;
@@ -272,11 +272,11 @@ impl Whole {
     /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a
     /// negative damping ratio.
     pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
-        Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
+        Whole::without_ports(mass, damping, stiffness)?.seen_at(ports)
     }
 
     /// Creates a structure without ports.
-    pub(super) fn unseen(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
+    pub(super) fn without_ports(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
             Damping::Matrix(c) => Some(c),
@@ -338,10 +338,10 @@ impl Whole {
         let ratios =
             (0..self.dofs()).map(own).filter(|(_, mass)| *mass > 0.0).map(|(stiffness, mass)| stiffness / mass);
         let highest = ratios.fold(0.0, f64::max).sqrt();
-        if highest > 0.0 && omega > ABOVE_ALL * highest {
+        if highest > 0.0 && omega > MAX_FREQUENCY_RATIO * highest {
             return Err(ReductionError::AboveAll { omega, highest });
         }
-        let wanted = Wanted::UpTo { value: omega * omega, most: MOST_MODES };
+        let wanted = Wanted::UpTo { value: omega * omega, most: MAX_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
     }
 
@@ -350,7 +350,7 @@ impl Whole {
     /// # Errors
     /// [`ReductionError::Modes`], or [`ReductionError::Number`] for an invalid count.
     pub fn lowest_modes(&self, count: usize) -> Result<NaturalModes, ReductionError> {
-        if !(1..=MOST_MODES).contains(&count) {
+        if !(1..=MAX_MODES).contains(&count) {
             let must = "a whole number from 1 to 600";
             return Err(ReductionError::Number { what: "the number of modes", value: count as f64, must });
         }
@@ -381,7 +381,7 @@ impl Whole {
 
     /// Returns the displacements of the ports for columns of full length.
     fn rows_of(&self, columns: &[f64]) -> DMatrix<f64> {
-        seen(&self.ports, self.dofs(), columns)
+        evaluate_rows(&self.ports, self.dofs(), columns)
     }
 
     /// Returns unit forces at a range of ports, n × their number.
@@ -450,7 +450,7 @@ impl Reduced {
     /// largest degree of freedom if no port moves. Comparisons between coordinates then compare
     /// metres. The displacements of all other rows are dropped.
     #[must_use]
-    pub(super) fn in_metres(mut self) -> Self {
+    pub(super) fn scaled_to_metres(mut self) -> Self {
         let most = |column: &[f64]| column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let sizes: Vec<f64> = self.basis.chunks_exact(self.n.max(1)).map(most).collect();
         for k in 0..self.dofs() {
@@ -485,7 +485,7 @@ impl Reduced {
     /// # Panics
     /// If a row is out of range.
     pub fn rows(&self, rows: &[Row]) -> DMatrix<f64> {
-        product(&seen(rows, self.n, &self.basis), &self.weights)
+        product(&evaluate_rows(rows, self.n, &self.basis), &self.weights)
     }
 
     /// Returns all displacements of the whole structure, n × r.
@@ -569,7 +569,7 @@ fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
 }
 
 /// Evaluates weighted sums of rows over columns of length `n`.
-fn seen(rows: &[Row], n: usize, columns: &[f64]) -> DMatrix<f64> {
+fn evaluate_rows(rows: &[Row], n: usize, columns: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns.len() / n.max(1), |i, k| {
         rows[i].iter().map(|(at, weight)| weight * columns[k * n + at]).sum()
     })
@@ -615,7 +615,7 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let r = mass.nrows();
     let moves = |i: usize| mass[(i, i)] > 0.0 || (mass[(i, i)] == 0.0 && stiffness[(i, i)] > 0.0);
     if is_diagonal(mass) && is_diagonal(stiffness) && (0..r).all(moves) {
-        return Some(natural_by_themselves(&mass.diagonal(), &stiffness.diagonal()));
+        return Some(natural_diagonal(&mass.diagonal(), &stiffness.diagonal()));
     }
     let ratio = |i: usize| stiffness[(i, i)] / mass[(i, i)];
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
@@ -639,7 +639,7 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
 }
 
 /// Solves the eigenvalue problem of uncoupled coordinates.
-fn natural_by_themselves(mass: &DVector<f64>, stiffness: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
+fn natural_diagonal(mass: &DVector<f64>, stiffness: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let n = mass.len();
     let value = |i: usize| if mass[i] > 0.0 { stiffness[i] / mass[i] } else { f64::INFINITY };
     let size = |i: usize| if mass[i] > 0.0 { mass[i] } else { stiffness[i] }.sqrt();

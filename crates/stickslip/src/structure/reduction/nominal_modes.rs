@@ -22,10 +22,10 @@
 use super::cyclic_basis::HALF_WIDTH;
 use super::mistuning_error::{FREE, shift};
 use super::receptance_error::sign;
-use super::rubin::{DEPENDENT, leading};
+use super::rubin::{DEPENDENCE_TOLERANCE, independent_eigenvectors};
 use super::{Damping, Deviation, ReducedSector, ReductionError, Row, UNSEEN, natural, product, symmetric};
 use crate::structure::sector::is_real;
-use crate::structure::{RingEntry, turn};
+use crate::structure::{RingEntry, unit_root};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::eigen;
@@ -39,7 +39,7 @@ pub(in crate::structure) const EXTENTS: [f64; 2] = [3.0, 6.0];
 /// Relative change of an eigenvalue in one step at which it counts as converged. The next step
 /// changes it by about a hundredth of that, because the omitted modes have nine times its
 /// eigenvalue. This is an error of 1e-7 at a resonance of half width [`HALF_WIDTH`].
-const SETTLED: f64 = 1e-5 * HALF_WIDTH;
+const EIGENVALUE_TOLERANCE: f64 = 1e-5 * HALF_WIDTH;
 /// Largest number of steps; three or four are typical.
 const STEPS: usize = 40;
 /// Inertia of a mode relative to its stiffness, in units of the largest, below which it has no
@@ -120,7 +120,7 @@ impl NominalRing {
 
     /// Returns the modes of the ring with these blade deviations. The iteration starts from
     /// nominal modes up to `extent`, one of [`EXTENTS`].
-    pub fn mixed(&self, deviations: &[f64], extent: f64) -> Result<MistunedModes, ReductionError> {
+    pub fn mistuned_modes(&self, deviations: &[f64], extent: f64) -> Result<MistunedModes, ReductionError> {
         let (n, highest, shift) = (self.mass.n(), self.up_to * self.up_to, shift(self.up_to));
         let blades = all_blades(&self.of_blade, deviations, self.sector.dofs())?;
         let sum = [(1.0, &self.stiffness), (1.0, &blades), (shift, &self.mass)];
@@ -150,7 +150,7 @@ impl NominalRing {
             }
             shapes = columns::combination(n, &moved, &mixing);
             let before = std::mem::replace(&mut values, thetas.iter().map(|theta| 1.0 / theta - shift).collect());
-            let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= SETTLED * (now + shift);
+            let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= EIGENVALUE_TOLERANCE * (now + shift);
             let inside = values.partition_point(|value| *value <= highest);
             if !std::mem::replace(&mut begun, true) || !values.iter().zip(&before).take(inside).all(stands) {
                 continue;
@@ -237,7 +237,7 @@ impl NominalRing {
             seen.column_mut(k).unscale_mut(*size);
             own[k].iter_mut().for_each(|of| *of /= size * size);
         }
-        let error = self.left_out((&own, &seen), &whole, at_highest);
+        let error = self.residual_error((&own, &seen), &whole, at_highest);
         let damping = self.damping.as_ref().map(|damping| {
             let mut of_modes = of_modes;
             for (mut row, root) in of_modes.row_iter_mut().zip(&root) {
@@ -257,7 +257,12 @@ impl NominalRing {
 
     /// Returns the relative error of a modal response under loads of random signs. Each place
     /// is scaled by its flexibility.
-    fn left_out(&self, (own, seen): (&[[f64; 2]], &DMatrix<f64>), flexibility: &[f64], at_highest: &Factor) -> f64 {
+    fn residual_error(
+        &self,
+        (own, seen): (&[[f64; 2]], &DMatrix<f64>),
+        flexibility: &[f64],
+        at_highest: &Factor,
+    ) -> f64 {
         let scale = |place: usize| if flexibility[place] > 0.0 { flexibility[place].sqrt().recip() } else { 0.0 };
         let loads = DVector::from_fn(self.seen.len(), |place, _| sign(place) * scale(place));
         let mut moved = vec![0.0; self.mass.n()];
@@ -338,7 +343,7 @@ fn nominal_modes(sector: &ReducedSector, sectors: usize, highest: f64) -> Result
         let scale = (if real { 1.0 } else { 2.0 } / sectors as f64).sqrt();
         for k in 0..inside {
             for s in 0..sectors {
-                let phase = turn((diameter * s) as i64, sectors) * scale;
+                let phase = unit_root((diameter * s) as i64, sectors) * scale;
                 all.extend((0..r).map(|i| match real {
                     true => shapes[(i, k)] * phase.re,
                     false => shapes[(i, k)] * phase.re - shapes[(r + i, k)] * phase.im,
@@ -352,7 +357,7 @@ fn nominal_modes(sector: &ReducedSector, sectors: usize, highest: f64) -> Result
 /// Returns independent combinations of residual vectors of unit stiffness, from their
 /// flexibility at the places and that of the whole ring.
 fn independent(flexible: &DMatrix<f64>, whole: &[f64]) -> Result<DMatrix<f64>, ReductionError> {
-    let moving: Vec<usize> = (0..whole.len()).filter(|&k| flexible[(k, k)] > DEPENDENT * whole[k]).collect();
+    let moving: Vec<usize> = (0..whole.len()).filter(|&k| flexible[(k, k)] > DEPENDENCE_TOLERANCE * whole[k]).collect();
     let size: Vec<f64> = moving.iter().map(|&k| flexible[(k, k)].sqrt()).collect();
     let gram = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
         let (a, b) = (moving[i], moving[k]);
@@ -361,7 +366,7 @@ fn independent(flexible: &DMatrix<f64>, whole: &[f64]) -> Result<DMatrix<f64>, R
     if moving.is_empty() {
         return Ok(DMatrix::zeros(whole.len(), 0));
     }
-    let few = leading(&gram).ok_or(ReductionError::OutOfRange)?;
+    let few = independent_eigenvectors(&gram).ok_or(ReductionError::OutOfRange)?;
     let mut weights = DMatrix::zeros(whole.len(), few.ncols());
     for (i, &row) in moving.iter().enumerate() {
         weights.set_row(row, &(few.row(i) / size[i]));

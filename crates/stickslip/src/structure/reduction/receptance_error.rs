@@ -18,11 +18,11 @@ use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes};
 const SAMPLES: usize = 9;
 /// Distance of a sample from a mode, relative to its frequency, unless the damping is larger:
 /// the half width of a resonance.
-const BESIDE: f64 = 1e-3;
+const MODE_DISTANCE: f64 = 1e-3;
 /// Samples closer than this, relative to the frequency, are merged.
-const SAME: f64 = 1e-4;
+const MERGE_DISTANCE: f64 = 1e-4;
 /// Relative shift of a sample that coincides with a mode of the whole structure.
-const NUDGE: f64 = 3e-5;
+const SAMPLE_SHIFT: f64 = 3e-5;
 /// Attempts to shift a sample away from a mode.
 const ATTEMPTS: usize = 5;
 
@@ -30,7 +30,7 @@ const ATTEMPTS: usize = 5;
 /// together, with [`PROBES`] vectors of random signs. Separate loads would need one solution
 /// per port and sample. The norm of the response to random signs is on average that of the
 /// matrix, here within a tenth.
-const ALONE: usize = 96;
+const MAX_SEPARATE_PORTS: usize = 96;
 const PROBES: usize = 48;
 
 /// ω in rad/s, and displacements of the ports under the loads in m.
@@ -64,11 +64,16 @@ impl Reference {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn new(whole: &Whole, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
-        Self::few(whole, modes, up_to, SAMPLES)
+        Self::with_samples(whole, modes, up_to, SAMPLES)
     }
 
     /// Computes at most `most` samples.
-    pub(super) fn few(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Result<Self, ReductionError> {
+    pub(super) fn with_samples(
+        whole: &Whole,
+        modes: &NaturalModes,
+        up_to: f64,
+        most: usize,
+    ) -> Result<Self, ReductionError> {
         Self::at(whole, &frequencies(whole, modes, up_to, most))
     }
 
@@ -78,7 +83,7 @@ impl Reference {
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn at(whole: &Whole, frequencies: &[f64]) -> Result<Self, ReductionError> {
         let ports = whole.ports.len();
-        let alone = ports <= ALONE;
+        let alone = ports <= MAX_SEPARATE_PORTS;
         let local = local_sizes(whole);
         let mut factors = Factors { whole, last: None };
         let loads = match alone {
@@ -149,7 +154,7 @@ impl Factors<'_> {
     fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<ReceptanceSample, ReductionError> {
         let mut failed = ReductionError::OutOfRange;
         for attempt in 0..ATTEMPTS {
-            let omega = omega * (1.0 + NUDGE * attempt as f64);
+            let omega = omega * (1.0 + SAMPLE_SHIFT * attempt as f64);
             match self.answers(omega, together) {
                 Ok(receptance) => return Ok((omega, receptance)),
                 Err(error) => failed = error,
@@ -227,14 +232,14 @@ pub(super) fn sign(number: usize) -> f64 {
 /// elastic mode to the end of the range.
 fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
     let beside = match whole.damping {
-        Damping::Ratio { ratio, .. } => ratio.max(BESIDE),
-        _ => BESIDE,
+        Damping::Ratio { ratio, .. } => ratio.max(MODE_DISTANCE),
+        _ => MODE_DISTANCE,
     };
     let inside: Vec<f64> = modes
         .values
         .iter()
         .map(|value| value.max(0.0).sqrt())
-        .filter(|omega| *omega > SAME * up_to && *omega < up_to)
+        .filter(|omega| *omega > MERGE_DISTANCE * up_to && *omega < up_to)
         .collect();
     let mut all = Vec::new();
     for (k, omega) in inside.iter().enumerate() {
@@ -244,10 +249,10 @@ fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> 
     all.push(0.5 * inside.first().copied().unwrap_or(up_to));
     // equal modes, as in a square section, have no middle; at a mode, rounding would dominate
     // the error
-    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= SAME * mode));
+    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= MERGE_DISTANCE * mode));
     all.push(up_to);
     all.sort_by(f64::total_cmp);
-    all.dedup_by(|next, kept| *next - *kept < SAME * *kept);
+    all.dedup_by(|next, kept| *next - *kept < MERGE_DISTANCE * *kept);
     // evenly spaced indices of mixed parity keep both kinds of samples
     let last = all.len() - 1;
     let mut at: Vec<usize> = (0..most.min(all.len())).map(|i| i * last / (most - 1).min(last).max(1)).collect();

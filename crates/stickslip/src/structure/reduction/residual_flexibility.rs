@@ -16,7 +16,7 @@
 //! Nakagawa and Wittbrodt (1997), "A critique of mode acceleration and modal truncation
 //! augmentation methods for modal response analysis".
 
-use super::{AT_ONCE, ReductionError, Whole};
+use super::{COLUMN_BLOCK, ReductionError, Whole};
 use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
 
 /// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
@@ -42,8 +42,8 @@ pub(super) fn basis(
     let mut basis = Vec::with_capacity(modes.shapes.len() + n * ports * order);
     basis.extend_from_slice(&modes.shapes);
     for block in 0..order {
-        for first in (0..ports).step_by(AT_ONCE) {
-            let numbers = first..ports.min(first + AT_ONCE);
+        for first in (0..ports).step_by(COLUMN_BLOCK) {
+            let numbers = first..ports.min(first + COLUMN_BLOCK);
             let mut some = match block.checked_sub(1) {
                 Some(last) => {
                     let at = modes.shapes.len() + last * ports * n;

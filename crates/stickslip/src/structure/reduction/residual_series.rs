@@ -7,7 +7,8 @@
 //! `Q₍ᵢ₊ⱼ₊₁₎ = Xᵢᵀ M Xⱼ`. The error decreases like `((ω² - σ) / (λ - σ))²ᴶ`, with λ of the
 //! first omitted mode.
 //!
-//! Sources: Hansteen and Bell (1979); Dickens, Nakagawa and Wittbrodt (1997), as in `residual_flexibility`.
+//! Sources: Hansteen and Bell (1979); Dickens, Nakagawa and Wittbrodt (1997), as in
+//! `residual_flexibility`.
 
 use super::{Damping, Free, ReductionError};
 use nalgebra::{Complex, DMatrix};
@@ -41,7 +42,7 @@ impl Series {
         if matches!(damping, Damping::Matrix(_)) {
             return Err(ReductionError::SeriesDamping);
         }
-        let blocks: Vec<DMatrix<f64>> = (0..free.counts.1).map(|order| free.block(modes, order)).collect();
+        let blocks: Vec<DMatrix<f64>> = (0..free.counts.1).map(|order| free.residual_vectors(modes, order)).collect();
         let term = |j: usize| match j.checked_sub(1) {
             None => &free.ports * &blocks[0],
             Some(last) => blocks[last / 2].transpose() * &free.mass * &blocks[j / 2],

@@ -11,11 +11,11 @@
 //! retains it. With order J, the receptance agrees with that of the whole structure at σ in the
 //! first 2 J terms of its series, in addition to the modes.
 //!
-//! Sources: as in `residual_flexibility`; Craig and Chang (1977), "On the use of attachment modes in
-//! substructure coupling for dynamic analysis".
+//! Sources: as in `residual_flexibility`; Craig and Chang (1977), "On the use of attachment modes
+//! in substructure coupling for dynamic analysis".
 
 use super::{
-    AT_ONCE, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual_flexibility, symmetric,
+    COLUMN_BLOCK, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual_flexibility, symmetric,
 };
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ use stickslip_numerics::sparse::{Matrix, NaturalModes, columns};
 /// Relative stiffness below which residual vectors of unit size are linearly dependent. This
 /// occurs for ports that observe the same motion, up to rounding. A port whose residual
 /// flexibility is below this fraction of its total flexibility has only rounding there.
-pub(super) const DEPENDENT: f64 = 1e-11;
+pub(super) const DEPENDENCE_TOLERANCE: f64 = 1e-11;
 
 /// Modes and residual vectors, the source of reductions.
 #[derive(Debug, Clone)]
@@ -88,7 +88,7 @@ impl<'a> Free<'a> {
     }
 
     /// Returns `Xⱼ` for fewer modes, as a combination of the basis.
-    pub(super) fn block(&self, modes: usize, order: usize) -> DMatrix<f64> {
+    pub(super) fn residual_vectors(&self, modes: usize, order: usize) -> DMatrix<f64> {
         let (k, p) = (self.modes(), self.counts.0);
         let mut combination = DMatrix::zeros(self.mass.nrows(), p);
         for port in 0..p {
@@ -147,7 +147,7 @@ impl<'a> Free<'a> {
         };
         let mut vectors = DMatrix::zeros(all, 0);
         for order in 0..order {
-            let mut block = self.block(modes, order);
+            let mut block = self.residual_vectors(modes, order);
             // twice: the second pass removes the rounding of the first
             for _ in 0..if vectors.is_empty() { 1 } else { 2 } {
                 block -= product(&vectors, &along(&vectors, &self.stiffness, &block));
@@ -170,8 +170,8 @@ fn square(matrix: &Matrix, basis: &[f64]) -> DMatrix<f64> {
     let n = matrix.n().max(1);
     let all = basis.len() / n;
     let mut square = DMatrix::zeros(all, all);
-    for first in (0..all).step_by(AT_ONCE) {
-        let last = all.min(first + AT_ONCE);
+    for first in (0..all).step_by(COLUMN_BLOCK) {
+        let last = all.min(first + COLUMN_BLOCK);
         let moved = matrix.times_columns(&basis[first * n..last * n]);
         let below = columns::products(n, &basis[first * n..], &moved);
         for (k, i) in (first..last).flat_map(|k| (k..all).map(move |i| (k, i))) {
@@ -205,9 +205,9 @@ pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> O
     let unit = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
         energies[(moving[i], moving[k])] / (size(moving[i]) * size(moving[k]))
     });
-    let mut weights = match all_independent(&unit) {
+    let mut weights = match inverse_factor_if_independent(&unit) {
         Some(weights) => weights,
-        None => leading(&unit)?,
+        None => independent_eigenvectors(&unit)?,
     };
     for (mut row, &i) in weights.row_iter_mut().zip(&moving) {
         row /= size(i);
@@ -218,8 +218,8 @@ pub(super) fn independent(vectors: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> O
 /// Returns `L⁻ᵀ` of `A = L Lᵀ` with a unit diagonal, if the vectors are certainly independent.
 ///
 /// The largest eigenvalue is at most n, and the smallest is at least the reciprocal of the
-/// trace of `A⁻¹`. `None` means that their ratio could be below [`DEPENDENT`].
-fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// trace of `A⁻¹`. `None` means that their ratio could be below [`DEPENDENCE_TOLERANCE`].
+fn inverse_factor_if_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = unit.nrows();
     let mut lower = unit.clone();
     if !cholesky_in_blocks(lower.as_mut_slice(), n) {
@@ -227,14 +227,14 @@ fn all_independent(unit: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     let mut inverse = DMatrix::identity(n, n);
     solve_lower_in_blocks(lower.as_slice(), n, inverse.as_mut_slice(), true);
-    (DEPENDENT * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
+    (DEPENDENCE_TOLERANCE * n as f64 * inverse.norm_squared() < 1.0).then_some(inverse)
 }
 
 /// Returns eigenvectors divided by the square roots of their eigenvalues, without those at the
 /// level of rounding. They are independent combinations of vectors with these products.
-pub(super) fn leading(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(super) fn independent_eigenvectors(products: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (values, vectors) = eigen::symmetric_in_blocks(products)?;
-    let least = DEPENDENT * values.last().copied().unwrap_or(0.0);
+    let least = DEPENDENCE_TOLERANCE * values.last().copied().unwrap_or(0.0);
     let kept: Vec<usize> = (0..values.len()).filter(|&k| values[k] > least).collect();
     let mut vectors = vectors.select_columns(&kept);
     for (mut column, &k) in vectors.column_iter_mut().zip(&kept) {

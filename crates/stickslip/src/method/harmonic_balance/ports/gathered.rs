@@ -138,7 +138,7 @@ fn along(lines: &[CollinearAxis], others: &[CollinearAxis]) -> Option<f64> {
     if lines.len() != others.len() {
         return None;
     }
-    let mut factors = lines.iter().zip(others).map(|(line, other)| line.along(other));
+    let mut factors = lines.iter().zip(others).map(|(line, other)| line.ratio_to(other));
     let first = factors.next()??;
     factors.all(|factor| factor.is_some_and(|f| (f - first).abs() <= PARALLEL * first.abs())).then_some(first)
 }
@@ -150,7 +150,7 @@ fn times(kernel: &Kernel, other: &Kernel, factor: f64) -> Option<f64> {
         (Kernel::Rigid(rigid), Kernel::Rigid(other)) => Some(rigid.limit / other.limit),
         (Kernel::Prox(one), Kernel::Prox(other)) => {
             let as_fast = (factor.abs() - 1.0).abs() <= PARALLEL;
-            if as_fast && (factor > 0.0 || other.law.is_odd()) { one.law.times(&*other.law) } else { None }
+            if as_fast && (factor > 0.0 || other.law.is_odd()) { one.law.force_ratio(&*other.law) } else { None }
         }
         _ => None,
     }
