@@ -136,5 +136,5 @@ fn stiffness(law: &dyn Law) -> f64 {
     // the stiffness of a cubic spring depends on the motion
     let is = |parameter: &Parameter| parameter.key == "stiffness" && parameter.dimension == Dimension::STIFFNESS;
     let linear = law.info().parameters.iter().any(is);
-    law.value("stiffness").filter(|_| linear && !law.is_free()).unwrap_or(0.0)
+    law.value("stiffness").filter(|_| linear && !law.carries_no_force()).unwrap_or(0.0)
 }

@@ -31,8 +31,8 @@ impl Reference {
         for joint in &mut model.joints {
             let law: &dyn Law = &*joint.law;
             let changed: Option<SharedLaw> = match self {
-                Reference::Free => law.free(),
-                Reference::Stuck => law.stuck(),
+                Reference::Free => law.frictionless_reference(),
+                Reference::Stuck => law.stuck_reference(),
             };
             let none =
                 || self.missing(&format!("the law `{}` of joint `{}` has no slip limit", law.name(), joint.name));

@@ -7,7 +7,7 @@ use crate::words::significant;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::law::Piece;
+use stickslip::law::IdealElement;
 use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, JointMotion, Orbit};
 use stickslip::structure::Reduction;
@@ -159,7 +159,8 @@ impl Note {
     fn history(model: &Model, orbit: &Orbit) -> Option<Note> {
         let stuck = orbit.evidence.history.first()?.clone();
         let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
-        let is_rigid = |piece: &Piece| matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
+        let is_rigid =
+            |piece: &IdealElement| matches!(piece, IdealElement::Slider(slider) if slider.stiffness.is_none());
         let holds = |joint: &Joint| joint.law.pieces().unwrap_or_default().iter().any(is_rigid);
         let rigid = orbit.evidence.stuck.iter().any(|name| joint_of(name).is_some_and(holds));
         // An elastic stuck joint relaxes near the mean of the motion. A contact that stays
@@ -403,9 +404,9 @@ impl Note {
 
 /// Returns whether a law without memory has another stiffness at a larger amplitude.
 fn is_curved(joint: &Joint, motion: &JointMotion) -> bool {
-    let is_elastic = joint.law.rate().is_some_and(|rate| rate.states() == 0) && joint.law.scale().is_infinite();
+    let is_elastic = joint.law.rate().is_some_and(|rate| rate.states() == 0) && joint.law.force_scale().is_infinite();
     let (low, high) = motion.displacement.first().copied().unwrap_or_default();
-    let stiffness = |amplitude: f64| joint.law.linearised(amplitude, 1.0).re;
+    let stiffness = |amplitude: f64| joint.law.describing_function(amplitude, 1.0).re;
     is_elastic && high > low && stiffness(high - low) != stiffness(0.5 * (high - low))
 }
 

@@ -222,7 +222,9 @@ fn for_nodes(
     };
     let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();
     match (stated, directions) {
-        (false, Some(directions @ 2..)) => law.with(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone()),
+        (false, Some(directions @ 2..)) => {
+            law.with_value(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone())
+        }
         _ => law.clone(),
     }
 }

@@ -85,7 +85,7 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
         if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
             return None; // the modes are unknown
         }
-        if one.survey.system().joints().iter().any(|joint| joint.law().scale().is_infinite()) {
+        if one.survey.system().joints().iter().any(|joint| joint.law().force_scale().is_infinite()) {
             return None; // a force without a bound shifts resonances beyond those of small motion
         }
         // friction puts the resonance between the frequencies of a mode with the joint free and

@@ -275,7 +275,7 @@ pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> S
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
     let mut model = template.model_with(changes).unwrap_or_else(|error| panic!("{error}"));
     for joint in &mut model.joints {
-        joint.law = law(joint.law.scale());
+        joint.law = law(joint.law.force_scale());
     }
     model.assemble().expect("well formed")
 }

@@ -184,7 +184,7 @@ fn forces_beyond_a_slip_limit_are_reported_whole() {
             worst = worst.max((balance - now.joints[0].force[0]).abs());
             largest = largest.max(balance.abs());
         }
-        assert!(largest > 1.2 * stickslip::law::Law::scale(&law), "{largest}: the slip limit is not passed");
+        assert!(largest > 1.2 * stickslip::law::Law::force_scale(&law), "{largest}: the slip limit is not passed");
         assert!(worst < 1e-3 * largest, "{}: {worst} of {largest}", method.name());
     }
 }

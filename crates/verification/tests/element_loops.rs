@@ -117,7 +117,7 @@ fn theory_2_4_describing_function() {
         close("w ceq", first.im, kt / PI * slip.sin().powi(2), 1e-9);
         close("w ceq, second form", first.im, 4.0 * FT / (PI * a) * (1.0 - d / a), 1e-9);
         close("w ceq from the loss", first.im, orbit.joints[0].dissipation / (PI * a * a), 1e-9);
-        let law = Jenkins { stiffness: kt, limit: FT }.linearised(a, 1.0);
+        let law = Jenkins { stiffness: kt, limit: FT }.describing_function(a, 1.0);
         assert!((law - first).norm() < 1e-9 * first.norm(), "{law} {first}");
         near("printed keq", first.re, printed.0, 0.5e-6);
         near("printed w ceq", first.im, printed.1, 0.5e-6);
@@ -127,8 +127,8 @@ fn theory_2_4_describing_function() {
     // limits: stuck, half, far
     let law = Jenkins { stiffness: 2.0, limit: FT };
     let d = FT / 2.0;
-    assert_eq!(law.linearised(d, 1.0), Complex64::new(2.0, 0.0));
-    let half = law.linearised(2.0 * d, 1.0);
+    assert_eq!(law.describing_function(d, 1.0), Complex64::new(2.0, 0.0));
+    let half = law.describing_function(2.0 * d, 1.0);
     assert!((half - Complex64::new(1.0, 2.0 / PI)).norm() < 1e-15);
     let far = 1e6;
     let orbit = element(2.0, far * d, 1.0);
@@ -197,7 +197,7 @@ fn theory_3_1_arctan_dashpot_under_harmonic_motion() {
         let first = limit * 4.0 / PI * ((1.0 + z * z).sqrt() - 1.0) / z;
         let digits = 1e-9 + 1e-15 / (z * z); // `(√(1 + z²) - 1)/z` cancels for small z
         close("loss", orbit.joints[0].dissipation, PI * a * first, digits);
-        let law = CoulombArctan { limit, alpha }.linearised(a, omega);
+        let law = CoulombArctan { limit, alpha }.describing_function(a, omega);
         close("linearised", law.im * a, first, digits);
         // smaller intervals towards the reversals, where the arctangent is steep
         let mut breaks = vec![FRAC_PI_2, PI, 3.0 * FRAC_PI_2];

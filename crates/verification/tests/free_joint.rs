@@ -24,7 +24,9 @@ const LOSSLESS: f64 = 1e-8;
 fn laws() -> Vec<(&'static str, SharedLaw, SharedLaw)> {
     let rows = law::TABLE.iter().map(|row| (row.name, row.sample()));
     rows.filter(|(_, law)| law.directions() == 1)
-        .filter_map(|(name, law)| Some((name, law.clone(), law.free().filter(|law| law.is_free())?)))
+        .filter_map(|(name, law)| {
+            Some((name, law.clone(), law.frictionless_reference().filter(|law| law.carries_no_force())?))
+        })
         .collect()
 }
 

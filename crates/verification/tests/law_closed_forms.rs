@@ -5,7 +5,8 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::law::{
-    BoucWen, Cubic, Dahl, FrictionContact, Gap, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Piece, Stribeck, Valanis,
+    BoucWen, Cubic, Dahl, FrictionContact, Gap, IdealElement, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Stribeck,
+    Valanis,
 };
 use stickslip_verification::replay::{Instant, View, forces, lost, steps};
 use stickslip_verification::{close, integral, near, zero};
@@ -68,7 +69,7 @@ fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form
         let times = steps(1.0, 5, 1);
         let found = forces(&law, View::Pieces, &along(&places), &times);
         near("loss", lost(&along(&places), &times[1..], &found[1..]), loss, 1e-12);
-        let linear = law.linearised(a, 3.0);
+        let linear = law.describing_function(a, 3.0);
         near("stiffness", linear.re, keq, 5e-7);
         near("damping", linear.im, ceq, 5e-7);
     }
@@ -147,7 +148,7 @@ fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
         close("backbone", force[1], expected, 5e-4);
     }
     near("all slips", first(&law(1000), View::Pieces, &[0.0, 2.0 * far], 1)[1], 1.0, 1e-12);
-    close("at rest", law(32).linearised(1e-12, 1.0).re, 10.0, 1e-12);
+    close("at rest", law(32).describing_function(1e-12, 1.0).re, 10.0, 1e-12);
 }
 
 /// (11.4) without sliders: the law itself. Amplitudes go from a thousandth of full slip to
@@ -192,8 +193,10 @@ fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
         .unwrap()
         .iter()
         .filter_map(|piece| match piece {
-            Piece::Slider(slider) => Some(2.0 * slider.limit / slider.stiffness.unwrap()).filter(|way| *way < 2.0 * u),
-            Piece::Stop { .. } => None,
+            IdealElement::Slider(slider) => {
+                Some(2.0 * slider.limit / slider.stiffness.unwrap()).filter(|way| *way < 2.0 * u)
+            }
+            IdealElement::Stop { .. } => None,
         })
         .collect();
     slips.sort_by(f64::total_cmp);
@@ -264,7 +267,7 @@ fn theory_11_6_bouc_wen_and_lugre_contain_dahl() {
             near(law.name(), *found, *expected, 1e-12);
         }
     }
-    near("bound", bouc_wen.scale(), 2.0, 1e-14);
+    near("bound", bouc_wen.force_scale(), 2.0, 1e-14);
 }
 
 /// (11.15): a long motion to one side ends at the bound for any gamma and exponent. Without
@@ -302,7 +305,7 @@ fn theory_11_6_lugre_slides_steadily_with_its_curve_and_holds_like_a_spring() {
 
 /// Parallel sliders with a given force of first loading, linear between its corners.
 #[derive(Debug)]
-struct Graded(Vec<Piece>);
+struct Graded(Vec<IdealElement>);
 
 static GRADED: LawInfo = LawInfo {
     name: "graded",
@@ -322,7 +325,7 @@ impl Law for Graded {
     fn is_odd(&self) -> bool {
         true
     }
-    fn pieces(&self) -> Option<Vec<Piece>> {
+    fn pieces(&self) -> Option<Vec<IdealElement>> {
         Some(self.0.clone())
     }
 }
@@ -336,7 +339,8 @@ impl Graded {
             edges.windows(2).map(|pair| (backbone(pair[1]) - backbone(pair[0])) / (pair[1] - pair[0])).collect();
         slopes.push(0.0);
         // the slider that slips at a corner has the change of slope as its stiffness
-        let piece = |k: usize| Piece::slider(Some(slopes[k] - slopes[k + 1]), (slopes[k] - slopes[k + 1]) * corners[k]);
+        let piece =
+            |k: usize| IdealElement::slider(Some(slopes[k] - slopes[k + 1]), (slopes[k] - slopes[k + 1]) * corners[k]);
         Graded((0..corners.len()).map(piece).collect())
     }
 }
@@ -573,7 +577,7 @@ fn valanis_turns_along_a_logarithm() {
         near("turned", back, 2.0 * (u - way) - 10.0 / 3.0 * y, 1e-9);
     }
     let far = first(&law, View::Rate, &[0.0, 30.0], FINE)[FINE];
-    near("slip", far, 2.0 * 30.0 + law.scale(), 1e-9);
+    near("slip", far, 2.0 * 30.0 + law.force_scale(), 1e-9);
 }
 
 #[test]
@@ -588,7 +592,7 @@ fn springs_of_any_shape_lose_nothing() {
     // closed while `cos θ > gap / a`: `(k/π) (θ - sin θ cos θ)`
     let closed = (0.2f64 / 0.8).acos();
     let expected = 5.0 / PI * (closed - closed.sin() * closed.cos());
-    close("gap", gap.linearised(0.8, 1.0).re, expected, 1e-14);
+    close("gap", gap.describing_function(0.8, 1.0).re, expected, 1e-14);
 }
 
 #[test]
@@ -601,7 +605,7 @@ fn stribecks_describing_function_is_a_mean_of_its_curve() {
             (2.0 + 0.5 * (-share * share).exp()) * theta.sin()
         };
         let expected = 4.0 / (PI * a) * integral(friction, PI / 2.0, &[]);
-        let found = law.linearised(a, omega);
+        let found = law.describing_function(a, omega);
         close("damping", found.im, expected, 1e-3);
         near("stiffness", found.re, 0.0, 1e-3 * expected);
     }

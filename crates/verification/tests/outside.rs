@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::law::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, SharedLaw, Step, StepLaw};
+use stickslip::law::{Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion, SharedLaw, StepLaw, StepView};
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
 use stickslip::method::transient::Transient;
@@ -53,10 +53,10 @@ impl Law for TwoSurfaces {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
 }
@@ -65,7 +65,7 @@ impl RateLaw for TwoSurfaces {
     fn states(&self) -> usize {
         2
     }
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let v = motion.velocity[0];
         // without a limit it carries nothing, whatever its states are
         let share = if self.limit > 0.0 { 1.0 / self.limit } else { 0.0 };
@@ -108,10 +108,10 @@ impl Law for Hardening {
         true
     }
     /// Without a limit the law is two springs in series, with an unbounded force.
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         if self.limit > 0.0 { self.limit } else { f64::INFINITY }
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }
 }
@@ -237,13 +237,13 @@ impl Law for Wrong {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         1.0
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         if self.by_rate { None } else { Some(self) }
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         if self.by_rate { Some(self) } else { None }
     }
 }
@@ -275,7 +275,7 @@ impl RateLaw for Wrong {
     fn state_scale(&self) -> f64 {
         self.size
     }
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         rate[0] = motion.velocity[0] - z[0];
         self.force(motion.displacement[0])
     }
@@ -326,10 +326,10 @@ impl Law for OneSided {
     fn is_odd(&self) -> bool {
         true
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         if self.by_rate { None } else { Some(self) }
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         if self.by_rate { Some(self) } else { None }
     }
 }
@@ -351,7 +351,7 @@ impl StepLaw for OneSided {
 }
 
 impl RateLaw for OneSided {
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         Self::force(motion.displacement[0])
     }
 }

@@ -9,7 +9,7 @@
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use stickslip::law::{Contact, Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
+use stickslip::law::{Contact, Coulomb, Gap, IdealElement, Jenkins, Law, LawInfo, Parameter, SharedLaw, Stribeck};
 use stickslip::method::event_driven::{EventDriven, Subharmonic};
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::time_history::{Excitation, TimeHistory};
@@ -309,9 +309,9 @@ impl Law for Mixed {
     fn is_odd(&self) -> bool {
         false
     }
-    fn pieces(&self) -> Option<Vec<Piece>> {
-        let stop = Piece::Stop { gap: 0.4, stiffness: 3.0 };
-        Some(vec![Piece::slider(Some(2.0), 0.3), stop, Piece::slider(None, 0.1)])
+    fn pieces(&self) -> Option<Vec<IdealElement>> {
+        let stop = IdealElement::Stop { gap: 0.4, stiffness: 3.0 };
+        Some(vec![IdealElement::slider(Some(2.0), 0.3), stop, IdealElement::slider(None, 0.1)])
     }
 }
 
@@ -622,9 +622,9 @@ fn a_drop_behind_a_spring_is_refused() {
         fn is_odd(&self) -> bool {
             true
         }
-        fn pieces(&self) -> Option<Vec<Piece>> {
+        fn pieces(&self) -> Option<Vec<IdealElement>> {
             let slider = stickslip::law::Slider { stiffness: Some(2.0), limit: 0.3, static_limit: 0.4 };
-            Some(vec![Piece::Slider(slider)])
+            Some(vec![IdealElement::Slider(slider)])
         }
     }
     let system = oscillator(1.0, 0.1, &[Arc::new(Dropping)]).assemble().unwrap();

@@ -108,7 +108,7 @@ impl Line {
                 a[n + i][n + k] = -system.structure().damping()[(i, k)] / mass;
             }
             g[n + i] = force[i].re / mass;
-            h[n + i] = w[i] * system.joints()[0].law().scale() / mass;
+            h[n + i] = w[i] * system.joints()[0].law().force_scale() / mass;
             c[n + i] = w[i];
         }
         Line { n, a, g, h, c }
@@ -242,7 +242,7 @@ fn compare(system: &System, hertz: f64) -> bool {
         });
         b - a
     };
-    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law().scale() * slide, 1e-8);
+    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law().force_scale() * slide, 1e-8);
     true
 }
 

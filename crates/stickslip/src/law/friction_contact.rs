@@ -18,7 +18,8 @@
 
 use super::kernels::planar_slip;
 use super::{
-    Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Reach, SharedLaw, Step, StepLaw, StepSlopes, TANGENTS,
+    Contact, DisplacementBox, Law, LawInfo, MAX_DIRECTIONS, Parameter, Range, SharedLaw, StepDerivatives, StepLaw,
+    StepView, TANGENTS,
 };
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -38,14 +39,14 @@ pub(super) static INFO: LawInfo = LawInfo {
             Range::Any,
             "normal load at zero displacement; an elastic structure relieves part of it; negative: a gap of -preload/normal",
         )
-        .or(0.0),
+        .with_default(0.0),
         Parameter::new(
             TANGENTS,
             Dimension::NONE,
             Range::Count(2),
             "number of tangential directions; by default that of the nodes",
         )
-        .or(2.0),
+        .with_default(2.0),
     ],
     sample: &[10_000.0, 15_000.0, 0.3, 6.0, 2.0],
     build: |values| {
@@ -99,30 +100,30 @@ impl Law for FrictionContact {
     fn normal(&self) -> Option<usize> {
         Some(self.tangents)
     }
-    fn pressed_by(&self, force: f64) -> Option<SharedLaw> {
+    fn with_preload(&self, force: f64) -> Option<SharedLaw> {
         (self.preload <= 0.0).then(|| Arc::new(FrictionContact { preload: force, ..*self }) as SharedLaw)
     }
-    fn closed(&self) -> Option<Vec<f64>> {
+    fn closed_stiffness(&self) -> Option<Vec<f64>> {
         Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())
     }
     /// The slip limit at zero displacement; infinite without a preload or friction.
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         let limit = self.friction * self.preload;
         if limit > 0.0 { limit } else { f64::INFINITY }
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }
     /// Closing and opening differ.
     fn is_odd(&self) -> bool {
         false
     }
-    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+    fn contact_state(&self, velocity: &[f64], force: &[f64]) -> Contact {
         let normal = force[self.tangents];
         if normal <= 0.0 {
             return Contact::Open;
         }
-        Contact::at_limit(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
+        Contact::of_sticking_law(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
     }
 }
 
@@ -131,19 +132,19 @@ impl StepLaw for FrictionContact {
         self.tangents
     }
     fn state_scale(&self) -> f64 {
-        if self.scale().is_finite() { self.scale() } else { 1.0 }
+        if self.force_scale().is_finite() { self.force_scale() } else { 1.0 }
     }
     #[inline]
     fn advance<S: Real>(
         &self,
-        from: &[S; MOST_DIRECTIONS],
-        to: &[S; MOST_DIRECTIONS],
+        from: &[S; MAX_DIRECTIONS],
+        to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
-    ) -> [S; MOST_DIRECTIONS] {
+    ) -> [S; MAX_DIRECTIONS] {
         let zero = S::from(0.0);
-        let load = |u: &[S; MOST_DIRECTIONS]| u[self.tangents] * self.normal + self.preload;
+        let load = |u: &[S; MAX_DIRECTIONS]| u[self.tangents] * self.normal + self.preload;
         let (before, after) = (load(from), load(to));
-        let mut out = [zero; MOST_DIRECTIONS];
+        let mut out = [zero; MAX_DIRECTIONS];
         if after.re() <= 0.0 {
             z.fill(zero);
             return out;
@@ -179,19 +180,19 @@ impl StepLaw for FrictionContact {
         out[self.tangents] = after;
         out
     }
-    fn tangent(
+    fn analytic_derivatives(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-        slopes: StepSlopes<'_>,
-    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        slopes: StepDerivatives<'_>,
+    ) -> Option<[f64; MAX_DIRECTIONS]> {
         let (t, directions) = (self.tangents, slopes.directions);
-        let load = |u: &[f64; MOST_DIRECTIONS]| u[t] * self.normal + self.preload;
+        let load = |u: &[f64; MAX_DIRECTIONS]| u[t] * self.normal + self.preload;
         let (before, after) = (load(from), load(to));
         slopes.force.fill(0.0);
         slopes.state.fill(0.0);
-        let mut out = [0.0; MOST_DIRECTIONS];
+        let mut out = [0.0; MAX_DIRECTIONS];
         if after <= 0.0 {
             z.fill(0.0);
             return Some(out);
@@ -236,14 +237,18 @@ impl StepLaw for FrictionContact {
         out[t] = after;
         Some(out)
     }
-    fn holds(&self, (from, z): (&[f64; MOST_DIRECTIONS], &[f64]), Reach { mean, reach }: Reach<'_>) -> bool {
+    fn sticks_throughout(
+        &self,
+        (from, z): (&[f64; MAX_DIRECTIONS], &[f64]),
+        DisplacementBox { mean, half_width }: DisplacementBox<'_>,
+    ) -> bool {
         let t = self.tangents;
         let closed = self.preload + self.normal * from[t];
-        let least = self.preload + self.normal * (mean[t] - reach[t]);
+        let least = self.preload + self.normal * (mean[t] - half_width[t]);
         let at_mean = (0..t).map(|a| z[a] + self.tangential * (mean[a] - from[a]));
         let length = |squares: f64| squares.sqrt();
-        let pull =
-            length(at_mean.map(|f| f * f).sum()) + self.tangential * length(reach[..t].iter().map(|u| u * u).sum());
+        let pull = length(at_mean.map(|f| f * f).sum())
+            + self.tangential * length(half_width[..t].iter().map(|u| u * u).sum());
         // A straight path between two states inside the friction cone stays inside it.
         closed > 0.0 && least > 0.0 && pull < self.friction * least
     }
@@ -320,10 +325,10 @@ mod tests {
         }
         fn advance<S: Real>(
             &self,
-            from: &[S; MOST_DIRECTIONS],
-            to: &[S; MOST_DIRECTIONS],
+            from: &[S; MAX_DIRECTIONS],
+            to: &[S; MAX_DIRECTIONS],
             z: &mut [S],
-        ) -> [S; MOST_DIRECTIONS] {
+        ) -> [S; MAX_DIRECTIONS] {
             self.0.advance(from, to, z)
         }
     }
@@ -349,8 +354,8 @@ mod tests {
             z.iter_mut().for_each(|z| *z *= 0.99);
             let n = tangents + 1;
             let (mut hand, mut dual) = (StepPoint::new(n, tangents), StepPoint::new(n, tangents));
-            Step::linearise(&law, n, &from, &to, &z, &mut hand);
-            Step::linearise(&ByDuals(law), n, &from, &to, &z, &mut dual);
+            StepView::advance_with_derivatives(&law, n, &from, &to, &z, &mut hand);
+            StepView::advance_with_derivatives(&ByDuals(law), n, &from, &to, &z, &mut dual);
             let load = |u: &[f64; 3]| law.preload + law.normal * u[tangents];
             met[if load(&to) <= 0.0 { 0 } else { 1 + usize::from(load(&from) < 0.0) }] += 1;
             let rows = |point: &StepPoint| -> Vec<f64> {
@@ -376,7 +381,7 @@ mod tests {
         let signal = |of: fn(f64) -> f64| (0..n).map(|i| of(angle(i))).collect::<Vec<f64>>();
         let path = [signal(f64::cos), signal(|t| (2.0 * t).sin()), signal(|t| 0.8 * (t - 1.0).sin())];
         let around = |z: &mut [f64], trail: &mut [f64], force: &mut [Vec<f64>; 3]| {
-            Step::around(&law, 3, &path, (z, trail), force, None);
+            StepView::advance_cycle(&law, 3, &path, (z, trail), force, None);
         };
         let fresh = || (vec![f64::NAN; 2 * n], [(); 3].map(|()| vec![0.0; n]));
         let (mut trail, mut force) = fresh();
@@ -395,8 +400,8 @@ mod tests {
     #[test]
     fn contact_states_follow_force_and_load() {
         let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.5, preload: 1.0, tangents: 2 };
-        assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0]), Contact::Open);
-        assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.3, 0.4, 1.0]), Contact::Slip);
-        assert_eq!(law.contact(&[0.0, 0.0, 0.0], &[0.1, 0.1, 1.0]), Contact::Stick);
+        assert_eq!(law.contact_state(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0]), Contact::Open);
+        assert_eq!(law.contact_state(&[1.0, 0.0, 0.0], &[0.3, 0.4, 1.0]), Contact::Slip);
+        assert_eq!(law.contact_state(&[0.0, 0.0, 0.0], &[0.1, 0.1, 1.0]), Contact::Stick);
     }
 }

@@ -23,9 +23,9 @@
 use super::interface::describing_function;
 use super::interface::ideal_elements::UNREACHABLE_LIMIT;
 use super::interface::masing::{
-    MAX_LEGS, Masing, advance_legs, complex_stiffness, first_unreversed_leg, leg_count, leg_force,
+    MAX_LEGS, MasingView, advance_legs, complex_stiffness, first_unreversed_leg, leg_count, leg_force,
 };
-use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Step, StepLaw, StepSlopes};
+use super::{IdealElement, Law, LawInfo, MAX_DIRECTIONS, Parameter, Range, StepDerivatives, StepLaw, StepView};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -63,7 +63,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             Range::UpTo(MAX_ELEMENTS),
             "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
         )
-        .or(0.0),
+        .with_default(0.0),
     ],
     sample: &[10_000.0, 2.0, -0.5, 0.3, 0.0],
     build: |values| {
@@ -84,7 +84,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{Iwan, Law};
 /// let law = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
 /// // the force of first loading at macro-slip
-/// let far = law.slips_at();
+/// let far = law.slip_displacement();
 /// assert!((law.masing().unwrap().backbone(far).0 - 2.0).abs() < 1e-14);
 /// // 32 sliders and the spring that slips last
 /// assert_eq!(Iwan { elements: 32, ..law }.pieces().unwrap().len(), 33);
@@ -144,14 +144,14 @@ impl Law for Iwan {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn macro_slip(&self) -> Option<f64> {
+    fn macro_slip_displacement(&self) -> Option<f64> {
         (self.limit > 0.0).then(|| self.slips_at())
     }
     /// Available with a positive number of elements. A slip limit of zero gives no parts.
-    fn pieces(&self) -> Option<Vec<Piece>> {
+    fn pieces(&self) -> Option<Vec<IdealElement>> {
         if self.limit == 0.0 {
             return Some(Vec::new());
         }
@@ -167,27 +167,27 @@ impl Law for Iwan {
             0 => 0.0,
             bin => (-GRADING / f64::from(count).sqrt() * f64::from(count - bin)).exp(),
         };
-        let mut pieces: Vec<Piece> = (0..count)
+        let mut pieces: Vec<IdealElement> = (0..count)
             .map(|bin| {
                 let [from, to] = [edge(bin), edge(bin + 1)];
                 let spring = stiffness * (to.powf(chi + 1.0) - from.powf(chi + 1.0));
                 let slip = limit * (to.powf(chi + 2.0) - from.powf(chi + 2.0));
-                Piece::slider(Some(spring * self.limit / far), slip * self.limit)
+                IdealElement::slider(Some(spring * self.limit / far), slip * self.limit)
             })
             .collect();
         if self.beta > 0.0 {
             let last = self.limit * self.beta / self.denominator();
-            pieces.push(Piece::slider(Some(last / far), last));
+            pieces.push(IdealElement::slider(Some(last / far), last));
         }
         Some(pieces)
     }
-    fn masing(&self) -> Option<&dyn Masing> {
+    fn masing(&self) -> Option<&dyn MasingView> {
         (self.elements == 0 && self.limit > 0.0).then_some(self)
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         (self.elements == 0 && self.limit > 0.0).then_some(self)
     }
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
         match (self.masing(), amplitude > 0.0) {
             (Some(law), true) => complex_stiffness(law, amplitude),
             (Some(_), false) => self.stiffness.into(),
@@ -199,7 +199,7 @@ impl Law for Iwan {
     fn is_incrementally_passive(&self) -> bool {
         true // each spring-slider is passive
     }
-    fn consistent(&self) -> Result<(), String> {
+    fn check_consistency(&self) -> Result<(), String> {
         if self.chi > -1.0 {
             return Ok(());
         }
@@ -207,7 +207,7 @@ impl Law for Iwan {
     }
 }
 
-impl Masing for Iwan {
+impl MasingView for Iwan {
     fn backbone(&self, displacement: f64) -> (f64, f64) {
         let far = self.slips_at();
         let slope = match displacement / far {
@@ -218,7 +218,7 @@ impl Masing for Iwan {
         };
         (self.first_loading(displacement), slope)
     }
-    fn slips_at(&self) -> f64 {
+    fn slip_displacement(&self) -> f64 {
         Iwan::slips_at(self)
     }
 }
@@ -233,10 +233,10 @@ impl StepLaw for Iwan {
     }
     fn advance<S: Real>(
         &self,
-        from: &[S; MOST_DIRECTIONS],
-        to: &[S; MOST_DIRECTIONS],
+        from: &[S; MAX_DIRECTIONS],
+        to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
-    ) -> [S; MOST_DIRECTIONS] {
+    ) -> [S; MAX_DIRECTIONS] {
         advance_legs(z, to[0] - from[0], self.slips_at(), |k, leg| leg_force(k, leg, |u| self.first_loading(u)));
         let legs = z.iter().take_while(|leg| leg.re() != 0.0).enumerate();
         let force: S = legs.map(|(k, leg)| leg_force(k, *leg, |u| self.first_loading(u))).sum();
@@ -246,13 +246,13 @@ impl StepLaw for Iwan {
     }
     /// All legs but the last are unchanged. The last leg is the sum of the step and the legs
     /// that it merges with.
-    fn tangent(
+    fn analytic_derivatives(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-        slopes: StepSlopes<'_>,
-    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        slopes: StepDerivatives<'_>,
+    ) -> Option<[f64; MAX_DIRECTIONS]> {
         let before = leg_count(z);
         // The step may drop or merge legs.
         if before == z.len() || first_unreversed_leg(&z[..before]).is_some() {
@@ -283,9 +283,9 @@ mod tests {
     use super::*;
 
     /// Returns the force of first loading and the energy dissipated per cycle of the sliders.
-    fn of_pieces(pieces: &[Piece], u: f64) -> (f64, f64) {
+    fn of_pieces(pieces: &[IdealElement], u: f64) -> (f64, f64) {
         pieces.iter().fold((0.0, 0.0), |(force, loss), piece| {
-            let Piece::Slider(slider) = piece else { panic!("{piece:?}") };
+            let IdealElement::Slider(slider) = piece else { panic!("{piece:?}") };
             let hold = slider.limit / slider.stiffness.unwrap();
             (force + slider.limit * (u / hold).min(1.0), loss + 4.0 * slider.limit * (u - hold).max(0.0))
         })
@@ -316,9 +316,9 @@ mod tests {
             let zero = Dual::<18>::from(0.0);
             let force = law.advance(&[a, zero, zero], &[b, zero, zero], &mut dual)[0];
             let (mut of_force, mut of_state) = (vec![0.0; 18], vec![0.0; 18 * MAX_LEGS]);
-            let slopes = StepSlopes { directions: 1, force: &mut of_force, state: &mut of_state };
+            let slopes = StepDerivatives { directions: 1, force: &mut of_force, state: &mut of_state };
             let full = z[MAX_LEGS - 1] != 0.0;
-            let found = law.tangent(&[u, 0.0, 0.0], &[to, 0.0, 0.0], &mut z, slopes);
+            let found = law.analytic_derivatives(&[u, 0.0, 0.0], &[to, 0.0, 0.0], &mut z, slopes);
             assert_eq!(found.is_none(), full);
             if let Some(found) = found {
                 assert!((found[0] - force.re).abs() < 1e-14);
@@ -344,8 +344,9 @@ mod tests {
                 let law = Iwan { stiffness: 10.0, limit: 1.0, chi, beta, elements: 32 };
                 let pieces = law.pieces().unwrap();
                 let sum = |of: fn(&super::super::Slider) -> f64| {
-                    let each =
-                        pieces.iter().map(|piece| if let Piece::Slider(slider) = piece { of(slider) } else { 0.0 });
+                    let each = pieces
+                        .iter()
+                        .map(|piece| if let IdealElement::Slider(slider) = piece { of(slider) } else { 0.0 });
                     each.sum::<f64>()
                 };
                 assert!((sum(|slider| slider.limit) - 1.0).abs() < 1e-13, "all limits are FS");

@@ -62,8 +62,9 @@ pub use dahl::Dahl;
 pub use friction_contact::FrictionContact;
 pub use gap::Gap;
 pub use interface::{
-    BuildError, Contact, Law, LawError, LawInfo, MOST_DIRECTIONS, Masing, Mean, Parameter, Piece, Prox, Range, Rate,
-    RateLaw, RatePoint, Reach, Relative, SharedLaw, Slider, Sliding, Step, StepLaw, StepPoint, StepSlopes, TANGENTS,
+    BuildError, Contact, DisplacementBox, IdealElement, Law, LawError, LawInfo, MAX_DIRECTIONS, MasingView, Parameter,
+    ProxView, Range, RateLaw, RatePoint, RateView, RelativeMotion, SampleMeans, SharedLaw, Slider, SlidingView,
+    StepDerivatives, StepLaw, StepPoint, StepView, TANGENTS,
 };
 pub use iwan::Iwan;
 pub use jenkins::Jenkins;

@@ -224,5 +224,5 @@ pub(crate) const NEAR_REST: f64 = 1e-3;
 /// Returns true if a law carries no force: it is free, or it consists only of sliders with zero
 /// limit.
 pub(crate) fn carries_nothing(law: &SharedLaw) -> bool {
-    law.is_free() || law.sliders().is_some_and(|sliders| sliders.is_empty())
+    law.carries_no_force() || law.sliders().is_some_and(|sliders| sliders.is_empty())
 }

@@ -87,7 +87,8 @@ mod tests {
     use super::*;
     use crate::dimension::Dimension;
     use crate::law::{
-        Coulomb, FrictionContact, Gap, Jenkins, Jenkins2d, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw,
+        Coulomb, FrictionContact, Gap, Jenkins, Jenkins2d, Law, LawInfo, Parameter, RateLaw, RateView, RelativeMotion,
+        StepLaw,
     };
     use crate::method::harmonic_balance::{self, HarmonicBalance};
     use crate::method::shooting::Shooting;
@@ -141,13 +142,13 @@ mod tests {
         fn directions(&self) -> usize {
             if matches!(self, Sample::Relaxing) { 1 } else { 2 }
         }
-        fn scale(&self) -> f64 {
+        fn force_scale(&self) -> f64 {
             if matches!(self, Sample::Sliding) { SLIDING.1 } else { f64::INFINITY }
         }
-        fn rate(&self) -> Option<&dyn Rate> {
+        fn rate(&self) -> Option<&dyn RateView> {
             if matches!(self, Sample::Sliding) { None } else { Some(self) }
         }
-        fn step(&self) -> Option<&dyn crate::law::Step> {
+        fn step(&self) -> Option<&dyn crate::law::StepView> {
             if matches!(self, Sample::Sliding) { Some(self) } else { None }
         }
     }
@@ -156,7 +157,7 @@ mod tests {
         fn states(&self) -> usize {
             if matches!(self, Sample::Plane) { 0 } else { 2 }
         }
-        fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
             let ([u, w, _], [v, q, _], zero) = (motion.displacement, motion.velocity, S::from(0.0));
             match self {
                 Sample::Plane | Sample::Sliding => [u * 3.0 + v * 0.2, w * 3.0 + q * 0.2, zero],

@@ -3,7 +3,7 @@
 use super::assembly::{Assembly, PlacedLaw};
 use super::drive::Drive;
 use super::steps::{Instant, Steps};
-use crate::law::{Contact, MOST_DIRECTIONS, Relative};
+use crate::law::{Contact, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::{Axis, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
@@ -97,14 +97,19 @@ impl SteppedPath {
     }
 
     /// Returns the forces of a joint at `s` in [0, 1] of a step with the given relative motion.
-    fn forces(&self, joint: &PlacedLaw, (step, s): (usize, f64), motion: &Relative<f64>) -> [f64; MOST_DIRECTIONS] {
+    fn forces(
+        &self,
+        joint: &PlacedLaw,
+        (step, s): (usize, f64),
+        motion: &RelativeMotion<f64>,
+    ) -> [f64; MAX_DIRECTIONS] {
         if let Some(rate) = joint.law.rate().filter(|_| joint.states == 0 && self.steps.nodes.len() > 1) {
-            return rate.value(motion, &[], &mut []);
+            return rate.evaluate_values(motion, &[], &mut []);
         }
-        let mut force = [0.0; MOST_DIRECTIONS];
+        let mut force = [0.0; MAX_DIRECTIONS];
         // a limit bounds the force along one direction; along several it bounds at most their
         // norm
-        let scale = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
+        let scale = if joint.directions == 1 { joint.law.force_scale() } else { f64::INFINITY };
         joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, scale));
         force
     }
@@ -115,13 +120,13 @@ impl SteppedPath {
             return self.steps.contact_at_end(step)[joint];
         }
         let (joint, length) = (&self.assembly.joints[joint], self.steps.spans[step].1);
-        let mut motion = Relative::along(0.0, 0.0);
+        let mut motion = RelativeMotion::along(0.0, 0.0);
         for (d, axis) in joint.axes().enumerate() {
             let [from, to] = self.relative_ends(step, axis);
             (motion.displacement[d], motion.velocity[d], _) = quintic(s, length, from, to);
         }
         let force = self.forces(joint, (step, s), &motion);
-        joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
+        joint.law.contact_state(&motion.velocity[..joint.directions], &force[..joint.directions])
     }
 
     /// Returns the first `s` in [0, 1], at most `to`, at which a joint leaves the contact state
@@ -154,7 +159,7 @@ impl SteppedPath {
     fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
         let sample = |(q, joint): (usize, &PlacedLaw)| {
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
@@ -163,7 +168,7 @@ impl SteppedPath {
                 values.iter_mut().for_each(|value| *value *= sign);
             }
             let contact = if count > 1 && !self.steps.jumps {
-                joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
+                joint.law.contact_state(&motion.velocity[..joint.directions], &force[..joint.directions])
             } else {
                 let contact = self.steps.contact_at_end(step)[q];
                 if sign < 0.0 { contact.mirrored() } else { contact }

@@ -300,7 +300,7 @@ impl PlaceCollector<'_> {
         of: impl Fn(usize) -> PlaceSource,
     ) -> Result<(), ModelError> {
         check_identifier(name, element, "name", is_identifier)?;
-        if directions.len() > crate::law::MOST_DIRECTIONS {
+        if directions.len() > crate::law::MAX_DIRECTIONS {
             let message = format!("a node has at most three directions, found {}", directions.len());
             return Err(ModelError::new(element, "directions", message));
         }

@@ -13,7 +13,7 @@ mod sampled_path;
 mod stability;
 
 pub use crate::law::Contact;
-use crate::law::{Piece, SharedLaw, Slider};
+use crate::law::{IdealElement, SharedLaw, Slider};
 use crate::model::System;
 pub use error::{Breakdown, Course, OrbitError};
 pub use evidence::{Accuracy, Evidence};
@@ -74,11 +74,11 @@ pub(crate) fn history_dependent_joints<'a>(
     let holds = |law: &SharedLaw, motion: &JointMotion| {
         let travel = motion.displacement.first().map_or(0.0, |(low, high)| high - low);
         let sliders = law.pieces().into_iter().flatten().filter_map(|piece| match piece {
-            Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => Some((stiffness, limit)),
+            IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => Some((stiffness, limit)),
             _ => None,
         });
         let mut reaches = sliders.filter(|(_, limit)| *limit > 0.0).map(|(stiffness, limit)| limit / stiffness);
-        let inner = law.masing().is_some_and(|law| travel <= 2.0 * law.slips_at());
+        let inner = law.masing().is_some_and(|law| travel <= 2.0 * law.slip_displacement());
         stuck.contains(&motion.name) || inner || reaches.any(|reach| travel <= 2.0 * reach)
     };
     let kept = laws.zip(joints).filter(|(law, motion)| holds(law, motion));

@@ -1,7 +1,7 @@
 //! A motion that can be evaluated at any time.
 
 use super::Symmetry;
-use crate::law::{Contact, MOST_DIRECTIONS};
+use crate::law::{Contact, MAX_DIRECTIONS};
 use nalgebra::DMatrix;
 
 /// State of a motion at one instant.
@@ -24,11 +24,11 @@ pub struct Sample {
 pub struct JointSample {
     /// Relative displacement in the joint's directions, m. In this and the following arrays,
     /// only the joint's directions are used.
-    pub displacement: [f64; MOST_DIRECTIONS],
+    pub displacement: [f64; MAX_DIRECTIONS],
     /// Relative velocity, m/s.
-    pub velocity: [f64; MOST_DIRECTIONS],
+    pub velocity: [f64; MAX_DIRECTIONS],
     /// Force, N.
-    pub force: [f64; MOST_DIRECTIONS],
+    pub force: [f64; MAX_DIRECTIONS],
     /// Contact state.
     pub contact: Contact,
 }

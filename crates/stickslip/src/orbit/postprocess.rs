@@ -159,7 +159,7 @@ pub(crate) fn results<S: PathSignals>(
         let ContactSummary { shares, switches, sticks_throughout } = signals.faces(j);
         // A law without a slip limit never slips, and a smooth law always creeps. Neither counts
         // as stuck, because their orbits are unique.
-        if sticks_throughout && joint.law().scale().is_finite() && joint.law().rate().is_none() {
+        if sticks_throughout && joint.law().force_scale().is_finite() && joint.law().rate().is_none() {
             stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {

@@ -26,7 +26,7 @@ use crate::words::shown_hertz;
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
-use stickslip::law::MOST_DIRECTIONS;
+use stickslip::law::MAX_DIRECTIONS;
 use stickslip::model::{Axis as Along, Model};
 use stickslip::orbit::{Orbit, Sample};
 use stickslip_numerics::quadrature::FIVE;
@@ -71,7 +71,7 @@ pub(super) const KIND: Kind = Kind {
 fn cost(costing: &Costing<'_>) -> Cost {
     let (values, points) = (&costing.case.values, costing.points());
     let loops = match values.names("loop") {
-        _ if values.flag("sum") == Some(true) => MOST_DIRECTIONS as f64,
+        _ if values.flag("sum") == Some(true) => MAX_DIRECTIONS as f64,
         None if costing.joints == 0.0 => costing.case.model.motions.len() as f64,
         _ => wanted(values, &costing.case.model).len() as f64,
     };

@@ -55,12 +55,12 @@ impl Contact {
 
     /// Returns the state of a smooth law from its force relative to its limit, over all
     /// directions. With a limit of zero the faces slip in the direction of the velocity.
-    pub fn by_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
+    pub fn of_smooth_law(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
         Contact::from_fraction(SMOOTH_SLIP_FRACTION, limit, velocity, force)
     }
 
     /// Returns the state of a law that sticks below its limit.
-    pub fn at_limit(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
+    pub fn of_sticking_law(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
         Contact::from_fraction(AT_LIMIT, limit, velocity, force)
     }
 

@@ -1,7 +1,7 @@
 //! The describing function of a law: the first harmonic of its periodic force under a harmonic
 //! motion.
 
-use crate::law::{MOST_DIRECTIONS, Piece, Prox, Rate, RatePoint, Relative, Slider, Step};
+use crate::law::{IdealElement, MAX_DIRECTIONS, ProxView, RatePoint, RateView, RelativeMotion, Slider, StepView};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -22,10 +22,10 @@ const SCALED_PENALTY: f64 = 1e6;
 /// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
 /// first available view, in the order of the arguments.
 pub(in crate::law) fn complex_stiffness(
-    pieces: Option<Vec<Piece>>,
-    rate: Option<&dyn Rate>,
-    step: Option<&dyn Step>,
-    (prox, directions): (Option<&dyn Prox>, usize),
+    pieces: Option<Vec<IdealElement>>,
+    rate: Option<&dyn RateView>,
+    step: Option<&dyn StepView>,
+    (prox, directions): (Option<&dyn ProxView>, usize),
     (amplitude, omega): (f64, f64),
 ) -> Complex64 {
     // At zero amplitude, use a tiny amplitude. The limit of small motion would need a length
@@ -39,10 +39,10 @@ pub(in crate::law) fn complex_stiffness(
     }
     if let Some(step) = step {
         let mut z = vec![0.0; step.states()];
-        let mut before = [0.0; MOST_DIRECTIONS];
+        let mut before = [0.0; MAX_DIRECTIONS];
         return first_harmonic(a, |theta| {
             let to = [a * theta.cos(), 0.0, 0.0];
-            let force = step.value(&before, &to, &mut z)[0];
+            let force = step.advance_values(&before, &to, &mut z)[0];
             before = to;
             force
         });
@@ -51,7 +51,7 @@ pub(in crate::law) fn complex_stiffness(
     let penalty = SCALED_PENALTY / (a * omega);
     let rigid = first_harmonic(a, |theta| {
         let y = -penalty * a * omega * theta.sin();
-        let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
+        let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
         prox.resolve(&[y, 0.0, 0.0][..directions], penalty, &mut force, &mut slope);
         force[0]
     });
@@ -60,11 +60,13 @@ pub(in crate::law) fn complex_stiffness(
 }
 
 /// Returns the complex stiffness of one ideal part in closed form.
-pub(in crate::law) fn slider_or_stop(piece: &Piece, amplitude: f64) -> Complex64 {
+pub(in crate::law) fn slider_or_stop(piece: &IdealElement, amplitude: f64) -> Complex64 {
     match *piece {
-        Piece::Slider(Slider { limit: 0.0, .. }) => ZERO,
-        Piece::Slider(Slider { stiffness: None, limit, .. }) => Complex64::new(0.0, 4.0 * limit / (PI * amplitude)),
-        Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
+        IdealElement::Slider(Slider { limit: 0.0, .. }) => ZERO,
+        IdealElement::Slider(Slider { stiffness: None, limit, .. }) => {
+            Complex64::new(0.0, 4.0 * limit / (PI * amplitude))
+        }
+        IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
             let hold = limit / stiffness;
             if amplitude <= hold {
                 return Complex64::new(stiffness, 0.0);
@@ -74,7 +76,7 @@ pub(in crate::law) fn slider_or_stop(piece: &Piece, amplitude: f64) -> Complex64
             Complex64::new(slip - sin * cos, sin * sin) * (stiffness / PI)
         }
         // closed while cos θ > gap / amplitude
-        Piece::Stop { gap, stiffness } => {
+        IdealElement::Stop { gap, stiffness } => {
             let share = if amplitude > 0.0 { gap / amplitude } else { f64::INFINITY.copysign(gap) };
             let closed = share.clamp(-1.0, 1.0).acos();
             let (sin, cos) = closed.sin_cos();
@@ -98,7 +100,7 @@ fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex6
 }
 
 /// Integrates the states by the implicit Euler method, which is stable for any stiffness.
-fn rate_law(rate: &dyn Rate, amplitude: f64, omega: f64) -> Complex64 {
+fn rate_law(rate: &dyn RateView, amplitude: f64, omega: f64) -> Complex64 {
     let states = rate.states();
     let length = TAU / (omega * SAMPLES as f64);
     let mut z = vec![0.0; states];
@@ -106,10 +108,10 @@ fn rate_law(rate: &dyn Rate, amplitude: f64, omega: f64) -> Complex64 {
     let mut point = RatePoint::new(1, states);
     first_harmonic(amplitude, |theta| {
         let (sin, cos) = theta.sin_cos();
-        let motion = Relative::along(amplitude * cos, -amplitude * omega * sin);
+        let motion = RelativeMotion::along(amplitude * cos, -amplitude * omega * sin);
         let before = z.clone();
         for _ in 0..if states == 0 { 0 } else { ITERATIONS } {
-            rate.linearise(1, &motion, &z, &mut point);
+            rate.evaluate_with_derivatives(1, &motion, &z, &mut point);
             let residual = DVector::from_fn(states, |s, _| z[s] - before[s] - length * point.rate[s]);
             let jacobian = DMatrix::from_fn(states, states, |s, t| {
                 f64::from(u8::from(s == t)) - length * point.rate_slope(s)[2 + t]
@@ -120,6 +122,6 @@ fn rate_law(rate: &dyn Rate, amplitude: f64, omega: f64) -> Complex64 {
         if z.iter().any(|z| !z.is_finite()) {
             z = before;
         }
-        rate.value(&motion, &z, &mut rates)[0]
+        rate.evaluate_values(&motion, &z, &mut rates)[0]
     })
 }

@@ -2,7 +2,7 @@
 
 /// An ideal part of a law. The parts of one law act in parallel and have the same displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Piece {
+pub enum IdealElement {
     /// Sticks while its force is below its limit, and slips with the force at its limit.
     Slider(Slider),
     /// A spring that acts only beyond a gap: `f = stiffness max(u - gap, 0)`.
@@ -26,22 +26,22 @@ pub struct Slider {
     pub static_limit: f64,
 }
 
-impl Piece {
+impl IdealElement {
     /// Returns a slider with equal static and dynamic limits.
     pub fn slider(stiffness: Option<f64>, limit: f64) -> Self {
-        Piece::Slider(Slider { stiffness, limit, static_limit: limit })
+        IdealElement::Slider(Slider { stiffness, limit, static_limit: limit })
     }
 
     /// Tells whether this is a slider whose static limit exceeds its dynamic limit.
-    pub fn drops(&self) -> bool {
-        matches!(self, Piece::Slider(slider) if slider.static_limit > slider.limit)
+    pub fn has_force_drop(&self) -> bool {
+        matches!(self, IdealElement::Slider(slider) if slider.static_limit > slider.limit)
     }
 
     /// Tells whether the part never carries a force.
     pub(crate) fn carries_no_force(&self) -> bool {
         match self {
-            Piece::Slider(slider) => slider.static_limit == 0.0,
-            Piece::Stop { stiffness, .. } => *stiffness == 0.0,
+            IdealElement::Slider(slider) => slider.static_limit == 0.0,
+            IdealElement::Stop { stiffness, .. } => *stiffness == 0.0,
         }
     }
 }

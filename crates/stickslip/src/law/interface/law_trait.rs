@@ -1,8 +1,8 @@
 //! The trait of all laws, and the description of a law in the table.
 
 use super::describing_function;
-use super::ideal_elements::{Piece, Slider};
-use crate::law::{Contact, Masing, Parameter, Prox, Rate, Sliding, Step};
+use super::ideal_elements::{IdealElement, Slider};
+use crate::law::{Contact, MasingView, Parameter, ProxView, RateView, SlidingView, StepView};
 use num_complex::Complex64;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt::Debug;
@@ -18,7 +18,7 @@ pub type SharedLaw = Arc<dyn Law>;
 /// ```
 /// use std::sync::Arc;
 /// use stickslip::dimension::Dimension;
-/// use stickslip::law::{Law, LawInfo, Parameter, Rate, RateLaw, Relative};
+/// use stickslip::law::{Law, LawInfo, Parameter, RateView, RateLaw, RelativeMotion};
 /// use stickslip_numerics::dual::Real;
 ///
 /// #[derive(Debug)]
@@ -39,11 +39,11 @@ pub type SharedLaw = Arc<dyn Law>;
 ///     fn info(&self) -> &'static LawInfo { &INFO }
 ///     fn values(&self) -> Vec<f64> { vec![self.stiffness, self.growth] }
 ///     fn is_odd(&self) -> bool { true }
-///     fn rate(&self) -> Option<&dyn Rate> { Some(self) }
+///     fn rate(&self) -> Option<&dyn RateView> { Some(self) }
 /// }
 ///
 /// impl RateLaw for Stiffening {
-///     fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+///     fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
 ///         let u = motion.displacement[0];
 ///         let force = (u + u * u * u * S::from(self.growth)) * S::from(self.stiffness);
 ///         [force, S::from(0.0), S::from(0.0)]
@@ -52,7 +52,7 @@ pub type SharedLaw = Arc<dyn Law>;
 ///
 /// let law = Stiffening { stiffness: 1e4, growth: 1e6 };
 /// // the describing function of f = k (u + b u³) is k (1 + ¾ b a²)
-/// assert!((law.linearised(1e-3, 1.0).re - 1.75e4).abs() < 1e-6);
+/// assert!((law.describing_function(1e-3, 1.0).re - 1.75e4).abs() < 1e-6);
 /// ```
 pub trait Law: Debug + Send + Sync {
     /// Returns the table entry: name, summary, parameters.
@@ -74,55 +74,55 @@ pub trait Law: Debug + Send + Sync {
     /// Returns this law with its faces pressed together by `force` (N) at zero displacement. It
     /// describes small motions of a contact without preload that a constant load presses
     /// together. `None` if the law has no faces or already has a preload.
-    fn pressed_by(&self, _force: f64) -> Option<SharedLaw> {
+    fn with_preload(&self, _force: f64) -> Option<SharedLaw> {
         None
     }
     /// Returns the stiffness (N/m) in each direction while the faces are closed and stick.
     /// `None` if the faces cannot separate.
-    fn closed(&self) -> Option<Vec<f64>> {
+    fn closed_stiffness(&self) -> Option<Vec<f64>> {
         None
     }
     /// Returns the springs (N/m) of the two linear references: free of friction, and stuck. Each
     /// reference has one stiffness per direction. Laws that slip but have no parameter `limit`
     /// implement this.
-    fn springs(&self) -> Option<[Vec<f64>; 2]> {
+    fn reference_springs(&self) -> Option<[Vec<f64>; 2]> {
         None
     }
     /// Returns the relative displacement (m) at which the whole joint slips (macro-slip). Laws
     /// with gradual slip before it (micro-slip) implement this.
-    fn macro_slip(&self) -> Option<f64> {
+    fn macro_slip_displacement(&self) -> Option<f64> {
         None
     }
     /// Returns the magnitude of the law's forces, N, for tolerances and initial guesses: the
     /// slip limit, or infinity if the force is unbounded.
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         f64::INFINITY
     }
     /// Returns ideal sliders, springs and stops in parallel, if they represent the law exactly.
-    fn pieces(&self) -> Option<Vec<Piece>> {
+    fn pieces(&self) -> Option<Vec<IdealElement>> {
         None
     }
     /// Returns the rate view: a smooth force and the rates of the internal states.
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         None
     }
     /// Returns the step view: the force at the end of a step.
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         None
     }
     /// Returns the Masing view: the force of first loading of a one-dimensional law that follows
     /// Masing's rules with memory.
-    fn masing(&self) -> Option<&dyn Masing> {
+    fn masing(&self) -> Option<&dyn MasingView> {
         None
     }
     /// Returns the prox view: the resolvent of a velocity-dependent law.
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         None
     }
     /// Returns the sliding view: the friction curve of a law that is set-valued at rest. The
     /// curve is continuous at rest: slip begins at the force that the joint carries when it
     /// starts to slide.
-    fn sliding(&self) -> Option<&dyn Sliding> {
+    fn sliding(&self) -> Option<&dyn SlidingView> {
         None
     }
     /// Tells whether the force is odd: `f(-u) = -f(u)` for whole histories. Methods halve the
@@ -139,15 +139,15 @@ pub trait Law: Debug + Send + Sync {
     }
     /// Returns the contact state at this velocity (m/s) under this force (N), both given in the
     /// law's directions.
-    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+    fn contact_state(&self, velocity: &[f64], force: &[f64]) -> Contact {
         match self.rate() {
-            Some(_) => Contact::by_limit(self.scale(), velocity, force),
-            None => Contact::at_limit(self.scale(), velocity, force),
+            Some(_) => Contact::of_smooth_law(self.force_scale(), velocity, force),
+            None => Contact::of_sticking_law(self.force_scale(), velocity, force),
         }
     }
     /// Returns the complex stiffness (N/m) of the first harmonic under `u = amplitude cos Ωt` in
     /// the first direction. Methods build initial guesses from it.
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
         let directions = self.directions();
         describing_function::complex_stiffness(
             self.pieces(),
@@ -166,7 +166,7 @@ pub trait Law: Debug + Send + Sync {
     ///
     /// # Errors
     /// A sentence without the law's name, such as "`beta + gamma` is -1; it must be more than zero".
-    fn consistent(&self) -> Result<(), String> {
+    fn check_consistency(&self) -> Result<(), String> {
         Ok(())
     }
 }
@@ -203,9 +203,9 @@ impl dyn Law + '_ {
     /// Returns the sliders if the law consists of sliders alone. Parts that carry no force are
     /// left out.
     pub fn sliders(&self) -> Option<Vec<Slider>> {
-        let slider = |piece: &Piece| match piece {
-            Piece::Slider(slider) => Some(*slider),
-            Piece::Stop { .. } => None,
+        let slider = |piece: &IdealElement| match piece {
+            IdealElement::Slider(slider) => Some(*slider),
+            IdealElement::Stop { .. } => None,
         };
         self.pieces()?.iter().filter(|piece| !piece.carries_no_force()).map(slider).collect()
     }
@@ -223,9 +223,9 @@ impl dyn Law + '_ {
     /// ```
     /// use stickslip::law::{Dahl, Law};
     /// let law: &dyn Law = &Dahl { stiffness: 1e4, limit: 2.0 };
-    /// assert_eq!(law.with("limit", 3.0).unwrap().values(), [1e4, 3.0]);
+    /// assert_eq!(law.with_value("limit", 3.0).unwrap().values(), [1e4, 3.0]);
     /// ```
-    pub fn with(&self, key: &str, value: f64) -> Option<SharedLaw> {
+    pub fn with_value(&self, key: &str, value: f64) -> Option<SharedLaw> {
         let (info, mut values) = (self.info(), self.values());
         let at = info.parameters.iter().position(|p| p.key == key)?;
         values[at] = value;
@@ -242,12 +242,12 @@ impl dyn Law + '_ {
     /// assert_eq!(laws.map(|law| law.has_faces()), [true, true, false]);
     /// ```
     pub fn has_faces(&self) -> bool {
-        self.scale().is_finite() || self.closed().is_some()
+        self.force_scale().is_finite() || self.closed_stiffness().is_some()
     }
 
     /// Tells whether the law never carries a force: the magnitude of its forces is zero.
-    pub fn is_free(&self) -> bool {
-        self.scale() == 0.0
+    pub fn carries_no_force(&self) -> bool {
+        self.force_scale() == 0.0
     }
 }
 

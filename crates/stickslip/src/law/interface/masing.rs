@@ -21,13 +21,13 @@ use stickslip_numerics::dual::Real;
 use stickslip_numerics::quadrature;
 
 /// The Masing view: the curve of first loading.
-pub trait Masing: Debug + Send + Sync {
+pub trait MasingView: Debug + Send + Sync {
     /// Returns the force of first loading (N) at a non-negative displacement (m), and its slope
     /// (N/m).
     fn backbone(&self, displacement: f64) -> (f64, f64);
     /// Returns the displacement of macro-slip, m. Beyond it the force is constant, and the
     /// history is erased.
-    fn slips_at(&self) -> f64;
+    fn slip_displacement(&self) -> f64;
 }
 
 /// Number of legs in a state. A motion with more nested return points, such as a long decay, is
@@ -141,7 +141,7 @@ const PANELS: u32 = 8;
 /// Returns the complex stiffness (N/m) of the first harmonic of the periodic force under
 /// `u = amplitude cos θ`. In the half period of decreasing u the force is
 /// `B(a) - 2 B((a - u)/2)`; the other half mirrors it.
-pub(in crate::law) fn complex_stiffness(law: &dyn Masing, amplitude: f64) -> Complex64 {
+pub(in crate::law) fn complex_stiffness(law: &dyn MasingView, amplitude: f64) -> Complex64 {
     let top = law.backbone(amplitude).0;
     let mut sum = Complex64::ZERO;
     for panel in 0..PANELS {

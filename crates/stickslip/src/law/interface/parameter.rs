@@ -29,7 +29,7 @@ pub enum Range {
 
 impl Range {
     /// Tells whether `value` lies in the range.
-    pub fn has(self, value: f64) -> bool {
+    pub fn contains(self, value: f64) -> bool {
         value.is_finite()
             && match self {
                 Range::Positive => value > 0.0,
@@ -63,7 +63,7 @@ pub struct Parameter {
     /// Physical dimension, for units and error messages.
     pub dimension: Dimension,
     /// Key of another parameter; its value is the exponent to which the dimension is raised. See
-    /// [`Parameter::dimension_under`].
+    /// [`Parameter::dimension_for`].
     pub power: Option<&'static str>,
     /// Permitted values.
     pub range: Range,
@@ -91,16 +91,16 @@ impl Parameter {
     }
 
     /// Returns the parameter with its dimension raised to the value of another parameter.
-    pub const fn to_the(self, power: &'static str) -> Self {
+    pub const fn with_power_of(self, power: &'static str) -> Self {
         Parameter { power: Some(power), ..self }
     }
 
     /// Returns the dimension for given values of the other parameters. `None` if the exponent is
     /// not an integer. The parameter is then a plain number in SI, without a unit.
-    pub fn dimension_under(&self, value: impl Fn(&str) -> Option<f64>) -> Option<Dimension> {
+    pub fn dimension_for(&self, value: impl Fn(&str) -> Option<f64>) -> Option<Dimension> {
         match self.power {
             None => Some(self.dimension),
-            Some(power) => self.dimension.to_the(value(power)?),
+            Some(power) => self.dimension.pow(value(power)?),
         }
     }
 
@@ -110,13 +110,13 @@ impl Parameter {
     /// ```
     /// let parameter = |law, key| {
     ///     let row = stickslip::law::find(law).unwrap();
-    ///     row.parameters.iter().find(|p| p.key == key).unwrap().takes()
+    ///     row.parameters.iter().find(|p| p.key == key).unwrap().describe_values()
     /// };
     /// assert_eq!(parameter("dahl", "limit"), "force (N), zero or more");
     /// assert_eq!(parameter("bouc-wen", "gamma"), "inverse length (1/m) to the power `exponent`, of either sign");
     /// assert_eq!(parameter("friction-contact", "tangents"), "a whole number from 1 to 2; default 2");
     /// ```
-    pub fn takes(&self) -> String {
+    pub fn describe_values(&self) -> String {
         let power = self.power.map(|power| format!(" to the power `{power}`")).unwrap_or_default();
         let what = match (self.range, self.dimension) {
             (Range::Count(_) | Range::UpTo(_), _) => self.range.to_string(),
@@ -127,7 +127,7 @@ impl Parameter {
     }
 
     /// Returns the parameter with a default value, SI.
-    pub const fn or(self, default: f64) -> Self {
+    pub const fn with_default(self, default: f64) -> Self {
         Parameter { default: Some(default), ..self }
     }
 }

@@ -1,7 +1,7 @@
 //! The rate view: force and rates of the internal states, as smooth functions of the motion.
 
 use super::derivatives::{Derivatives, PASS_WIDTH, STACK_STATES, dual_argument};
-use super::relative_motion::{MOST_DIRECTIONS, Relative};
+use super::relative_motion::{MAX_DIRECTIONS, RelativeMotion};
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
 
@@ -20,26 +20,32 @@ pub trait RateLaw {
     }
     /// Writes into `z` the states at which the law carries a `force` (N) in its directions.
     /// Returns `false` if the force does not determine the states.
-    fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
+    fn state_from_force(&self, _force: &[f64], _z: &mut [f64]) -> bool {
         false
     }
     /// Returns the force (N) and writes the rates at one instant. `z` and `rate` have length
     /// [`RateLaw::states`]; the law defines their units.
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; MOST_DIRECTIONS];
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; MAX_DIRECTIONS];
 }
 
 /// The rate view as methods use it; every [`RateLaw`] implements it.
-pub trait Rate: Debug + Send + Sync {
+pub trait RateView: Debug + Send + Sync {
     /// Returns the number of internal states.
     fn states(&self) -> usize;
     /// Returns the typical magnitude of the states, see [`RateLaw::state_scale`].
     fn state_scale(&self) -> f64;
-    /// Writes the states at which the law carries a force, see [`RateLaw::state_under`].
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool;
+    /// Writes the states at which the law carries a force, see [`RateLaw::state_from_force`].
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool;
     /// Returns the force (N) and writes the rates at one instant.
-    fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS];
+    fn evaluate_values(&self, motion: &RelativeMotion<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MAX_DIRECTIONS];
     /// Evaluates force and rates with exact derivatives, in the first `directions`.
-    fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint);
+    fn evaluate_with_derivatives(
+        &self,
+        directions: usize,
+        motion: &RelativeMotion<f64>,
+        z: &[f64],
+        point: &mut RatePoint,
+    );
 }
 
 /// Force and rates of a law at one instant, with derivatives. The arguments are `u` in all
@@ -47,7 +53,7 @@ pub trait Rate: Debug + Send + Sync {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RatePoint {
     /// Force in each direction, N.
-    pub force: [f64; MOST_DIRECTIONS],
+    pub force: [f64; MAX_DIRECTIONS],
     /// Rates of the internal states.
     pub rate: Vec<f64>,
     /// Derivatives: one row per force, then one row per rate; one column per argument.
@@ -58,7 +64,7 @@ impl RatePoint {
     /// Allocates a point for a law with these numbers of directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
         RatePoint {
-            force: [0.0; MOST_DIRECTIONS],
+            force: [0.0; MAX_DIRECTIONS],
             rate: vec![0.0; states],
             slopes: Derivatives::new(directions, states),
         }
@@ -81,21 +87,27 @@ impl RatePoint {
     }
 }
 
-impl<L: RateLaw + Debug + Send + Sync> Rate for L {
+impl<L: RateLaw + Debug + Send + Sync> RateView for L {
     fn states(&self) -> usize {
         RateLaw::states(self)
     }
     fn state_scale(&self) -> f64 {
         RateLaw::state_scale(self)
     }
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
-        RateLaw::state_under(self, force, z)
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
+        RateLaw::state_from_force(self, force, z)
     }
     #[inline]
-    fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS] {
+    fn evaluate_values(&self, motion: &RelativeMotion<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MAX_DIRECTIONS] {
         self.evaluate(motion, z, rate)
     }
-    fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint) {
+    fn evaluate_with_derivatives(
+        &self,
+        directions: usize,
+        motion: &RelativeMotion<f64>,
+        z: &[f64],
+        point: &mut RatePoint,
+    ) {
         match 2 * directions + z.len() {
             0..=2 => dual_pass::<2, L>(self, directions, motion, z, 0, point),
             3 => dual_pass::<3, L>(self, directions, motion, z, 0, point),
@@ -115,13 +127,13 @@ impl<L: RateLaw + Debug + Send + Sync> Rate for L {
 fn dual_pass<const N: usize, L: RateLaw>(
     law: &L,
     directions: usize,
-    motion: &Relative<f64>,
+    motion: &RelativeMotion<f64>,
     z: &[f64],
     first: usize,
     point: &mut RatePoint,
 ) {
     let seeded = |value: f64, argument: usize| -> Dual<N> { dual_argument(value, argument, first) };
-    let mut moving = Relative::along(Dual::from(0.0), Dual::from(0.0));
+    let mut moving = RelativeMotion::along(Dual::from(0.0), Dual::from(0.0));
     for a in 0..directions {
         moving.displacement[a] = seeded(motion.displacement[a], a);
         moving.velocity[a] = seeded(motion.velocity[a], directions + a);

@@ -8,7 +8,7 @@
 use std::fmt::Debug;
 
 /// The friction force as a function of velocity.
-pub trait Sliding: Debug + Send + Sync {
+pub trait SlidingView: Debug + Send + Sync {
     /// Returns the friction force `g` (N) at a velocity (m/s) and its derivative (N s/m). `g` is
     /// even in the velocity. The branch of one direction is continued smoothly beyond zero
     /// velocity, because iterations may evaluate it there.

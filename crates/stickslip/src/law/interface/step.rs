@@ -2,7 +2,7 @@
 //! ends and the state before it.
 
 use super::derivatives::{Derivatives, PASS_WIDTH, STACK_STATES, dual_argument};
-use super::relative_motion::MOST_DIRECTIONS;
+use super::relative_motion::MAX_DIRECTIONS;
 use std::fmt::Debug;
 use stickslip_numerics::dual::{Dual, Real};
 
@@ -19,43 +19,43 @@ pub trait StepLaw {
     /// point `from` to the point `to`. Replaces `z` by the states at the end.
     fn advance<S: Real>(
         &self,
-        from: &[S; MOST_DIRECTIONS],
-        to: &[S; MOST_DIRECTIONS],
+        from: &[S; MAX_DIRECTIONS],
+        to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
-    ) -> [S; MOST_DIRECTIONS];
+    ) -> [S; MAX_DIRECTIONS];
     /// Advances numbers with hand-written derivatives, if the law has any; they cost a fifth of
     /// those by dual numbers. `slopes` gets one row for each of the first `directions` forces
     /// and one row for each state. The columns are the displacement before the step in all
     /// directions, the displacement after it, and the states before it.
-    fn tangent(
+    fn analytic_derivatives(
         &self,
-        _from: &[f64; MOST_DIRECTIONS],
-        _to: &[f64; MOST_DIRECTIONS],
+        _from: &[f64; MAX_DIRECTIONS],
+        _to: &[f64; MAX_DIRECTIONS],
         _z: &mut [f64],
-        _slopes: StepSlopes<'_>,
-    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        _slopes: StepDerivatives<'_>,
+    ) -> Option<[f64; MAX_DIRECTIONS]> {
         None
     }
     /// Tells whether the joint sticks during a whole motion. The motion leads straight from
-    /// `from` (m), with states `z`, to `mean` (m), and then stays within `reach` (m) of `mean`.
-    /// Force and states are then linear in the motion. `false` is always a valid answer.
-    fn holds(&self, _from: (&[f64; MOST_DIRECTIONS], &[f64]), _to: Reach<'_>) -> bool {
+    /// `from` (m), with states `z`, to `mean` (m), and then stays within `half_width` (m) of
+    /// `mean`. Force and states are then linear in the motion. `false` is always a valid answer.
+    fn sticks_throughout(&self, _from: (&[f64; MAX_DIRECTIONS], &[f64]), _to: DisplacementBox<'_>) -> bool {
         false
     }
 }
 
-/// Displacements within `reach` of `mean` in each direction, m.
+/// Displacements within `half_width` of `mean` in each direction, m.
 #[derive(Debug, Clone, Copy)]
-pub struct Reach<'a> {
+pub struct DisplacementBox<'a> {
     /// Centre of the motion, m.
-    pub mean: &'a [f64; MOST_DIRECTIONS],
+    pub mean: &'a [f64; MAX_DIRECTIONS],
     /// Largest distance from the centre, m.
-    pub reach: &'a [f64; MOST_DIRECTIONS],
+    pub half_width: &'a [f64; MAX_DIRECTIONS],
 }
 
 /// Output memory for the derivatives of a step: rows of the forces, and rows of the states.
 #[derive(Debug)]
-pub struct StepSlopes<'a> {
+pub struct StepDerivatives<'a> {
     /// Number of directions of the joint.
     pub directions: usize,
     /// Derivatives of the forces, row by row, one row per direction.
@@ -65,24 +65,24 @@ pub struct StepSlopes<'a> {
 }
 
 /// The step view as methods use it; every [`StepLaw`] implements it.
-pub trait Step: Debug + Send + Sync {
+pub trait StepView: Debug + Send + Sync {
     /// Returns the number of internal states.
     fn states(&self) -> usize;
     /// Returns the typical magnitude of the states, see [`StepLaw::state_scale`].
     fn state_scale(&self) -> f64;
     /// Returns the force (N) at the end of a step. Replaces `z` by the states there.
-    fn value(
+    fn advance_values(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-    ) -> [f64; MOST_DIRECTIONS];
+    ) -> [f64; MAX_DIRECTIONS];
     /// Advances a step with exact derivatives in the first `directions`, without changing `z`.
-    fn linearise(
+    fn advance_with_derivatives(
         &self,
         directions: usize,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &[f64],
         point: &mut StepPoint,
     );
@@ -97,16 +97,16 @@ pub trait Step: Debug + Send + Sync {
     /// previous cycle on this path, or NaN. Without `rows`, the cycle ends early when its states
     /// equal those of the previous cycle: the remaining forces are then already correct. With
     /// `rows`, the second array is set to NaN.
-    fn around(
+    fn advance_cycle(
         &self,
         directions: usize,
-        path: &[Vec<f64>; MOST_DIRECTIONS],
+        path: &[Vec<f64>; MAX_DIRECTIONS],
         states: (&mut [f64], &mut [f64]),
-        force: &mut [Vec<f64>; MOST_DIRECTIONS],
+        force: &mut [Vec<f64>; MAX_DIRECTIONS],
         rows: Option<&mut [f64]>,
     );
-    /// Tells whether the joint sticks, see [`StepLaw::holds`].
-    fn holds(&self, from: (&[f64; MOST_DIRECTIONS], &[f64]), to: Reach<'_>) -> bool;
+    /// Tells whether the joint sticks, see [`StepLaw::sticks_throughout`].
+    fn sticks_throughout(&self, from: (&[f64; MAX_DIRECTIONS], &[f64]), to: DisplacementBox<'_>) -> bool;
 }
 
 /// Force and states at the end of a step, with derivatives. The arguments are the displacement
@@ -114,7 +114,7 @@ pub trait Step: Debug + Send + Sync {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepPoint {
     /// Force in each direction, N.
-    pub force: [f64; MOST_DIRECTIONS],
+    pub force: [f64; MAX_DIRECTIONS],
     /// States at the end of the step.
     pub state: Vec<f64>,
     /// Derivatives: one row per force, then one row per state; one column per argument.
@@ -125,7 +125,7 @@ impl StepPoint {
     /// Allocates a point for a law with these numbers of directions and internal states.
     pub fn new(directions: usize, states: usize) -> Self {
         StepPoint {
-            force: [0.0; MOST_DIRECTIONS],
+            force: [0.0; MAX_DIRECTIONS],
             state: vec![0.0; states],
             slopes: Derivatives::new(directions, states),
         }
@@ -142,7 +142,7 @@ impl StepPoint {
     }
 }
 
-impl<L: StepLaw + Debug + Send + Sync> Step for L {
+impl<L: StepLaw + Debug + Send + Sync> StepView for L {
     fn states(&self) -> usize {
         StepLaw::states(self)
     }
@@ -150,26 +150,26 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
         StepLaw::state_scale(self)
     }
     #[inline]
-    fn value(
+    fn advance_values(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-    ) -> [f64; MOST_DIRECTIONS] {
+    ) -> [f64; MAX_DIRECTIONS] {
         self.advance(from, to, z)
     }
-    fn linearise(
+    fn advance_with_derivatives(
         &self,
         directions: usize,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &[f64],
         point: &mut StepPoint,
     ) {
         point.state.copy_from_slice(z);
         let (force, state) = point.slopes.force_and_state_mut();
-        let slopes = StepSlopes { directions, force, state };
-        if let Some(force) = self.tangent(from, to, &mut point.state, slopes) {
+        let slopes = StepDerivatives { directions, force, state };
+        if let Some(force) = self.analytic_derivatives(from, to, &mut point.state, slopes) {
             point.force = force;
             return;
         }
@@ -183,17 +183,17 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
             }
         }
     }
-    fn around(
+    fn advance_cycle(
         &self,
         directions: usize,
-        path: &[Vec<f64>; MOST_DIRECTIONS],
+        path: &[Vec<f64>; MAX_DIRECTIONS],
         (z, previous_states): (&mut [f64], &mut [f64]),
-        force: &mut [Vec<f64>; MOST_DIRECTIONS],
+        force: &mut [Vec<f64>; MAX_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) {
         let n = path[0].len();
         let at = |i: usize| std::array::from_fn(|a| if a < directions { path[a][i] } else { 0.0 });
-        let mut store = |i: usize, now: [f64; MOST_DIRECTIONS]| {
+        let mut store = |i: usize, now: [f64; MAX_DIRECTIONS]| {
             force.iter_mut().zip(now).take(directions).for_each(|(force, now)| force[i] = now);
         };
         let Some(rows) = rows else {
@@ -228,9 +228,9 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
             let to = at(i);
             let rows = &mut rows[i * (states + directions) * width..][..(states + directions) * width];
             let (state, slopes) = rows.split_at_mut(states * width);
-            let own = StepSlopes { directions, force: &mut *slopes, state: &mut *state };
-            let now = self.tangent(&from, &to, z, own).unwrap_or_else(|| {
-                self.linearise(directions, &from, &to, z, &mut point);
+            let own = StepDerivatives { directions, force: &mut *slopes, state: &mut *state };
+            let now = self.analytic_derivatives(&from, &to, z, own).unwrap_or_else(|| {
+                self.advance_with_derivatives(directions, &from, &to, z, &mut point);
                 let (of_forces, of_states) = point.slopes.force_and_state_mut();
                 slopes.copy_from_slice(of_forces);
                 state.copy_from_slice(of_states);
@@ -241,18 +241,18 @@ impl<L: StepLaw + Debug + Send + Sync> Step for L {
             from = to;
         }
     }
-    fn holds(&self, from: (&[f64; MOST_DIRECTIONS], &[f64]), to: Reach<'_>) -> bool {
-        StepLaw::holds(self, from, to)
+    fn sticks_throughout(&self, from: (&[f64; MAX_DIRECTIONS], &[f64]), to: DisplacementBox<'_>) -> bool {
+        StepLaw::sticks_throughout(self, from, to)
     }
 }
 
-/// Performs the steps of [`Step::around`] without derivatives, for a fixed number of states.
-/// Most laws have one or two.
+/// Performs the steps of [`StepView::advance_cycle`] without derivatives, for a fixed number of
+/// states. Most laws have one or two.
 fn cycle_without_derivatives<const STATES: usize, L: StepLaw>(
     law: &L,
-    (n, at): (usize, impl Fn(usize) -> [f64; MOST_DIRECTIONS]),
+    (n, at): (usize, impl Fn(usize) -> [f64; MAX_DIRECTIONS]),
     (z, previous_states): (&mut [f64], &mut [f64]),
-    mut store: impl FnMut(usize, [f64; MOST_DIRECTIONS]),
+    mut store: impl FnMut(usize, [f64; MAX_DIRECTIONS]),
 ) {
     let mut now: [f64; STATES] = std::array::from_fn(|s| z[s]);
     let (previous_states, _) = previous_states.as_chunks_mut::<STATES>();
@@ -275,14 +275,14 @@ fn cycle_without_derivatives<const STATES: usize, L: StepLaw>(
 fn dual_pass<const N: usize, L: StepLaw>(
     law: &L,
     directions: usize,
-    (from, to): (&[f64; MOST_DIRECTIONS], &[f64; MOST_DIRECTIONS]),
+    (from, to): (&[f64; MAX_DIRECTIONS], &[f64; MAX_DIRECTIONS]),
     z: &[f64],
     first: usize,
     point: &mut StepPoint,
 ) {
     let seeded = |value: f64, argument: usize| -> Dual<N> { dual_argument(value, argument, first) };
     let zero = Dual::<N>::from(0.0);
-    let (mut before, mut after) = ([zero; MOST_DIRECTIONS], [zero; MOST_DIRECTIONS]);
+    let (mut before, mut after) = ([zero; MAX_DIRECTIONS], [zero; MAX_DIRECTIONS]);
     for a in 0..directions {
         before[a] = seeded(from[a], a);
         after[a] = seeded(to[a], directions + a);

@@ -10,7 +10,7 @@ impl LawInfo {
     ///
     /// # Errors
     /// Parameters are missing, or a value is not finite or out of its range, or
-    /// [`Law::consistent`] fails.
+    /// [`Law::check_consistency`] fails.
     ///
     /// # Example
     /// ```
@@ -58,17 +58,17 @@ impl dyn Law + '_ {
                            must return false";
             return Err(LawError::Inconsistent { law: self.name(), message: message.to_owned() });
         }
-        self.consistent().map_err(|message| LawError::Inconsistent { law: self.name(), message })
+        self.check_consistency().map_err(|message| LawError::Inconsistent { law: self.name(), message })
     }
 }
 
 /// Checks that every value is in its range.
 fn in_range(info: &LawInfo, values: &[f64]) -> Result<(), LawError> {
     for (parameter, &value) in info.parameters.iter().zip(values) {
-        if !parameter.range.has(value) {
+        if !parameter.range.contains(value) {
             let Parameter { key, range, .. } = *parameter;
             let of = |key: &str| Some(values[info.parameters.iter().position(|p| p.key == key)?]);
-            let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
+            let dimension = parameter.dimension_for(of).unwrap_or(Dimension::NONE);
             return Err(LawError::Value { law: info.name, key, dimension, range, value });
         }
     }

@@ -5,7 +5,7 @@
 //! a few histories of every size. An odd law gives identical bits, because a change of sign
 //! causes no rounding.
 
-use crate::law::{Law, MOST_DIRECTIONS, Piece, Prox, Rate, Relative, Step};
+use crate::law::{IdealElement, Law, MAX_DIRECTIONS, ProxView, RateView, RelativeMotion, StepView};
 
 /// Magnitudes of the displacements, as powers of ten in metres.
 const DECADES: std::ops::RangeInclusive<i32> = -9..=0;
@@ -16,15 +16,15 @@ const FORCES: [f64; 4] = [0.3, 0.9, 1.5, 10.0];
 /// Difference relative to the largest force that is larger than rounding.
 const DIFFERENCE: f64 = 1e-9;
 /// One history in every direction, in relative units, with reversals and varying amplitude.
-const HISTORY: [[f64; MOST_DIRECTIONS]; 6] =
+const HISTORY: [[f64; MAX_DIRECTIONS]; 6] =
     [[0.3, 0.2, -0.1], [1.0, -0.4, 0.6], [0.4, -1.0, 1.0], [-0.2, -0.7, 0.3], [-0.9, 0.5, -0.8], [-0.1, 0.8, -0.3]];
 
-type ForceVector = [f64; MOST_DIRECTIONS];
+type ForceVector = [f64; MAX_DIRECTIONS];
 
 /// Tells whether any view of the law violates the symmetry.
 pub(in crate::law) fn violates_odd_symmetry(law: &dyn Law) -> bool {
     // Contacts and one-sided stops are not odd by construction.
-    let one_sided = |pieces: Vec<Piece>| pieces.iter().any(|piece| matches!(piece, Piece::Stop { .. }));
+    let one_sided = |pieces: Vec<IdealElement>| pieces.iter().any(|piece| matches!(piece, IdealElement::Stop { .. }));
     let directions = law.directions();
     law.normal().is_some()
         || law.pieces().is_some_and(one_sided)
@@ -43,7 +43,7 @@ fn size(decade: i32) -> f64 {
 
 /// Returns the force scale of a law, N; 1 N if it is unbounded.
 fn force_scale(law: &dyn Law) -> f64 {
-    Some(law.scale()).filter(|scale| scale.is_finite()).unwrap_or(1.0)
+    Some(law.force_scale()).filter(|scale| scale.is_finite()).unwrap_or(1.0)
 }
 
 /// NaN counts as no difference; solvers stop at NaN.
@@ -54,36 +54,36 @@ fn forces_differ(forces: impl Fn(f64) -> Vec<ForceVector>) -> bool {
     all().zip(back.iter().flatten()).any(|(a, b)| (a + b).abs() > DIFFERENCE * largest)
 }
 
-fn by_rate(rate: &dyn Rate, size: f64) -> Vec<ForceVector> {
+fn by_rate(rate: &dyn RateView, size: f64) -> Vec<ForceVector> {
     let (mut z, mut rates) = (vec![0.0; rate.states()], vec![0.0; rate.states()]);
-    let mut before = [0.0; MOST_DIRECTIONS];
+    let mut before = [0.0; MAX_DIRECTIONS];
     let along = |point: &ForceVector| {
         let displacement = point.map(|u| u * size);
         let velocity = std::array::from_fn(|a| VELOCITY_RATIO * (displacement[a] - before[a]));
         before = displacement;
-        let force = rate.value(&Relative { displacement, velocity }, &z, &mut rates);
+        let force = rate.evaluate_values(&RelativeMotion { displacement, velocity }, &z, &mut rates);
         z.iter_mut().zip(&rates).for_each(|(z, rate)| *z += rate / VELOCITY_RATIO);
         force
     };
     HISTORY.iter().map(along).collect()
 }
 
-fn by_step(step: &dyn Step, size: f64) -> Vec<ForceVector> {
+fn by_step(step: &dyn StepView, size: f64) -> Vec<ForceVector> {
     let mut z = vec![0.0; step.states()];
-    let mut before = [0.0; MOST_DIRECTIONS];
+    let mut before = [0.0; MAX_DIRECTIONS];
     let along = |point: &ForceVector| {
         let to = point.map(|u| u * size);
-        let force = step.value(&before, &to, &mut z);
+        let force = step.advance_values(&before, &to, &mut z);
         before = to;
         force
     };
     HISTORY.iter().map(along).collect()
 }
 
-fn by_force(prox: &dyn Prox, directions: usize, size: f64) -> Vec<ForceVector> {
-    let penalty = 2.0 * prox.least_penalty().max(0.5);
+fn by_force(prox: &dyn ProxView, directions: usize, size: f64) -> Vec<ForceVector> {
+    let penalty = 2.0 * prox.minimum_penalty().max(0.5);
     let asked = FORCES.iter().zip(&HISTORY).map(|(share, point)| {
-        let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
+        let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
         let y = point.map(|part| share * part * size);
         prox.resolve(&y[..directions], penalty, &mut force[..directions], &mut slope[..directions * directions]);
         force

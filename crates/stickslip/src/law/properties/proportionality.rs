@@ -18,7 +18,7 @@ impl dyn Law + '_ {
         }
         let mut times = None;
         for ((parameter, own), its) in self.info().parameters.iter().zip(self.values()).zip(other.values()) {
-            let power = match parameter.dimension_under(|key| other.value(key)) {
+            let power = match parameter.dimension_for(|key| other.value(key)) {
                 Some(dimension) if own != 0.0 || its != 0.0 => dimension.kg,
                 _ => 0,
             };

@@ -6,7 +6,7 @@
 //! them different contacts, and the friction problem would not have a unique solution. Each
 //! joint receives a [`Share`] of the part's force.
 
-use crate::law::{Contact, Law, Piece};
+use crate::law::{Contact, IdealElement, Law};
 use crate::method::{MethodError, Refusal};
 use crate::model::{CollinearAxis, System};
 use crate::structure::Matrices;
@@ -224,7 +224,7 @@ impl Gathered {
 /// Returns the reason why the method does not support a law.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
     let Some(pieces) = law.pieces() else { return Some("it does not consist of ideal sliders, springs and stops") };
-    let drops = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
+    let drops = |piece: &IdealElement| matches!(piece, IdealElement::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
     if law.directions() != 1 {
         Some("it acts along several directions")
     } else if pieces.iter().any(drops) {
@@ -324,9 +324,9 @@ impl Mechanics {
             for piece in joint.law().pieces().unwrap_or_default() {
                 let direction = axis.dense(n);
                 let kind = match piece {
-                    Piece::Slider(slider) if slider.static_limit == 0.0 => continue,
-                    Piece::Stop { stiffness: 0.0, .. } => continue,
-                    Piece::Slider(slider) => match slider.stiffness {
+                    IdealElement::Slider(slider) if slider.static_limit == 0.0 => continue,
+                    IdealElement::Stop { stiffness: 0.0, .. } => continue,
+                    IdealElement::Slider(slider) => match slider.stiffness {
                         None => {
                             let (limit, static_limit) = (slider.limit, slider.static_limit);
                             let line = CollinearAxis::of(axis);
@@ -339,7 +339,7 @@ impl Mechanics {
                         }
                     },
                     // the position of a stop includes the mean of the imposed motion
-                    Piece::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
+                    IdealElement::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
                 };
                 gathered.push(Part { joint: j, direction, kind });
             }

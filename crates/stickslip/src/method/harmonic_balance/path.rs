@@ -3,7 +3,7 @@
 use super::equations::{Level, Solution};
 use super::ports::{Member, Ports};
 use super::rest::Rest;
-use crate::law::{Contact, MOST_DIRECTIONS};
+use crate::law::{Contact, MAX_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results, sticks};
@@ -101,7 +101,7 @@ struct Series {
     harmonics: Vec<usize>,
     x: Vec<DVector<Complex64>>,
     /// Forces along the axes, per joint and sample, N.
-    force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
+    force: Vec<Vec<[f64; MAX_DIRECTIONS]>>,
     /// Contact state per joint and sample.
     contact: Vec<Vec<Contact>>,
 }
@@ -211,7 +211,7 @@ pub(super) fn orbit(
 /// Joint forces and contact states at the samples of a period, and the internal states at
 /// t = 0.
 struct Samples {
-    force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
+    force: Vec<Vec<[f64; MAX_DIRECTIONS]>>,
     contact: Vec<Vec<Contact>>,
     states: Vec<f64>,
 }
@@ -220,7 +220,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
     let Setting { system, ports, omega, .. } = *setting;
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
-    let mut force = vec![vec![[0.0; MOST_DIRECTIONS]; samples]; system.joints().len()];
+    let mut force = vec![vec![[0.0; MAX_DIRECTIONS]; samples]; system.joints().len()];
     let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
     let mut states = Vec::new();
     for (j, joint) in system.joints().iter().enumerate() {
@@ -248,8 +248,8 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
                     let mut z = vec![0.0; rate.states()];
                     // the sampled force is within the bounds of the law; the truncated series
                     // may exceed them
-                    let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
-                    rate.state_under(&now[..port.axes], &mut z);
+                    let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
+                    rate.state_from_force(&now[..port.axes], &mut z);
                     states.extend(z);
                 }
                 _ if port.is_force() => {}
@@ -270,8 +270,8 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
             })
             .collect();
         for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
-            let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
-            *contact = joint.law().contact(&now[..axes.len()], &force[..axes.len()]);
+            let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
+            *contact = joint.law().contact_state(&now[..axes.len()], &force[..axes.len()]);
         }
     }
     Samples { force, contact, states }

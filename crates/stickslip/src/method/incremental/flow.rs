@@ -3,7 +3,7 @@
 use super::carried::Carried;
 use super::law;
 use super::step::{Eliminated, Step};
-use crate::law::Piece;
+use crate::law::IdealElement;
 use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -71,7 +71,9 @@ impl IncrementalFlow {
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
-                None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(Piece::drops)) => Err(DROPS),
+                None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(IdealElement::has_force_drop)) => {
+                    Err(DROPS)
+                }
                 None if chosen.pieces().is_some() => Err("its slider is rigid; it needs a spring in series"),
                 None => Err("it defines neither a step view nor a rate view"),
             }

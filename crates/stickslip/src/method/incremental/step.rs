@@ -6,7 +6,7 @@
 //! per axis, for any number of masses.
 
 use super::law::{At, Follower};
-use crate::law::Relative;
+use crate::law::RelativeMotion;
 use crate::method::assembly::{Assembly, PlacedLaw};
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
@@ -55,7 +55,7 @@ impl Eliminated {
 }
 
 /// The motion along the axes at an instant.
-type Relatives = Vec<Relative<f64>>;
+type Relatives = Vec<RelativeMotion<f64>>;
 
 /// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
@@ -94,7 +94,7 @@ const ENOUGH: f64 = 1e-9;
 impl Step {
     pub fn new(assembly: &Assembly) -> Self {
         let (n, j) = (assembly.n, assembly.axes.len());
-        let still = vec![Relative::along(0.0, 0.0); assembly.joints.len()];
+        let still = vec![RelativeMotion::along(0.0, 0.0); assembly.joints.len()];
         Step {
             laws: assembly.joints.iter().map(Follower::new).collect(),
             before: DVector::zeros(j),
@@ -243,8 +243,8 @@ impl Step {
 }
 
 /// Returns the motion of a joint in a state.
-fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f64) -> Relative<f64> {
-    let mut motion = Relative::along(0.0, 0.0);
+fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f64) -> RelativeMotion<f64> {
+    let mut motion = RelativeMotion::along(0.0, 0.0);
     for (d, axis) in assembly.joints[q].axes().enumerate() {
         (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, drive, time);
     }

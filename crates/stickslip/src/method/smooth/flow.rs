@@ -5,7 +5,7 @@
 //! the same interval ends exactly at its end.
 
 use super::step::{Eliminated, StageLoads, Step, points};
-use crate::law::{RatePoint, Relative};
+use crate::law::{RatePoint, RelativeMotion};
 use crate::method::Breakdown;
 use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
@@ -182,13 +182,13 @@ impl SmoothFlow {
     fn set_laws(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (joint, point) in self.assembly.joints.iter().zip(&mut self.laws) {
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
-                rate.linearise(joint.directions, &motion, &state[first..first + joint.states], point);
+                rate.evaluate_with_derivatives(joint.directions, &motion, &state[first..first + joint.states], point);
             }
         }
     }
@@ -275,7 +275,7 @@ impl SmoothFlow {
                     raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
                 }
                 // the reference of an unbounded law is its present force
-                let limit = joint.law.scale();
+                let limit = joint.law.force_scale();
                 let force = if limit.is_finite() { limit } else { self.step.force.amax().max(point.force[d].abs()) };
                 if raw != 0.0 {
                     largest = largest.max((raw * h / REAL).abs() / (force * travel * self.tolerance));
@@ -302,7 +302,7 @@ impl SmoothFlow {
             let (velocity, force) =
                 (&self.step.unknown[i * j..(i + 1) * j], &self.step.force.as_slice()[i * j..(i + 1) * j]);
             let joints = self.assembly.joints.iter();
-            let contact = joints.map(|joint| joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]));
+            let contact = joints.map(|joint| joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]));
             let of = i * n..(i + 1) * n;
             self.steps.keep_node([&x[of.clone()], &v[of]], [velocity, force], contact);
         }

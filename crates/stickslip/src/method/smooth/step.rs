@@ -7,7 +7,7 @@
 //! times a tick, so that a few eliminations serve a whole orbit. The filter of the error
 //! estimate is eliminated in the same way.
 
-use crate::law::{RatePoint, Relative};
+use crate::law::{RatePoint, RelativeMotion};
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
@@ -299,7 +299,7 @@ impl Step {
         }
         for stage in 0..STAGES {
             for (q, joint) in assembly.joints.iter().enumerate() {
-                let mut motion = Relative::along(0.0, 0.0);
+                let mut motion = RelativeMotion::along(0.0, 0.0);
                 for (d, axis) in joint.axes().enumerate() {
                     // structural displacement from the collocation of structural velocities,
                     // without imposed motion
@@ -313,7 +313,7 @@ impl Step {
                 let z = &self.unknown[first..first + joint.states];
                 let point = &mut self.points[stage * assembly.joints.len() + q];
                 if let Some(rate) = joint.law.rate() {
-                    rate.linearise(joint.directions, &motion, z, point);
+                    rate.evaluate_with_derivatives(joint.directions, &motion, z, point);
                 }
                 for (d, axis) in joint.axes().enumerate() {
                     self.force[stage * j + axis] = point.force[d];
@@ -668,7 +668,7 @@ impl Filter {
         // the forces t of the laws at zero velocity of the axes
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
             let (directions, states) = (joint.directions, joint.states);
-            let mut u = [0.0; crate::law::MOST_DIRECTIONS];
+            let mut u = [0.0; crate::law::MAX_DIRECTIONS];
             joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].along(x) / rate);
             for (s, own) in joint.internal().enumerate() {
                 let slope = point.rate_slope(s);

@@ -12,7 +12,7 @@
 
 use super::mode::{Mode, in_mode};
 use super::switch::{decide, mobility, saltate, stop};
-use crate::law::{RatePoint, Relative, SharedLaw};
+use crate::law::{RatePoint, RelativeMotion, SharedLaw};
 use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -207,9 +207,9 @@ impl SwitchedFlow {
         let Some(force) = mobility(&self.assembly, &held).lu().solve(&DVector::from_vec(free)) else { return false };
         let each: Vec<(usize, f64)> = self.held().zip(force.iter()).map(|(own, f)| (own.joint, f / own.unit)).collect();
         for (joint, unknown) in each {
-            let motion = Relative::along(0.0, unknown);
+            let motion = RelativeMotion::along(0.0, unknown);
             if let Some(rate) = self.assembly.joints[joint].law.rate() {
-                rate.linearise(1, &motion, &[], &mut self.laws[joint]);
+                rate.evaluate_with_derivatives(1, &motion, &[], &mut self.laws[joint]);
             }
         }
         self.set_motion(state, time);
@@ -221,17 +221,17 @@ impl SwitchedFlow {
     fn answer(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (q, (joint, point)) in self.assembly.joints.iter().zip(&mut self.laws).enumerate() {
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
             let holds = |friction: &Friction| friction.joint == q && friction.mode == Mode::Held;
             if self.frictions.iter().any(holds) {
-                motion = Relative::along(0.0, 0.0);
+                motion = RelativeMotion::along(0.0, 0.0);
             }
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
-                rate.linearise(joint.directions, &motion, &state[first..first + joint.states], point);
+                rate.evaluate_with_derivatives(joint.directions, &motion, &state[first..first + joint.states], point);
             }
         }
         self.set_motion(state, time);
@@ -558,7 +558,7 @@ impl SwitchedFlow {
             let contact = self.assembly.joints.iter().enumerate().map(|(q, joint)| {
                 let own = self.frictions.iter().find(|friction| friction.joint == q);
                 own.map_or_else(
-                    || joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]),
+                    || joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]),
                     |friction| friction.mode.contact(),
                 )
             });

@@ -20,7 +20,7 @@ pub use results::{FirstSlip, LinearMode, Loose, Modes, Onset, Unpressed};
 pub use wave_modes::WaveModes;
 
 use super::{Model, ModelError, System, SystemJoint};
-use crate::law::{MOST_DIRECTIONS, SharedLaw};
+use crate::law::{MAX_DIRECTIONS, SharedLaw};
 use linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
 use std::collections::HashMap;
 use stuck_joint::{StuckAxis, StuckState};
@@ -91,7 +91,7 @@ impl Model {
     /// ```
     pub fn survey_under_load(
         &self,
-        forces: &dyn Fn(&System) -> Option<Vec<[f64; MOST_DIRECTIONS]>>,
+        forces: &dyn Fn(&System) -> Option<Vec<[f64; MAX_DIRECTIONS]>>,
     ) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
         let forces = if system.dofs() > MAX_DOFS { None } else { forces(&system) };
@@ -99,7 +99,7 @@ impl Model {
         // together
         let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {
             let force = forces.as_ref()?.get(index)?[joint.law().normal()?];
-            (force > 0.0).then(|| Some((force, joint.law().pressed_by(force)?)))?
+            (force > 0.0).then(|| Some((force, joint.law().with_preload(force)?)))?
         };
         let of_joint = |(index, joint): (usize, &SystemJoint)| {
             let found = pressed(index, joint);

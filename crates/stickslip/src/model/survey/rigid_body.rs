@@ -68,7 +68,7 @@ impl Model {
                 if carries {
                     gripped.union(e);
                 }
-                if carries || joint.law.scale().is_infinite() && joint.law.closed().is_none() {
+                if carries || joint.law.force_scale().is_infinite() && joint.law.closed_stiffness().is_none() {
                     held.union(e);
                 }
                 if faces.contains(&number) {

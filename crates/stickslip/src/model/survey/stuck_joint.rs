@@ -2,7 +2,7 @@
 
 use super::super::SystemJoint;
 use super::linear_modes::SpringDamper;
-use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
+use crate::law::{Law, MAX_DIRECTIONS, RatePoint, RelativeMotion, StepPoint};
 
 /// One axis of a joint whose sliders do not slip.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,12 +34,12 @@ impl StuckAxis {
             let state =
                 pressed.map_or_else(|| StuckState::of(law, axis), |force| StuckState::pressed(law, axis, force));
             let closed = match state {
-                StuckState::Nothing => law.closed().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
+                StuckState::Nothing => law.closed_stiffness().and_then(|along| along.get(axis).copied()).unwrap_or(0.0),
                 StuckState::Spring { .. } | StuckState::Rigid { .. } => 0.0,
             };
             let held = if matches!(state, StuckState::Rigid { .. }) { 0.0 } else { small_damping(law, axis) };
-            let damping = [law.free().map_or(0.0, |free| small_damping(&*free, axis)), held];
-            let gradual = law.macro_slip().is_some();
+            let damping = [law.frictionless_reference().map_or(0.0, |free| small_damping(&*free, axis)), held];
+            let gradual = law.macro_slip_displacement().is_some();
             StuckAxis { joint: index, axis, name, at: along.rows().to_vec(), state, closed, pressed, damping, gradual }
         })
         .collect()
@@ -79,8 +79,12 @@ pub(super) enum StuckState {
 impl StuckState {
     /// Returns the stuck state along one axis of the law.
     fn of(law: &dyn Law, axis: usize) -> StuckState {
-        if let Some(displacement) = law.macro_slip() {
-            return StuckState::Spring { stiffness: small_stiffness(law, axis), limit: law.scale(), displacement };
+        if let Some(displacement) = law.macro_slip_displacement() {
+            return StuckState::Spring {
+                stiffness: small_stiffness(law, axis),
+                limit: law.force_scale(),
+                displacement,
+            };
         }
         let Some(branches) = law.sliders() else { return StuckState::smooth(law, axis) };
         let branches = || branches.iter().filter(|branch| branch.static_limit > 0.0);
@@ -108,7 +112,7 @@ impl StuckState {
     /// Returns the stuck state of a smooth law: its spring in small motion, or rigid if its
     /// resistance is viscous. The approximation improves with the slope of the law.
     fn smooth(law: &dyn Law, axis: usize) -> StuckState {
-        let (limit, stiffness) = (law.scale(), small_stiffness(law, axis));
+        let (limit, stiffness) = (law.force_scale(), small_stiffness(law, axis));
         match (limit > 0.0, stiffness > 0.0) {
             (false, _) => StuckState::Nothing,
             // a law of displacement alone acts as its spring and never slips
@@ -127,20 +131,20 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
         return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
     }
     if law.pieces().is_some() {
-        return law.linearised(LINEAR_AMPLITUDE, 1.0).re;
+        return law.describing_function(LINEAR_AMPLITUDE, 1.0).re;
     }
-    let (count, rest) = (law.directions(), [0.0; MOST_DIRECTIONS]);
+    let (count, rest) = (law.directions(), [0.0; MAX_DIRECTIONS]);
     if let Some(step) = law.step() {
         let z = vec![0.0; step.states()];
         let mut point = StepPoint::new(count, z.len());
-        step.linearise(count, &rest, &rest, &z, &mut point);
+        step.advance_with_derivatives(count, &rest, &rest, &z, &mut point);
         return point.force_slope(axis)[count + axis];
     }
     let Some(rate) = law.rate() else { return 0.0 };
     // includes the immediate response of the states: f_u + f_z z_v
     let z = vec![0.0; rate.states()];
     let mut point = RatePoint::new(count, z.len());
-    rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
+    rate.evaluate_with_derivatives(count, &RelativeMotion { displacement: rest, velocity: rest }, &z, &mut point);
     let by_states = (0..z.len()).map(|s| point.force_slope(axis)[2 * count + s] * point.rate_slope(s)[count + axis]);
     point.force_slope(axis)[axis] + by_states.sum::<f64>()
 }
@@ -149,20 +153,20 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
 /// the force over velocity at constant states.
 fn small_damping(law: &dyn Law, axis: usize) -> f64 {
     let Some(rate) = law.rate() else { return 0.0 };
-    let (count, rest, z) = (law.directions(), [0.0; MOST_DIRECTIONS], vec![0.0; rate.states()]);
+    let (count, rest, z) = (law.directions(), [0.0; MAX_DIRECTIONS], vec![0.0; rate.states()]);
     let mut point = RatePoint::new(count, z.len());
-    rate.linearise(count, &Relative { displacement: rest, velocity: rest }, &z, &mut point);
+    rate.evaluate_with_derivatives(count, &RelativeMotion { displacement: rest, velocity: rest }, &z, &mut point);
     point.force_slope(axis)[count + axis]
 }
 
 /// Returns the force of a law along an axis at zero displacement, N.
 fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
-    let rest = [0.0; MOST_DIRECTIONS];
+    let rest = [0.0; MAX_DIRECTIONS];
     match (law.step(), law.rate()) {
-        (Some(step), _) => step.value(&rest, &rest, &mut vec![0.0; step.states()])[axis],
+        (Some(step), _) => step.advance_values(&rest, &rest, &mut vec![0.0; step.states()])[axis],
         (None, Some(rate)) => {
             let mut z = vec![0.0; rate.states()];
-            rate.value(&Relative { displacement: rest, velocity: rest }, &z.clone(), &mut z)[axis]
+            rate.evaluate_values(&RelativeMotion { displacement: rest, velocity: rest }, &z.clone(), &mut z)[axis]
         }
         (None, None) => 0.0,
     }

@@ -2,7 +2,7 @@
 
 use super::memory::REPEATS;
 use super::{Port, StaticState};
-use crate::law::MOST_DIRECTIONS;
+use crate::law::MAX_DIRECTIONS;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::fourier::Fourier;
@@ -25,10 +25,10 @@ pub(in super::super) struct Alternation {
     /// A signal for whoever needs one.
     pub signal: Vec<f64>,
     /// Forces of the port evaluated last along its axes, per sample, N; of sliders only after [`Alternation::sample`].
-    pub force: [Vec<f64>; MOST_DIRECTIONS],
+    pub force: [Vec<f64>; MAX_DIRECTIONS],
     /// Velocities of the port along its axes, for ports that use them, or displacements.
-    pub(super) displacement: [Vec<f64>; MOST_DIRECTIONS],
-    pub(super) velocity: [Vec<f64>; MOST_DIRECTIONS],
+    pub(super) displacement: [Vec<f64>; MAX_DIRECTIONS],
+    pub(super) velocity: [Vec<f64>; MAX_DIRECTIONS],
     /// Per sample of a port whose kernel tells slip: it moves.
     pub slips: Vec<bool>,
     /// The derivative of the force by ω in rad/s, [axis][harmonic], of the motion port evaluated last with its derivative: of a law that knows how
@@ -130,7 +130,7 @@ impl Alternation {
     }
 
     /// Where the joint of a port is before it vibrates: displacements (m) along its axes, and states.
-    pub(super) fn at_rest(&self, port: &Port) -> ([f64; MOST_DIRECTIONS], Vec<f64>) {
+    pub(super) fn at_rest(&self, port: &Port) -> ([f64; MAX_DIRECTIONS], Vec<f64>) {
         let StaticState { displacement, states } = &port.static_state;
         (displacement.map(|u| u * self.static_share), states.iter().map(|z| z * self.static_share).collect())
     }

@@ -6,7 +6,7 @@
 
 use super::sliders::Part;
 use super::{Kernel, Member, Port, Ports, Rigid, StaticState, Times};
-use crate::law::{Piece, Slider};
+use crate::law::{IdealElement, Slider};
 use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
 use crate::model::{CollinearAxis, PARALLEL, SystemJoint};
@@ -25,19 +25,19 @@ impl Gathered {
     pub fn push(&mut self, j: usize, joint: &SystemJoint) -> Result<(), MethodError> {
         let law = joint.law();
         let unsupported = |misses| MethodError::law(NAME, joint, misses);
-        if law.is_free() {
+        if law.carries_no_force() {
             return Ok(());
         }
         if joint.axes().len() == 1
             && let Some(pieces) = law.pieces()
         {
-            if pieces.iter().any(Piece::drops) {
+            if pieces.iter().any(IdealElement::has_force_drop) {
                 return Err(unsupported("its slip limit drops abruptly at the onset of slip"));
             }
             self.add_pieces(j, joint, &pieces);
             return Ok(());
         }
-        let scale = law.scale();
+        let scale = law.force_scale();
         if joint.axes().len() == 1 && law.masing().is_some() {
             self.add(j, joint, Kernel::Masing(law.clone()), (0.0, scale, 0.0));
             return Ok(());
@@ -46,7 +46,7 @@ impl Gathered {
             if !(scale.is_finite() && scale > 0.0) {
                 return Err(unsupported("its force scale is not finite and positive, which its resolvent needs"));
             }
-            let measures = (prox.compliance(), scale, prox.least_penalty());
+            let measures = (prox.compliance(), scale, prox.minimum_penalty());
             self.add_force(j, joint, Kernel::Prox(Times { law: law.clone(), times: 1.0 }), measures);
         } else if law.step().is_some() {
             self.add(j, joint, Kernel::Step(law.clone()), (0.0, scale, 0.0));
@@ -71,20 +71,20 @@ impl Gathered {
     }
 
     /// One port for elastic sliders and stops, and one for rigid sliders: both move alike.
-    fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[Piece]) {
+    fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[IdealElement]) {
         let mut parts = Vec::new();
         // rigid sliders side by side are one
         let (mut rigid, mut scale) = (0.0, 0.0);
         for piece in pieces {
             match *piece {
-                Piece::Slider(Slider { limit: 0.0, .. }) => {}
-                Piece::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
-                Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
+                IdealElement::Slider(Slider { limit: 0.0, .. }) => {}
+                IdealElement::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
+                IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
                     scale += limit;
                     parts.push(Part::Slider { stiffness, limit });
                 }
-                Piece::Stop { stiffness: 0.0, .. } => {}
-                Piece::Stop { gap, stiffness } => {
+                IdealElement::Stop { stiffness: 0.0, .. } => {}
+                IdealElement::Stop { gap, stiffness } => {
                     scale = f64::INFINITY;
                     parts.push(Part::Stop { gap, stiffness });
                 }

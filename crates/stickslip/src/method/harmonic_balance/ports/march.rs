@@ -8,7 +8,7 @@
 
 use super::alternation::{Alternation, share};
 use super::memory::{Memory, REPEATS, at_once};
-use crate::law::MOST_DIRECTIONS;
+use crate::law::MAX_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -52,9 +52,9 @@ pub(super) trait March {
     /// the samples. `rows`, [sample]: derivatives of the states after the step that ends there, then of the forces, by inputs and states before, and by ω
     /// if it is known.
     /// False if some step has no solution.
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
     /// The first movement, straight from static equilibrium to sample 0.
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
 }
 
 impl Alternation {
@@ -88,7 +88,7 @@ impl Alternation {
         if begun {
             z.copy_from_slice(&known.state);
         } else {
-            let mut force = [0.0; MOST_DIRECTIONS];
+            let mut force = [0.0; MAX_DIRECTIONS];
             if !march.first(z.as_mut_slice(), &mut force, None) {
                 return None;
             }
@@ -431,7 +431,7 @@ impl Alternation {
         let (m, d) = (march.states(), march.axes());
         first.resize((m + d) * width(march), 0.0);
         let mut z = DVector::zeros(m);
-        let mut force = [0.0; MOST_DIRECTIONS];
+        let mut force = [0.0; MAX_DIRECTIONS];
         if !march.first(z.as_mut_slice(), &mut force, Some(first)) {
             return None;
         }

@@ -16,7 +16,7 @@ use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
 use super::events::{Anchor, Extreme};
 use super::series::{Series, turns};
 use super::sliders::{add_multiple, integrate_over};
-use crate::law::{Law, Masing};
+use crate::law::{Law, MasingView};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -54,7 +54,7 @@ pub(in super::super) struct Branches {
 
 /// The force on a branch: `from` a displacement with the force `begin`, in a scale of 1 or 2.
 struct Curve<'a> {
-    law: &'a dyn Masing,
+    law: &'a dyn MasingView,
     from: f64,
     begin: f64,
     scale: f64,
@@ -90,7 +90,7 @@ impl Branches {
     }
 
     /// The force at the end of the last leg between these points, and its derivative by every one of them, into `slopes`.
-    fn force(&self, law: &dyn Masing, points: &[Point], slopes: &mut Vec<f64>) -> f64 {
+    fn force(&self, law: &dyn MasingView, points: &[Point], slopes: &mut Vec<f64>) -> f64 {
         slopes.clear();
         slopes.resize(points.len(), 0.0);
         let mut sum = 0.0;
@@ -105,7 +105,7 @@ impl Branches {
     }
 
     /// The curve of a branch, with the derivative of the force where it begins.
-    fn curve<'a>(&self, law: &'a dyn Masing, branch: &Branch, slopes: &mut Vec<f64>) -> Curve<'a> {
+    fn curve<'a>(&self, law: &'a dyn MasingView, branch: &Branch, slopes: &mut Vec<f64>) -> Curve<'a> {
         let points = &self.points[branch.points.clone()];
         let begin = self.force(law, points, slopes);
         let from = points.last().map_or(0.0, |point| point.value);
@@ -117,7 +117,7 @@ impl Alternation {
     /// Adds the harmonics of the force of a law in the motion `c` to `force`, and their derivative to `tangent`.
     pub(super) fn masing(
         &mut self,
-        law: &dyn Masing,
+        law: &dyn MasingView,
         rest: &StaticState,
         c: &[Complex64],
         force: &mut [Complex64],
@@ -153,7 +153,7 @@ impl Alternation {
                     self.state.fill(0.0);
                     let points = branches.points[branch.points.clone()].iter().map(|point| point.value);
                     for u in points.skip(1).chain([self.signal[0]]) {
-                        step.value(&before, &[u, 0.0, 0.0], &mut self.state);
+                        step.advance_values(&before, &[u, 0.0, 0.0], &mut self.state);
                         before[0] = u;
                     }
                 }
@@ -164,7 +164,7 @@ impl Alternation {
 
     /// The branches of a period of the motion whose turning points have been found, after one period from static equilibrium
     /// on: by then whatever it forgets is forgotten.
-    fn remember(&self, law: &dyn Masing, rest: &StaticState, series: Series, branches: &mut Branches) {
+    fn remember(&self, law: &dyn MasingView, rest: &StaticState, series: Series, branches: &mut Branches) {
         branches.clear();
         branches.memory.push(Point { value: 0.0, anchor: Anchor::Nothing });
         let count = self.extremes.len();
@@ -191,7 +191,7 @@ impl Alternation {
     /// The motion goes on to its next turning point; from a phase on, or, before the period that is told, from nowhere.
     fn add_leg(
         &self,
-        law: &dyn Masing,
+        law: &dyn MasingView,
         series: Series,
         branches: &mut Branches,
         (begin, end, anchor): (Option<f64>, Extreme, Anchor),
@@ -219,10 +219,10 @@ impl Alternation {
             branches.memory.truncate(branches.memory.len() - if first { 1 } else { 2 });
         }
         let rest = branches.memory[0].value;
-        if branches.memory.len() == 1 && (end.value - rest).abs() >= law.slips_at() {
-            until(branches, Some(rest + sign * law.slips_at()));
+        if branches.memory.len() == 1 && (end.value - rest).abs() >= law.slip_displacement() {
+            until(branches, Some(rest + sign * law.slip_displacement()));
             until(branches, None);
-            branches.memory[0] = Point { value: end.value - sign * law.slips_at(), anchor };
+            branches.memory[0] = Point { value: end.value - sign * law.slip_displacement(), anchor };
         } else {
             until(branches, None);
         }
@@ -232,7 +232,7 @@ impl Alternation {
     /// Harmonics of the force, and their derivative.
     fn add_branches(
         &mut self,
-        law: &dyn Masing,
+        law: &dyn MasingView,
         series: Series,
         branches: &Branches,
         (force, mut tangent): (&mut [Complex64], Option<&mut [f64]>),

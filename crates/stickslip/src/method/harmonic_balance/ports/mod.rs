@@ -30,7 +30,7 @@ pub(super) use memory::{REPEATS, at_once};
 use prox::{Rigid, Times};
 use sliders::Part;
 
-use crate::law::{MOST_DIRECTIONS, Masing, Prox, SharedLaw};
+use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
 use crate::model::{Axis, Cyclic, System, SystemJoint};
 use nalgebra::DMatrix;
@@ -71,7 +71,7 @@ pub(super) struct Member {
 #[derive(Debug, Clone, Default)]
 pub(super) struct StaticState {
     /// Along the axes of the port, m.
-    pub displacement: [f64; MOST_DIRECTIONS],
+    pub displacement: [f64; MAX_DIRECTIONS],
     /// Internal states of its law, or the forces of its sliders (N); none where the law has none.
     pub states: Vec<f64>,
 }
@@ -122,7 +122,7 @@ impl Port {
     pub fn is_rigid(&self) -> bool {
         match &self.kernel {
             Kernel::Rigid(_) => true,
-            Kernel::Prox(times) => times.at_velocity(0.0).is_none(),
+            Kernel::Prox(times) => times.force_at_velocity(0.0).is_none(),
             _ => false,
         }
     }
@@ -196,7 +196,7 @@ impl Port {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::closed).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
-            Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed() {
+            Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed_stiffness() {
                 Some(closed) => closed[axis],
                 None => crate::method::guess::at_rest(&**law, 1.0)[(axis, axis)].re,
             },
@@ -207,7 +207,7 @@ impl Port {
     pub fn reach(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::reach).fold(0.0, f64::max),
-            Kernel::Masing(law) => law.masing().map_or(0.0, Masing::slips_at),
+            Kernel::Masing(law) => law.masing().map_or(0.0, MasingView::slip_displacement),
             _ => 0.0,
         }
     }
@@ -246,7 +246,7 @@ impl Port {
         }
     }
 
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         match &self.kernel {
             Kernel::Rigid(rigid) => Some(rigid),
             Kernel::Prox(times) => Some(times),
@@ -482,7 +482,7 @@ impl Alternation {
 }
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-const _: () = assert!(MOST_DIRECTIONS == 3, "signals of a port are kept for three axes");
+const _: () = assert!(MAX_DIRECTIONS == 3, "signals of a port are kept for three axes");
 
 /// Where the tangent of every port begins, and the length of all: a port with d axes has a square of 2 d × harmonics.
 pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {

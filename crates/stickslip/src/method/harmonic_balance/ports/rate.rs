@@ -9,7 +9,7 @@
 use super::Port;
 use super::alternation::Alternation;
 use super::march::March;
-use crate::law::{MOST_DIRECTIONS, Rate, RatePoint, Relative};
+use crate::law::{MAX_DIRECTIONS, RatePoint, RateView, RelativeMotion};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -31,7 +31,7 @@ impl Alternation {
     /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and their derivative to `tangent`.
     pub(super) fn rate(
         &mut self,
-        rate: &dyn Rate,
+        rate: &dyn RateView,
         port: &Port,
         omega: f64,
         c: &[Complex64],
@@ -54,16 +54,16 @@ impl Alternation {
         self.reserve_slopes(2 * axes * axes);
         let mut point = RatePoint::new(axes, 0);
         for i in 0..self.samples() {
-            let motion = Relative {
+            let motion = RelativeMotion {
                 displacement: std::array::from_fn(|a| self.displacement[a][i]),
                 velocity: std::array::from_fn(|a| self.velocity[a][i]),
             };
             if tangent.is_none() {
-                let values = rate.value(&motion, &[], &mut []);
+                let values = rate.evaluate_values(&motion, &[], &mut []);
                 (0..axes).for_each(|a| self.force[a][i] = values[a]);
                 continue;
             }
-            rate.linearise(axes, &motion, &[], &mut point);
+            rate.evaluate_with_derivatives(axes, &motion, &[], &mut point);
             for a in 0..axes {
                 self.force[a][i] = point.force[a];
                 for (b, slope) in point.force_slope(a).iter().enumerate() {
@@ -101,7 +101,7 @@ impl Alternation {
     /// The same of a law with internal states.
     fn integrate(
         &mut self,
-        rate: &dyn Rate,
+        rate: &dyn RateView,
         port: &Port,
         omega: f64,
         c: &[Complex64],
@@ -111,7 +111,7 @@ impl Alternation {
         let (n, nh, axes) = (self.samples(), self.harmonics.len(), port.axes);
         let (rest, at_rest) = self.at_rest(port);
         let angle = TAU / n as f64;
-        let mut stages: [[Vec<f64>; MOST_DIRECTIONS]; 2] = Default::default();
+        let mut stages: [[Vec<f64>; MAX_DIRECTIONS]; 2] = Default::default();
         for a in 0..axes {
             let c = &c[a * nh..(a + 1) * nh];
             for (kind, stage) in stages.iter_mut().enumerate() {
@@ -143,11 +143,11 @@ impl Alternation {
 }
 
 /// Displacements or velocities, [axis][sample].
-type Signals = [Vec<f64>; MOST_DIRECTIONS];
+type Signals = [Vec<f64>; MAX_DIRECTIONS];
 
 /// Steps of a rate law along a sampled motion. Inputs of a step: displacements and velocities at the first stage, then at the end.
 struct RateMarch<'a> {
-    rate: &'a dyn Rate,
+    rate: &'a dyn RateView,
     axes: usize,
     omega: f64,
     /// Time from sample to sample, s.
@@ -157,7 +157,7 @@ struct RateMarch<'a> {
     /// The same at the first stage of the step that ends at the sample.
     stages: &'a [Signals; 2],
     /// Displacements and states in static equilibrium, where the first movement begins.
-    rest: [f64; MOST_DIRECTIONS],
+    rest: [f64; MAX_DIRECTIONS],
     at_rest: Vec<f64>,
     points: [RatePoint; 2],
     stage: DVector<f64>,
@@ -168,10 +168,10 @@ struct RateMarch<'a> {
 impl RateMarch<'_> {
     fn advance(
         &mut self,
-        (length, motions): (f64, [Relative<f64>; 2]),
+        (length, motions): (f64, [RelativeMotion<f64>; 2]),
         before: &[f64],
         after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
+        force: &mut [f64; MAX_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) -> bool {
         let (m, d) = (before.len(), self.axes);
@@ -183,7 +183,7 @@ impl RateMarch<'_> {
         for _ in 0..ITERATIONS {
             for (stage, motion) in motions.iter().enumerate() {
                 let z = &self.stage.as_slice()[stage * m..(stage + 1) * m];
-                self.rate.linearise(d, motion, z, &mut self.points[stage]);
+                self.rate.evaluate_with_derivatives(d, motion, z, &mut self.points[stage]);
             }
             let points = &self.points;
             let matrix = DMatrix::from_fn(2 * m, 2 * m, |row, column| {
@@ -213,10 +213,10 @@ impl RateMarch<'_> {
         }
         after.copy_from_slice(&self.stage.as_slice()[m..]);
         let Some(rows) = rows else {
-            *force = self.rate.value(&motions[1], after, &mut vec![0.0; m]);
+            *force = self.rate.evaluate_values(&motions[1], after, &mut vec![0.0; m]);
             return true;
         };
-        self.rate.linearise(d, &motions[1], after, &mut self.points[1]);
+        self.rate.evaluate_with_derivatives(d, &motions[1], after, &mut self.points[1]);
         *force = self.points[1].force;
         let inputs = 4 * d;
         let width = inputs + m + usize::from(self.frequency);
@@ -282,14 +282,14 @@ impl March for RateMarch<'_> {
         let rate = self.omega / (TAU * LEAD);
         [1.0 - LEFT, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
         let (n, m, d) = (self.at[0][0].len(), z.len(), self.axes);
         let size = (m + d) * (4 * d + m + usize::from(self.frequency));
-        let read = |signals: [&Signals; 2], i: usize| Relative {
+        let read = |signals: [&Signals; 2], i: usize| RelativeMotion {
             displacement: std::array::from_fn(|a| if a < d { signals[0][a][i] } else { 0.0 }),
             velocity: std::array::from_fn(|a| if a < d { signals[1][a][i] } else { 0.0 }),
         };
-        let (mut before, mut now) = (z.to_vec(), [0.0; MOST_DIRECTIONS]);
+        let (mut before, mut now) = (z.to_vec(), [0.0; MAX_DIRECTIONS]);
         for step in 1..=n {
             let i = step % n;
             let motions = [read([&self.stages[0], &self.stages[1]], i), read(self.at, i)];
@@ -302,12 +302,12 @@ impl March for RateMarch<'_> {
         }
         true
     }
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         let duration = TAU * LEAD / self.omega;
-        let to: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
+        let to: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
         let velocity = std::array::from_fn(|a| (to[a] - self.rest[a]) / duration);
         let third = std::array::from_fn(|a| LEFT * self.rest[a] + (1.0 - LEFT) * to[a]);
-        let motions = [third, to].map(|displacement| Relative { displacement, velocity });
+        let motions = [third, to].map(|displacement| RelativeMotion { displacement, velocity });
         let before = std::mem::take(&mut self.at_rest);
         let found = self.advance((duration, motions), &before, after, force, rows);
         self.at_rest = before;
