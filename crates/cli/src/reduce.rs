@@ -5,7 +5,7 @@ use crate::{run, speak};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip::model::{Axis, DiskPart, Model, Place, ReductionEvidence, Substructure, SubstructureDamping, System};
+use stickslip::model::{Axis, DiskPart, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping, System};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry, names};
@@ -108,16 +108,16 @@ fn at_rest(substructure: &Substructure, places: &[Place]) -> Result<Few, String>
 /// Reduces with one basis for all speeds up to that of the second export.
 fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports) -> Result<Few, String> {
     let seen: Vec<Row> =
-        places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
-    let few = exports.rest.reduced_between(&exports.there, &seen, &substructure.reduction);
+        places.iter().filter(|place| place.view_of.is_none()).flat_map(|place| place.rows.clone()).collect();
+    let few = exports.rest.reduced_for_two_stiffnesses(&exports.there, &seen, &substructure.reduction);
     let few = few.map_err(|error| error.to_string())?;
     let mut seen = few.seen.into_iter();
     let mut places: Vec<Place> = places.to_vec();
-    let rows = places.iter_mut().filter(|place| place.of.is_none()).flat_map(|place| &mut place.rows);
+    let rows = places.iter_mut().filter(|place| place.view_of.is_none()).flat_map(|place| &mut place.rows);
     rows.zip(&mut seen).for_each(|(row, seen)| *row = seen);
     let n = few.component.dofs();
-    let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
-    let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
+    let earlier = ReductionAccuracy { error: few.error, up_to: few.up_to };
+    let earlier = substructure.earlier_reduction.map_or(earlier, |first| first.combine(earlier));
     let system = whole(few.component, earlier, places)?;
     let what = format!(
         "{n} coordinates ({}), error {:.1e} up to {:.6} Hz, at all speeds up to {:.6} rpm",
@@ -131,7 +131,7 @@ fn over_speeds(substructure: &Substructure, places: &[Place], exports: &Exports)
         exports.at, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
-    Ok(Few { system, what, keys, there: Some(few.there), sector: None })
+    Ok(Few { system, what, keys, there: Some(few.other_stiffness), sector: None })
 }
 
 /// Reduces the sector of a disk with one basis for all its travelling waves.
@@ -148,8 +148,8 @@ fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize
         place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen);
     }
     let n = few.pairs.len();
-    let earlier = ReductionEvidence { error: few.error, up_to: few.up_to };
-    let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
+    let earlier = ReductionAccuracy { error: few.error, up_to: few.up_to };
+    let earlier = substructure.earlier_reduction.map_or(earlier, |first| first.combine(earlier));
     let sector = Sector { sectors, rows: few.component.rows().to_vec(), pairs: few.pairs };
     let system = whole(few.component, earlier, places)?;
     let what = format!("{n} coordinates ({}), error {:.1e} up to {:.6} Hz", few.kind, few.error, few.up_to / TAU);
@@ -157,9 +157,9 @@ fn sector(substructure: &Substructure, places: &[Place], (sectors, disk): (usize
 }
 
 /// Assembles reduced matrices as a structure.
-fn whole(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -> Result<System, String> {
+fn whole(component: Component, earlier: ReductionAccuracy, places: Vec<Place>) -> Result<System, String> {
     let (damping, reduction) = (SubstructureDamping::Own, Reduction::None { up_to: 0.0 });
-    let whole = Substructure { component, damping, reduction, earlier: Some(earlier), disk: None };
+    let whole = Substructure { component, damping, reduction, earlier_reduction: Some(earlier), disk: None };
     let model = Model { substructure: Some(whole), places, ..Model::default() };
     model.assemble().map_err(|error| error.to_string())
 }
@@ -211,7 +211,7 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
     }
     files.extend(few.there.iter().map(|there| ("stiffened", there.entries().collect())));
     let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", few.what, few.keys.join("\n"));
-    if let Some(ReductionEvidence { error, up_to }) = few.system.reduction_evidence() {
+    if let Some(ReductionAccuracy { error, up_to }) = few.system.reduction_evidence() {
         let _ = writeln!(text, "reduced = {{ error = {error:e}, up_to = \"{up_to:e} rad/s\" }}");
     }
     for (key, entries) in files {
@@ -236,7 +236,7 @@ fn save(few: &Few, out: &Path) -> Result<(), String> {
         let _ = writeln!(text, "\n[disk]\nsectors = {sectors}\nboundary = \"{BOUNDARY}\"");
     }
     let mut nodes: Vec<(&str, Vec<(&str, &Axis)>)> = Vec::new();
-    for (place, axis) in system.places().iter().zip(system.seen()) {
+    for (place, axis) in system.places().iter().zip(system.place_axes()) {
         let (name, along) = place.split_once('.').unwrap_or((place, ""));
         match nodes.last_mut().filter(|(last, _)| *last == name) {
             Some((_, axes)) => axes.push((along, axis)),

@@ -78,8 +78,8 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half the peak-to-peak value of the velocity of every place",
         columns: |system| of_places(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
-            let places = prepared.system.seen().iter();
-            places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.velocity)))).collect()
+            let places = prepared.system.place_axes().iter();
+            places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.velocity)))).collect()
         },
     },
     Extra {
@@ -87,15 +87,15 @@ pub(crate) const TABLE: &[Extra] = &[
         doc: "half the peak-to-peak value of the acceleration of every place",
         columns: |system| of_places(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
-            let places = prepared.system.seen().iter();
-            places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.acceleration)))).collect()
+            let places = prepared.system.place_axes().iter();
+            places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.acceleration)))).collect()
         },
     },
     Extra {
         name: "harmonics",
         doc: "amplitudes of harmonics 1 to 5 of the displacement of every place",
         columns: |system| {
-            let places = system.places().iter().zip(system.seen());
+            let places = system.places().iter().zip(system.place_axes());
             let all = |(place, along): (&String, &Axis)| {
                 (1..=HARMONICS).map(|h| format!("{place}_harmonic{h}_{}", along.unit())).collect::<Vec<_>>()
             };
@@ -128,7 +128,7 @@ fn of_joints(system: &System, quantity: &str) -> Vec<String> {
 }
 
 fn of_places(system: &System, quantity: fn(&str) -> String) -> Vec<String> {
-    let places = system.places().iter().zip(system.seen());
+    let places = system.places().iter().zip(system.place_axes());
     places.map(|(place, along)| format!("{place}_{}", quantity(along.unit()))).collect()
 }
 

@@ -200,9 +200,10 @@ fn farther(model: &Model, system: &System) -> Option<System> {
     if own.component.dofs() > ROWS {
         return None;
     }
-    let counted = |times: &f64| own.component.modes_below(times * few.serves()).is_some_and(|count| count <= MODES);
+    let counted =
+        |times: &f64| own.component.modes_below(times * few.intended_up_to()).is_some_and(|count| count <= MODES);
     let times = TIMES.into_iter().find(counted)?;
-    let model = Model { substructure: Some(own.farther(few, times)), ..model.clone() };
+    let model = Model { substructure: Some(own.with_extended_range(few, times)), ..model.clone() };
     model.assemble().ok()
 }
 

@@ -90,7 +90,9 @@ impl Summary {
     /// Writes the cells of the row that follow the varied parameters and the frequency.
     pub fn write(&self, prepared: &Prepared, rows: &mut Rows) {
         let system = &prepared.system;
-        for ((place, along), [amplitude, mean, phase]) in system.places().iter().zip(system.seen()).zip(&self.places) {
+        for ((place, along), [amplitude, mean, phase]) in
+            system.places().iter().zip(system.place_axes()).zip(&self.places)
+        {
             rows.number(&columns::amplitude_in(place, along.unit()), *amplitude);
             rows.number(&format!("{place}_mean_{}", along.unit()), *mean);
             rows.number(&columns::phase_of(place), *phase);

@@ -4,7 +4,7 @@
 use crate::columns::REDUCTION_ERROR;
 use crate::dataset::{Column, Table, Values as Cells, column_name};
 use crate::study::Case;
-use stickslip::model::ReductionEvidence;
+use stickslip::model::ReductionAccuracy;
 
 /// Columns that grow row by row. All rows write their columns in the same order.
 #[derive(Debug, Default)]
@@ -72,8 +72,8 @@ impl Rows {
 
     /// Adds the error of the reduced model at the places, for a row with an orbit or a
     /// frequency. Without a reduction it adds nothing.
-    pub fn reduced(&mut self, reduction: Option<ReductionEvidence>) {
-        if let Some(ReductionEvidence { error, .. }) = reduction {
+    pub fn reduced(&mut self, reduction: Option<ReductionAccuracy>) {
+        if let Some(ReductionAccuracy { error, .. }) = reduction {
             self.number(REDUCTION_ERROR, error);
         }
     }

@@ -10,7 +10,8 @@ use crate::values::{Given, Values};
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::model::{
-    Around, Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, Spring, with_rotations,
+    Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, SectorDistribution, Spring,
+    with_rotations,
 };
 
 /// Returns the places of the structure given by matrices.
@@ -24,7 +25,7 @@ pub(crate) fn sector_of(
     structure: &ModelStatement,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
-) -> (Model, Vec<Around>, Vec<Around>) {
+) -> (Model, Vec<SectorDistribution>, Vec<SectorDistribution>) {
     let ModelStatement { lists, template, matrices } = structure;
     let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     let mut model = Model::default();
@@ -230,7 +231,7 @@ fn for_nodes(
 }
 
 /// Returns the distribution of an entry of a list over the sectors.
-pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
+pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Problem>) -> SectorDistribution {
     let mut found = Vec::new();
     for key in ["engine_order", "nodal_diameter", "sector"] {
         match whole(table, values, key) {
@@ -240,16 +241,16 @@ pub(crate) fn around(table: &StatedTable, values: &Values, problems: &mut Vec<Pr
         }
     }
     match found[..] {
-        [] => Around::EngineOrder(0),
-        [("engine_order", order)] => Around::EngineOrder(order),
-        [("nodal_diameter", diameter)] => Around::NodalDiameter(diameter),
-        [(_, sector)] => Around::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
+        [] => SectorDistribution::EngineOrder(0),
+        [("engine_order", order)] => SectorDistribution::EngineOrder(order),
+        [("nodal_diameter", diameter)] => SectorDistribution::NodalDiameter(diameter),
+        [(_, sector)] => SectorDistribution::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
         [(one, _), (other, _), ..] => {
             let message = format!("`{one}` and `{other}` both define the wave");
             let help =
                 format!("keep one of them; for two waves write two entries, one with `{one}` and one with `{other}`");
             problems.push(Problem::new(table.location_of(other, None), other, message).help(help));
-            Around::EngineOrder(0)
+            SectorDistribution::EngineOrder(0)
         }
     }
 }

@@ -849,7 +849,7 @@ pub(crate) fn model_of(
 fn numbers_hold(model: &Model) -> bool {
     let not_negative = |value: f64| value.is_finite() && value >= 0.0;
     model.masses.iter().all(|mass| not_negative(mass.mass))
-        && model.bodies.iter().all(|body| body.is_sound())
+        && model.bodies.iter().all(|body| body.is_valid())
         && model.springs.iter().all(|spring| not_negative(spring.stiffness) && spring.damping.is_finite())
         && model.joints.iter().all(|joint| joint.law.check().is_ok())
         && model.forces.iter().all(|force| force.amplitude.is_finite() && force.phase.is_finite())

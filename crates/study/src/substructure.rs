@@ -6,7 +6,7 @@ use crate::stated::Matrices;
 use crate::statement::{Environment, StatedTable};
 use crate::values::Values;
 use stickslip::method::WIDTH;
-use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
+use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
@@ -97,10 +97,10 @@ pub(crate) fn of(
         (None, Some(false)) => WHOLE,
         _ => Reduction::up_to(0.0),
     };
-    let earlier = values.table("reduced").and_then(|reduced| {
-        Some(ReductionEvidence { error: reduced.quantity("error")?, up_to: reduced.quantity("up_to")? })
+    let earlier_reduction = values.table("reduced").and_then(|reduced| {
+        Some(ReductionAccuracy { error: reduced.quantity("error")?, up_to: reduced.quantity("up_to")? })
     });
-    Substructure { component, damping, reduction, earlier, disk: None }
+    Substructure { component, damping, reduction, earlier_reduction, disk: None }
 }
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {
@@ -326,7 +326,7 @@ pub(crate) fn view(table: &StatedTable, values: &Values, model: &Model) -> Resul
         let message = format!("{} names in `directions` for {}", directions.len(), names.join(", "));
         return Err(problem("directions", message).map_help("name each tangent and the normal, or remove `directions`"));
     }
-    Ok(Place { name, directions, rows, frame: None, of: Some(of.to_owned()) })
+    Ok(Place { name, directions, rows, frame: None, view_of: Some(of.to_owned()) })
 }
 
 /// Builds a point of a body, with all directions of its points or those that are named.
@@ -495,7 +495,7 @@ fn made(table: &StatedTable, values: &Values, component: &Component) -> Result<P
         }
         None => None,
     };
-    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, of: None })
+    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, view_of: None })
 }
 
 /// Returns the rows of a node in the order x, y, z of a frame, by the ends of their names.

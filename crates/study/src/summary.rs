@@ -18,7 +18,7 @@ use crate::survey::{Surveyed, range};
 use crate::work::Units;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{Modes, Onset, System};
+use stickslip::model::{LinearModes, SlipOnset, System};
 
 /// Summary of a study before it is run.
 #[derive(Debug, Clone)]
@@ -37,9 +37,9 @@ pub struct ModelSummary {
     /// True if the model has too many degrees of freedom for the modes, which are then absent.
     pub too_large: bool,
     /// Modes with all joints free.
-    pub free: Modes,
+    pub free: LinearModes,
     /// Modes with all joints stuck.
-    pub stuck: Modes,
+    pub stuck: LinearModes,
     /// The joints, in the order of the model.
     pub joints: Vec<JointSummary>,
     /// Number of orbits at one frequency, with the reason if there may be several. `None` if
@@ -80,7 +80,7 @@ impl Orbits {
             // on a large structure the answer takes three factorizations
             return match system.structure().is_sparse() {
                 true => None,
-                false if system.contracts() => Some(Orbits::One),
+                false if system.is_incrementally_stable() => Some(Orbits::One),
                 false => Some(Orbits::Several("the structure feeds energy into some motion".to_owned())),
             };
         }
@@ -113,7 +113,7 @@ pub struct JointSummary {
     pub at_rest: Option<f64>,
     /// Load by the excitation while all joints stick. `None` if the study has no excitation or
     /// the model is too large for a quick answer.
-    pub onset: Option<Onset>,
+    pub onset: Option<SlipOnset>,
 }
 
 /// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
@@ -136,7 +136,7 @@ const UNLOADED: f64 = 1e6;
 
 /// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
 /// rounding.
-fn load(onset: &Onset) -> f64 {
+fn load(onset: &SlipOnset) -> f64 {
     if onset.largest * UNLOADED < 1.0 { 0.0 } else { onset.largest }
 }
 
@@ -175,8 +175,8 @@ impl ModelSummary {
             limit: slip.limit,
             displacement: slip.displacement,
             gradual: slip.gradual,
-            pressed: slip.pressed,
-            at_rest: slip.at_rest,
+            pressed: slip.preload,
+            at_rest: slip.equilibrium_force,
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
@@ -242,12 +242,12 @@ impl ModelSummary {
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.
     pub fn to_json(&self) -> Json {
-        let modes = |modes: &Modes| {
+        let modes = |modes: &LinearModes| {
             json!({
                 "frequencies_Hz": modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>(),
                 "damping_ratios": modes.elastic.iter().map(|mode| mode.damping).collect::<Vec<_>>(),
                 "rigid": modes.rigid,
-                "lost": modes.lost,
+                "lost": modes.unresolved,
             })
         };
         let joint = |joint: &JointSummary| {
@@ -259,9 +259,9 @@ impl ModelSummary {
                 "pressed_at_rest_N": joint.at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
                 "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / load(onset)).filter(|x| x.is_finite()),
-                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| load(onset) > 0.0).map(|onset| onset.at / TAU),
+                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| load(onset) > 0.0).map(|onset| onset.omega / TAU),
                 "slips_Hz": joint.onset.as_ref()
-                    .map(|onset| onset.slips.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
+                    .map(|onset| onset.slip_ranges.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
             })
         };
         json!({

@@ -6,7 +6,7 @@ use crate::values::{Frequencies, Values};
 use crate::words::{quantity, significant};
 use std::f64::consts::TAU;
 use stickslip::curve::modes::unit;
-use stickslip::model::{Cyclic, LinearMode, Modes};
+use stickslip::model::{CyclicSymmetry, LinearModes, NaturalMode};
 
 /// Warnings of a kind that needs an excitation.
 pub(crate) fn driven(cases: &[Surveyed]) -> Vec<String> {
@@ -58,7 +58,7 @@ fn no_excitation(cases: &[Surveyed], starts_count: bool) -> Option<String> {
 pub(crate) fn undamped(cases: &[Surveyed]) -> Option<String> {
     let found = |one: &Surveyed| {
         let (from, to) = range(&one.case)?;
-        one.survey.undamped(from, to).first().copied()
+        one.survey.undamped_resonances(from, to).first().copied()
     };
     // the warning must be true for every case
     let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
@@ -82,7 +82,7 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
             return None; // `no_excitation` reports this
         }
         let (free, stuck) = (one.survey.free(), one.survey.stuck());
-        if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+        if one.survey.is_too_large() || free.unresolved + stuck.unresolved > 0 {
             return None; // the modes are unknown
         }
         if one.survey.system().joints().iter().any(|joint| joint.law().force_scale().is_infinite()) {
@@ -92,7 +92,8 @@ fn no_resonance(cases: &[Surveyed]) -> Option<String> {
         // stuck
         let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
         let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
-        let single = |modes: &Modes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
+        let single =
+            |modes: &LinearModes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
         let intervals: Vec<(f64, f64)> = between.chain(single(free)).chain(single(stuck)).collect();
         for h in harmonics.iter().map(|h| f64::from(*h)) {
             if intervals.iter().any(|(a, b)| a / h <= to && b / h >= from) {
@@ -165,7 +166,7 @@ fn coarse(cases: &[Surveyed]) -> Option<String> {
 fn narrowest(one: &Surveyed) -> Option<Narrow> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let (free, stuck) = (one.survey.free(), one.survey.stuck());
-    if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+    if one.survey.is_too_large() || free.unresolved + stuck.unresolved > 0 {
         return None; // the modes are unknown
     }
     let all = one.survey.harmonics().into_iter().flat_map(|harmonic| resonances(free, stuck, harmonic));
@@ -182,11 +183,11 @@ fn narrowest_met(one: &Surveyed) -> Option<Narrow> {
     };
     let harmonics = one.survey.harmonics();
     let highest = to * f64::from(*harmonics.last()?);
-    let below = |modes: &Modes| modes.elastic.iter().filter(|mode| mode.omega <= highest).count();
+    let below = |modes: &LinearModes| modes.elastic.iter().filter(|mode| mode.omega <= highest).count();
     let most = below(one.survey.free()).max(below(one.survey.stuck()));
     let Ok(Some(waves)) = one.case.model.wave_modes(most) else { return narrowest(one) };
     let met = |harmonic: u32| {
-        let turns = Cyclic { sectors, order }.diameter(harmonic as usize);
+        let turns = CyclicSymmetry { sectors, order }.diameter(harmonic as usize);
         waves.iter().find(|wave| wave.diameter == turns.min(sectors - turns))
     };
     let of = |harmonic: u32| met(harmonic).map(|wave| resonances(&wave.free, &wave.stuck, harmonic));
@@ -195,11 +196,11 @@ fn narrowest_met(one: &Surveyed) -> Option<Narrow> {
 
 /// Returns the excitation frequencies at which a harmonic meets each mode: the lower and the
 /// higher one (joints free and stuck), and the width, rad/s.
-fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)> {
-    let width = |mode: &LinearMode| 2.0 * mode.damping * mode.omega;
+fn resonances(free: &LinearModes, stuck: &LinearModes, harmonic: u32) -> Vec<(f64, f64, f64)> {
+    let width = |mode: &NaturalMode| 2.0 * mode.damping * mode.omega;
     let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
     let h = f64::from(harmonic);
-    let between = |(free, stuck): (&LinearMode, &LinearMode)| {
+    let between = |(free, stuck): (&NaturalMode, &NaturalMode)| {
         let width = width(free).max(width(stuck));
         (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h, width / h)
     };

@@ -266,7 +266,7 @@ pub fn with_mass(system: &System, change: impl FnOnce(&mut DMatrix<f64>)) -> Res
     let mut mass = old.mass().clone();
     change(&mut mass);
     let structure = Structure::new(old.places().to_vec(), mass, old.damping().clone(), old.stiffness().clone())?;
-    Ok(system.on(structure).expect("as many degrees of freedom"))
+    Ok(system.with_structure(structure).expect("as many degrees of freedom"))
 }
 
 /// Assembles a template with the laws of all joints replaced by `law(limit)`, given the slip

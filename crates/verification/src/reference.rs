@@ -138,7 +138,7 @@ impl<'a> Reference<'a> {
     fn motion(&self, j: usize, x: &DVector<f64>, v: &DVector<f64>, time: f64) -> (Along, Along) {
         let (mut u, mut rate) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS]);
         for (k, axis) in self.contacts[j].axes.iter().enumerate() {
-            (u[k], rate[k]) = (axis.along(x.as_slice()), axis.along(v.as_slice()));
+            (u[k], rate[k]) = (axis.component(x.as_slice()), axis.component(v.as_slice()));
             for &(h, g) in axis.imposed() {
                 let turn = num_complex::Complex64::cis(f64::from(h) * self.omega * time) * g;
                 u[k] += turn.re;

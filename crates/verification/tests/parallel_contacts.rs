@@ -10,7 +10,9 @@ use stickslip::curve::modes::{ModeRequest, mode};
 use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip::model::{Around, Axis, Disk, Force, GROUND, Joint, Mass, Model, Spring, System, SystemBuilder};
+use stickslip::model::{
+    Axis, Disk, Force, GROUND, Joint, Mass, Model, SectorDistribution, Spring, System, SystemBuilder,
+};
 use stickslip::orbit::{Accuracy, Orbit};
 use stickslip::structure::Structure;
 use stickslip_verification::{close, exact, near};
@@ -269,7 +271,7 @@ fn ring(sectors: usize, contacts: &[(bool, f64)]) -> Model {
         forces: vec![Force { on: "blade".into(), amplitude: 1.0, phase: 0.3, harmonic: 1 }],
         ..Model::default()
     };
-    let disk = Disk { sectors, forces: vec![Around::EngineOrder(1)], motions: Vec::new() };
+    let disk = Disk { sectors, forces: vec![SectorDistribution::EngineOrder(1)], motions: Vec::new() };
     disk.ring(|_| sector.clone()).unwrap()
 }
 

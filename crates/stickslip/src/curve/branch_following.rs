@@ -29,7 +29,7 @@ const MAX_SIZE: usize = 24;
 /// small, and several orbits may exist at a frequency.
 pub fn is_followed(system: &System) -> bool {
     let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
-    system.dofs() + directions <= MAX_SIZE && !system.contracts()
+    system.dofs() + directions <= MAX_SIZE && !system.is_incrementally_stable()
 }
 
 /// Returns a solver with branch following for systems that use it; otherwise the method's own

@@ -186,7 +186,7 @@ impl Trace<'_> {
         let mut equations = BranchEquations::new(self.at, self.method, self.range)?;
         let start = equations.start(self.range.0)?;
         let steps = Steps::between(self.range.0, self.range.1, self.step);
-        let single = (self.at)(self.range.0).0.contracts();
+        let single = (self.at)(self.range.0).0.is_incrementally_stable();
         let mut way = CurvePart { single, ..CurvePart::default() };
         let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
         if !single && end == End::Border {

@@ -228,7 +228,7 @@ pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     let equations = equations(system, 1, 8)?;
     let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
     let displacements = |x: Vec<Complex64>| -> Vec<Complex64> {
-        x.into_iter().zip(system.seen()).filter(|(_, place)| !place.is_rotation()).map(|(x, _)| x).collect()
+        x.into_iter().zip(system.place_axes()).filter(|(_, place)| !place.is_rotation()).map(|(x, _)| x).collect()
     };
     Ok(equations.linear_modes().get(index).and_then(|linear| {
         let shape = linear.shape.as_slice();

@@ -77,7 +77,7 @@ impl Auto {
     fn by_laws(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints().len();
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
-        let massless = (0..system.dofs()).any(|dof| system.structure().own_mass(dof) <= 0.0);
+        let massless = (0..system.dofs()).any(|dof| system.structure().diagonal_mass(dof) <= 0.0);
         let events = event_driven::orbit_work(system).map(|work| APART * work);
         let balance =
             |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };

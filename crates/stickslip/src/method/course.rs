@@ -112,8 +112,9 @@ fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64
     let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
     let share = widest.1;
     // a drift has the same direction in both halves of the window
-    let moved = |axis: &Axis, from: usize, to: usize| axis.along(&returns[to][..n]) - axis.along(&returns[from][..n]);
-    let displacements = system.seen().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
+    let moved =
+        |axis: &Axis, from: usize, to: usize| axis.component(&returns[to][..n]) - axis.component(&returns[from][..n]);
+    let displacements = system.place_axes().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
     let farthest = displacements.map(|(axis, place)| {
         let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
         let steady =

@@ -314,9 +314,9 @@ mod tests {
         // loss in the joints: `π ω c |u|²` along each axis; the relaxing joints lose by their
         // loss stiffness
         let x = linear(omega, &parts);
-        let loss: f64 = parts.iter().map(|(k, axis)| TAU / 2.0 * k.im * axis.along_complex(&x).norm_sqr()).sum();
+        let loss: f64 = parts.iter().map(|(k, axis)| TAU / 2.0 * k.im * axis.complex_component(&x).norm_sqr()).sum();
         near(orbit.energy.friction, loss, 1e-7);
-        near(orbit.joints[0].displacement[1].1, axes[1].along_complex(&x).norm(), 1e-7);
+        near(orbit.joints[0].displacement[1].1, axes[1].complex_component(&x).norm(), 1e-7);
         // a slider behind a spring that never slips requires equal steps
         let held = Axis::new(vec![(0, 1.0)]);
         joints.push((Arc::new(Jenkins { stiffness: 4.0, limit: 100.0 }), vec![held.clone()]));
@@ -341,7 +341,8 @@ mod tests {
     #[test]
     fn a_slider_led_round_a_circle_loses_what_it_must() {
         let a = 0.3;
-        let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| Axis::new(Vec::new()).moved([(1, g)]));
+        let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)]
+            .map(|g| Axis::new(Vec::new()).with_imposed_motion([(1, g)]));
         let nothing = DMatrix::zeros(0, 0);
         let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
         let system = System::builder(empty).joint("led", Arc::new(Sample::Sliding), circle.to_vec()).build().unwrap();
@@ -370,7 +371,8 @@ mod tests {
         for (law, (part, slips)) in laws.iter().flat_map(|law| [(0.99, 0.0), (1.01, 1.0)].map(|case| (law, case))) {
             let a = part * limit / stiffness;
             let still = Axis::new(Vec::new());
-            let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| still.clone().moved([(1, g)]));
+            let circle =
+                [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| still.clone().with_imposed_motion([(1, g)]));
             let axes = circle.into_iter().chain([still]).take(law.directions()).collect();
             let nothing = DMatrix::zeros(0, 0);
             let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();

@@ -111,7 +111,7 @@ impl Guess {
                     .zip(&guess.harmonics)
                     .filter(|(h, _)| **h > 0)
                     .map(|(h, (_, x))| {
-                        let along = joint.axes().iter().map(|axis| axis.along_complex(x) + axis.imposed_at(*h));
+                        let along = joint.axes().iter().map(|axis| axis.complex_component(x) + axis.imposed_at(*h));
                         along.map(|u| u.norm_sqr()).sum::<f64>().sqrt()
                     })
                     .sum();
@@ -165,7 +165,7 @@ impl Guess {
         (h, x): (u32, &DVector<Complex64>),
     ) -> Complex64 {
         let axes = system.joints()[joint].axes().iter().enumerate();
-        axes.map(|(b, along)| self.joints[joint][(axis, b)] * (along.along_complex(x) + along.imposed_at(h))).sum()
+        axes.map(|(b, along)| self.joints[joint][(axis, b)] * (along.complex_component(x) + along.imposed_at(h))).sum()
     }
 
     /// Returns displacements and velocities at t = 0, length 2n.

@@ -190,7 +190,7 @@ impl Held {
 fn place(system: &System, equilibrium: Option<&StaticEquilibrium>, spring: &ElasticSlider) -> f64 {
     let Some(known) = equilibrium else { return 0.0 };
     let axis = &system.joints()[spring.joint].axes()[0];
-    let displacement = axis.along(known.displacement()) + axis.imposed_at(0).re;
+    let displacement = axis.component(known.displacement()) + axis.imposed_at(0).re;
     let force = known.joint_states().get(spring.state - 2 * system.dofs()).copied().unwrap_or(0.0);
     displacement - force / spring.stiffness
 }

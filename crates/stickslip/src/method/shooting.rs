@@ -263,7 +263,7 @@ impl<'a> Shooter<'a> {
             duration: 0.0,
             rest: 0.0,
             // the smoothed laws are passive if the exact laws are
-            contracts: system.contracts(),
+            contracts: system.is_incrementally_stable(),
             equilibrium: StaticEquilibrium::under_load(system),
         })
     }

@@ -114,7 +114,7 @@ pub(crate) fn states_at(
             std::array::from_fn(|a| {
                 let Some(axis) = axes.get(a) else { return 0.0 };
                 let imposed = axis.imposed().iter().filter(|(h, _)| vibrates || *h == 0).map(|(_, g)| g.re);
-                axis.along(x) + imposed.sum::<f64>()
+                axis.component(x) + imposed.sum::<f64>()
             })
         };
         let from = along(equilibrium.displacement(), false);

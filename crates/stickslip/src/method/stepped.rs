@@ -59,8 +59,8 @@ impl SteppedPath {
         let end = |instant: Instant, time: f64| {
             let (g, speed) = self.drive.relative_at(axis, time);
             let along = &self.assembly.axes[axis];
-            let acceleration = along.along(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
-            [along.along(instant.displacement) + g, along.along(instant.velocity) + speed, acceleration]
+            let acceleration = along.component(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
+            [along.component(instant.displacement) + g, along.component(instant.velocity) + speed, acceleration]
         };
         let [from, to] = self.steps.ends(step);
         [end(from, start), end(to, start + length)]
@@ -230,7 +230,7 @@ impl Path for SteppedPath {
 /// Returns the displacements of the moved places at one instant and the forces that move them.
 fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64]; 4]) -> Vec<(f64, f64)> {
     let motion: Vec<[f64; 3]> = system
-        .moved()
+        .moved_places()
         .iter()
         .map(|place| {
             place.motion.iter().fold([0.0; 3], |sum, &(h, amplitude)| {
@@ -253,7 +253,7 @@ fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64];
         }
         (motion[m][0], force + place.joints.iter().zip(forces).map(|(sign, f)| sign * f).sum::<f64>())
     };
-    system.moved().iter().enumerate().map(reaction).collect()
+    system.moved_places().iter().enumerate().map(reaction).collect()
 }
 
 /// A signal is the list of its values at the nodes.
@@ -291,7 +291,7 @@ impl PathSignals for SteppedPath {
         signal.iter().enumerate().map(term).sum()
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(|step| self.ends(step, |values| place.along(values))))
+        Ok(self.range_of(|step| self.ends(step, |values| place.component(values))))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))

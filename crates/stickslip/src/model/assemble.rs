@@ -8,7 +8,7 @@ use super::place::places_of;
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::reduction::Row;
-use crate::structure::{DampedModes, Structure};
+use crate::structure::{ModalDamping, Structure};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
@@ -81,7 +81,8 @@ impl Model {
         let matrices = assembler.matrices()?;
         let motions = assembler.motions()?;
         let builder = System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
-        let builder = builder.earlier(self.substructure.as_ref().and_then(|substructure| substructure.earlier));
+        let builder =
+            builder.earlier(self.substructure.as_ref().and_then(|substructure| substructure.earlier_reduction));
         let (builder, forces) = assembler.forces(assembler.add_places(builder))?;
         let builder = assembler.loads_of_motions(builder, &matrices, &motions);
         let (builder, signs) = assembler.joints(builder, &motions)?;
@@ -90,7 +91,7 @@ impl Model {
         // a ring that was edited after its creation can lack the symmetry; then the whole ring
         // is solved
         Ok(match self.ring.and_then(Ring::wave) {
-            Some(wave) => system.clone().travelling(wave).unwrap_or(system),
+            Some(wave) => system.clone().with_cyclic_symmetry(wave).unwrap_or(system),
             None => system,
         })
     }
@@ -113,7 +114,7 @@ struct AssembledMatrices {
     mass: Matrix,
     damping: Matrix,
     /// Damped modes, in addition to `damping`.
-    modes: Option<DampedModes>,
+    modes: Option<ModalDamping>,
     stiffness: Matrix,
 }
 
@@ -209,7 +210,7 @@ impl Assembler<'_> {
             Some(modes) if *moved == 0 => structure.with_damped_modes(modes),
             Some(modes) => {
                 let free: Vec<f64> = modes.iter().flat_map(|column| &column[..*n]).copied().collect();
-                structure.with_damped_modes(&DampedModes::new(*n, Arc::new(free)))
+                structure.with_damped_modes(&ModalDamping::new(*n, Arc::new(free)))
             }
         })
     }
@@ -223,7 +224,7 @@ impl Assembler<'_> {
             if !place.moved && !without_results {
                 let axis = self.axis(row).0;
                 let axis = match place.radius {
-                    Some(radius) => axis.rotation(radius),
+                    Some(radius) => axis.as_rotation(radius),
                     None => axis,
                 };
                 builder = builder.place(place.name.clone(), axis);
@@ -335,7 +336,7 @@ impl Assembler<'_> {
                     }
                     imposed.extend(motions[k].iter().map(|(&harmonic, &amplitude)| (harmonic, amplitude * sign)));
                 }
-                let axis = axis.moved(imposed);
+                let axis = axis.with_imposed_motion(imposed);
                 axes.push(if let Some(along) = along { axis.named(along) } else { axis });
             }
             builder = builder.joint(joint.name.clone(), joint.law.clone(), axes);

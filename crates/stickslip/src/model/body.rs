@@ -80,7 +80,7 @@ impl Body {
         let axes = self.axes();
         let rows = axes.iter().map(|axis| self.row(offset, unit(*axis))).collect();
         let names: Vec<&str> = axes.iter().map(|axis| TRANSLATIONS[*axis]).collect();
-        Place::node(name, &names, rows).of_node(self.name.as_str())
+        Place::node(name, &names, rows).as_view_of(self.name.as_str())
     }
 
     /// Returns the axes x, y, z, by index, along which points of the body can move. A body in a
@@ -122,7 +122,7 @@ impl Body {
     }
 
     /// Returns whether its directions, mass and inertia are valid.
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         self.check().is_ok()
     }
 
@@ -339,7 +339,7 @@ mod tests {
     /// Returns the places under the forces of the first harmonic at `omega`, without joints.
     fn solved(system: &crate::model::System, omega: f64) -> Vec<f64> {
         let dynamic = system.structure().stiffness() - system.structure().mass() * (omega * omega);
-        let force = system.loads()[0].at(omega).map(|f| f.re);
+        let force = system.excitation_harmonics()[0].amplitudes_at(omega).map(|f| f.re);
         let x = dynamic.lu().solve(&force).unwrap();
         system.at_places(x.as_slice())
     }
@@ -399,7 +399,7 @@ mod tests {
                 let ends = [a, b].map(|i| format!("end{a}{b}_{i}"));
                 for (end, i) in ends.iter().zip([a, b]) {
                     let row = vec![(0, x / x.hypot(z)), (1, z / x.hypot(z))];
-                    model.places.push(Place::new(end.clone(), row).of_node(format!("p{i}")));
+                    model.places.push(Place::new(end.clone(), row).as_view_of(format!("p{i}")));
                 }
                 model.springs.push(spring(&ends[0], &ends[1], stiffness));
             }

@@ -103,14 +103,15 @@ mod tests {
     #[test]
     fn imposed_motion_goes_along_but_for_a_constant() {
         let g = Complex64::new(0.3, -0.4);
-        let axis = |weight: f64, imposed: Vec<(u32, Complex64)>| Axis::new(vec![(1, weight)]).moved(imposed);
+        let axis =
+            |weight: f64, imposed: Vec<(u32, Complex64)>| Axis::new(vec![(1, weight)]).with_imposed_motion(imposed);
         let first = axis(1.0, vec![(1, g), (0, Complex64::new(2.0, 0.0))]);
         assert_eq!(factor(&axis(-2.0, vec![(1, g * -2.0)]), &first), Some(-2.0));
         for imposed in [vec![], vec![(1, g)], vec![(1, g * -2.0), (3, g)]] {
             assert_eq!(factor(&axis(-2.0, imposed), &first), None);
         }
         // an axis with imposed motion alone has no direction
-        let moved = |rows| Axis::new(rows).moved([(1, g)]);
+        let moved = |rows| Axis::new(rows).with_imposed_motion([(1, g)]);
         assert_eq!(factor(&moved(vec![]), &moved(vec![])), None);
     }
 }

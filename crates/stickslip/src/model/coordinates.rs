@@ -15,7 +15,7 @@ use super::name_resolution::{PlaceSource, Places};
 use super::place::Place;
 use super::substructure::{Entries, SubstructureParts};
 use crate::structure::reduction::Row;
-use crate::structure::{DampedModes, ReducedComponent};
+use crate::structure::{ModalDamping, ReducedComponent};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ pub(super) struct Coordinates {
     pub entries: [Entries; 3],
     /// Modal damping in addition to the damping entries, over the free and then the moved
     /// coordinates.
-    pub modes: Option<DampedModes>,
+    pub modes: Option<ModalDamping>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
@@ -110,7 +110,7 @@ impl Coordinates {
             for (column, own) in columns.chunks_exact_mut(names.len().max(1)).zip(modes.iter()) {
                 own.iter().enumerate().for_each(|(at, value)| column[order.of_part(at)] = *value);
             }
-            DampedModes::new(names.len(), Arc::new(columns))
+            ModalDamping::new(names.len(), Arc::new(columns))
         });
         let moved: Vec<(&str, &Row)> = places
             .stated
@@ -151,7 +151,7 @@ impl Coordinates {
 /// Returns one direction of a place that is a second view of a node, over the coordinates of
 /// that node.
 fn node_view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
-    let of = place.of.as_deref().unwrap_or_default();
+    let of = place.view_of.as_deref().unwrap_or_default();
     let is_of = |name: &str| name == of || name.split_once('.').is_some_and(|(node, _)| node == of);
     let node: Vec<&Row> =
         places.stated.iter().zip(rows).filter(|(stated, _)| is_of(&stated.name)).map(|(_, row)| row).collect();
@@ -356,7 +356,7 @@ impl MotionElimination {
     }
 
     /// Returns `Tᵀ U`.
-    fn modes(&self, modes: &DampedModes, moved: usize) -> DampedModes {
+    fn modes(&self, modes: &ModalDamping, moved: usize) -> ModalDamping {
         let n = self.free + moved;
         let mut columns = vec![0.0; modes.iter().count() * n];
         for (column, own) in columns.chunks_exact_mut(n.max(1)).zip(modes.iter()) {
@@ -364,7 +364,7 @@ impl MotionElimination {
                 row.iter().for_each(|(to, weight)| column[*to] += weight * value);
             }
         }
-        DampedModes::new(n, Arc::new(columns))
+        ModalDamping::new(n, Arc::new(columns))
     }
 }
 

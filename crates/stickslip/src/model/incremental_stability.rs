@@ -38,15 +38,15 @@ impl System {
     /// ```
     /// use stickslip::structure::Structure;
     /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
-    /// assert!(system.contracts());
+    /// assert!(system.is_incrementally_stable());
     /// let old = system.structure();
     /// let mut damping = old.damping().clone();
     /// damping[(0, 0)] = -0.1;
     /// let driven = Structure::new(old.places().to_vec(), old.mass().clone(), damping, old.stiffness().clone()).unwrap();
-    /// assert!(!system.on(driven).unwrap().contracts());
+    /// assert!(!system.with_structure(driven).unwrap().is_incrementally_stable());
     /// ```
-    pub fn contracts(&self) -> bool {
-        self.has_passive_joints() && self.structure().dissipates()
+    pub fn is_incrementally_stable(&self) -> bool {
+        self.has_passive_joints() && self.structure().is_dissipative()
     }
 
     /// Returns whether every joint is incrementally passive.
@@ -83,13 +83,16 @@ mod tests {
     #[test]
     fn what_contracts() {
         let (one, two, zero) = ([1.0; 2], [1.0; 3], [0.0; 3]);
-        assert!(system(one, two, two).contracts());
-        assert!(system(one, two, zero).contracts(), "undamped");
-        assert!(system(one, zero, zero).contracts(), "two free masses");
-        assert!(system([1.0, 0.0], two, zero).contracts(), "a massless place that springs hold");
-        assert!(!system([1.0, 0.0], [1.0, 0.0, 0.0], zero).contracts(), "a massless place that nothing holds");
-        assert!(!system(one, two, [-0.1, 1.0, 0.05]).contracts(), "a damper that gives energy");
-        assert!(system(one, two, [-0.1, 1.0, 1.0]).contracts(), "others take more: 0.9 · 2 > 1");
+        assert!(system(one, two, two).is_incrementally_stable());
+        assert!(system(one, two, zero).is_incrementally_stable(), "undamped");
+        assert!(system(one, zero, zero).is_incrementally_stable(), "two free masses");
+        assert!(system([1.0, 0.0], two, zero).is_incrementally_stable(), "a massless place that springs hold");
+        assert!(
+            !system([1.0, 0.0], [1.0, 0.0, 0.0], zero).is_incrementally_stable(),
+            "a massless place that nothing holds"
+        );
+        assert!(!system(one, two, [-0.1, 1.0, 0.05]).is_incrementally_stable(), "a damper that gives energy");
+        assert!(system(one, two, [-0.1, 1.0, 1.0]).is_incrementally_stable(), "others take more: 0.9 · 2 > 1");
         // returns a system with changed dampers and springs
         type Change<'a> = &'a dyn Fn(&mut DMatrix<f64>);
         let with = |system: System, damping: Change, stiffness: Change| {
@@ -97,11 +100,11 @@ mod tests {
             let (mut c, mut k) = (old.damping().clone(), old.stiffness().clone());
             damping(&mut c);
             stiffness(&mut k);
-            system.on(Structure::new(old.places().to_vec(), old.mass().clone(), c, k).unwrap()).unwrap()
+            system.with_structure(Structure::new(old.places().to_vec(), old.mass().clone(), c, k).unwrap()).unwrap()
         };
         let turning = |c: &mut DMatrix<f64>| (c[(0, 1)], c[(1, 0)]) = (3.0, -3.0);
-        assert!(with(system(one, two, zero), &turning, &|_| ()).contracts(), "turning takes no power");
+        assert!(with(system(one, two, zero), &turning, &|_| ()).is_incrementally_stable(), "turning takes no power");
         let buckled = |k: &mut DMatrix<f64>| k[(0, 0)] = -1.0;
-        assert!(!with(system(one, two, two), &|_| (), &buckled).contracts(), "negative stiffness");
+        assert!(!with(system(one, two, two), &|_| (), &buckled).is_incrementally_stable(), "negative stiffness");
     }
 }

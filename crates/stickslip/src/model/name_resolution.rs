@@ -86,7 +86,7 @@ impl Model {
     /// its points.
     pub(super) fn is_of_body(&self, place: &str) -> bool {
         let node = place.split_once('.').map_or(place, |(node, _)| node);
-        let of = self.places.iter().find(|place| place.name == node).and_then(|place| place.of.as_deref());
+        let of = self.places.iter().find(|place| place.name == node).and_then(|place| place.view_of.as_deref());
         self.bodies.iter().any(|body| body.name == of.unwrap_or(node))
     }
 
@@ -131,7 +131,7 @@ impl Places {
                 let message = "a local frame needs three displacements, along x, y and z";
                 return Err(ModelError::new(element, "normal", message));
             }
-            if place.of.is_none() {
+            if place.view_of.is_none() {
                 collected.node(element, (&place.name, &place.directions), |along| PlaceSource::Component(i, along))?;
             }
         }
@@ -141,7 +141,7 @@ impl Places {
         for (i, body) in model.bodies.iter().enumerate() {
             collected.body(i, body)?;
         }
-        for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_some()) {
+        for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.view_of.is_some()) {
             check_view(model, place, Element::Place(i))?;
             collected.node(Element::Place(i), (&place.name, &place.directions), |along| PlaceSource::View(i, along))?;
         }
@@ -257,7 +257,7 @@ impl Places {
 /// Checks a place that is a view of another node: the node must have the directions that its
 /// rows use.
 fn check_view(model: &Model, place: &Place, element: Element) -> Result<(), ModelError> {
-    let Some(of) = &place.of else { return Ok(()) };
+    let Some(of) = &place.view_of else { return Ok(()) };
     let mass = model.masses.iter().find(|mass| mass.name == *of).map(|mass| mass.places().len());
     let body = model.bodies.iter().find(|body| body.name == *of).map(|body| body.directions.len());
     let Some(count) = mass.or(body) else {

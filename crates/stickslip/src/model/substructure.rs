@@ -4,9 +4,9 @@
 
 use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Substructure, SubstructureDamping};
-use crate::structure::reduction::{Damping, Reduced, ReductionError, Row};
+use crate::structure::reduction::{ReducedMatrices, ReductionError, Row, StructureDamping};
 use crate::structure::{
-    BladeCache, DampedModes, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorCache,
+    BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorCache,
 };
 use std::sync::Arc;
 use stickslip_numerics::sparse::ModesError;
@@ -24,14 +24,14 @@ pub(super) struct SubstructureParts {
     /// Entries of mass, damping and stiffness.
     pub entries: [Entries; 3],
     /// Modal damping in addition to the damping entries, over its coordinates.
-    pub modes: Option<DampedModes>,
+    pub modes: Option<ModalDamping>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
 impl SubstructureParts {
     pub fn new(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
         let n = substructure.component.dofs();
-        for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.of.is_none()) {
+        for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.view_of.is_none()) {
             for row in &place.rows {
                 let wrong = |key, message: String| Err(ModelError::new(Element::Place(i), key, message));
                 if let Some((at, _)) = row.iter().find(|(at, _)| *at >= n) {
@@ -92,7 +92,7 @@ impl SubstructureParts {
     }
 
     fn reduced(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
-        let own = model.places.iter().filter(|place| place.of.is_none());
+        let own = model.places.iter().filter(|place| place.view_of.is_none());
         let seen: Vec<Row> = own.flat_map(|place| place.rows.iter().cloned()).collect();
         let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(reduction_error)?;
         let ReducedForm::Alone(reduced) = component.form() else { return Ok(SubstructureParts::default()) };
@@ -103,11 +103,11 @@ impl SubstructureParts {
             let all = (0..matrix.ncols()).flat_map(|k| (0..matrix.nrows()).map(move |i| (i, k)));
             all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0).collect()
         };
-        let Reduced { mass, damping, stiffness, ports, .. } = reduced;
+        let ReducedMatrices { mass, damping, stiffness, ports, .. } = reduced;
         let row = |port: usize| ports.row(port).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
         let mut next = 0;
         let of_place = |place: &super::Place| -> Vec<Row> {
-            if place.of.is_some() {
+            if place.view_of.is_some() {
                 return Vec::new();
             }
             next += place.rows.len();
@@ -125,7 +125,7 @@ impl SubstructureParts {
     /// Returns the parts of all sectors of a disk.
     fn ring(substructure: &Substructure, disk: &DiskPart, sectors: usize, model: &Model) -> Result<Self, ModelError> {
         let Substructure { component, reduction, .. } = substructure;
-        if let Some(i) = model.places.iter().position(|place| place.of.is_some()) {
+        if let Some(i) = model.places.iter().position(|place| place.view_of.is_some()) {
             let message = "a rotated view of a mass is not supported in a disk whose sector is given by matrices; define the blade by masses";
             return Err(ModelError::new(Element::Place(i), "of", message));
         }
@@ -305,12 +305,12 @@ fn reduction_error(error: ReductionError) -> ModelError {
 }
 
 /// Returns the damping of a reduced component, unless a matrix defines the damping.
-fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Option<Damping> {
+fn damping_law(substructure: &Substructure, component: &ReducedComponent) -> Option<StructureDamping> {
     match substructure.damping {
         SubstructureDamping::Own => None,
-        SubstructureDamping::Ratio(ratio) => Some(Damping::Ratio { ratio, up_to: component.serves() }),
-        SubstructureDamping::RatioUpTo { ratio, up_to } => Some(Damping::Ratio { ratio, up_to }),
-        SubstructureDamping::Rayleigh { mass, stiffness } => Some(Damping::Rayleigh { mass, stiffness }),
+        SubstructureDamping::Ratio(ratio) => Some(StructureDamping::Ratio { ratio, up_to: component.intended_up_to() }),
+        SubstructureDamping::RatioUpTo { ratio, up_to } => Some(StructureDamping::Ratio { ratio, up_to }),
+        SubstructureDamping::Rayleigh { mass, stiffness } => Some(StructureDamping::Rayleigh { mass, stiffness }),
     }
 }
 
@@ -323,7 +323,7 @@ fn modal_damping_error() -> ModelError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Around, Disk, Force, GROUND, Mass, Place, Spring};
+    use crate::model::{Disk, Force, GROUND, Mass, Place, SectorDistribution, Spring};
     use crate::structure::{Boundary, Component};
     use stickslip_numerics::sparse::Matrix;
 
@@ -364,14 +364,14 @@ mod tests {
         let boundary = Boundary::of_nodes(component.rows(), &[("1".into(), "2".into())], None).unwrap();
         let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation] });
         Model {
-            substructure: Some(Substructure { component, damping, reduction, earlier: None, disk }),
+            substructure: Some(Substructure { component, damping, reduction, earlier_reduction: None, disk }),
             places: vec![Place::new("rim", vec![(1, 1.0)]), Place::new("tip", vec![(3, 1.0)])],
             forces: force(),
             ..Model::default()
         }
     }
 
-    fn ring(sector: impl Fn(f64) -> Model, around: Around, deviations: &[f64]) -> Model {
+    fn ring(sector: impl Fn(f64) -> Model, around: SectorDistribution, deviations: &[f64]) -> Model {
         let disk = Disk { sectors: 5, forces: vec![around], motions: vec![] };
         disk.ring(|s| sector(deviations.get(s).copied().unwrap_or(0.0))).unwrap()
     }
@@ -382,13 +382,13 @@ mod tests {
     fn a_ring_of_matrices_is_that_of_its_masses() {
         for deviations in [&[][..], &DEVIATIONS] {
             let own = |d| by_matrices(d, Reduction::None { up_to: 0.0 }, SubstructureDamping::Own);
-            let wave = Around::EngineOrder(2);
+            let wave = SectorDistribution::EngineOrder(2);
             let (matrices, masses) = (ring(own, wave, deviations), ring(by_masses, wave, deviations));
             assert_eq!(matrices.ring, masses.ring);
             let (matrices, masses) = (matrices.assemble().unwrap(), masses.assemble().unwrap());
             assert_eq!(matrices.places()[2..4], ["rim_1", "tip_1"]);
             assert_eq!(
-                matrices.seen()[8].rows(),
+                matrices.place_axes()[8].rows(),
                 [(0, 1.0)],
                 "the high side of the last sector is the low one of the first"
             );
@@ -398,7 +398,7 @@ mod tests {
             ] {
                 assert!((a - b).amax() < 1e-13, "{a} {b}");
             }
-            assert_eq!(matrices.loads(), masses.loads());
+            assert_eq!(matrices.excitation_harmonics(), masses.excitation_harmonics());
             assert_eq!(matrices.cyclic().is_some(), deviations.is_empty());
         }
     }
@@ -410,8 +410,8 @@ mod tests {
         let how = Reduction::Modes { modes: 3, kind: crate::structure::ReductionKind::Rubin, orders: 1, up_to: 0.0 };
         let damped = |d| by_matrices(d, how, SubstructureDamping::Ratio(0.01));
         for deviations in [&[][..], &[1e-12; 5], &DEVIATIONS] {
-            let few = ring(damped, Around::Sector(1), deviations);
-            let whole = ring(by_masses, Around::Sector(1), deviations);
+            let few = ring(damped, SectorDistribution::Sector(1), deviations);
+            let whole = ring(by_masses, SectorDistribution::Sector(1), deviations);
             let (few, whole) = (few.survey().unwrap(), whole.survey().unwrap());
             assert_eq!(few.dofs(), 15);
             for (a, b) in few.free().elastic.iter().zip(&whole.free().elastic) {
@@ -427,7 +427,7 @@ mod tests {
     #[test]
     fn wrong_sectors_are_refused() {
         let mut model = by_matrices(0.1, Reduction::None { up_to: 0.0 }, SubstructureDamping::Own);
-        let assembled = |model: &Model| ring(|_| model.clone(), Around::EngineOrder(1), &[]).assemble();
+        let assembled = |model: &Model| ring(|_| model.clone(), SectorDistribution::EngineOrder(1), &[]).assemble();
         model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![1];
         assert!(assembled(&model).unwrap_err().message.contains("boundary of the sector"));
         model.substructure.as_mut().unwrap().disk.as_mut().unwrap().blade = vec![];

@@ -50,7 +50,7 @@ pub struct Orbit {
     /// to the state at t = 0. It is 0 × 0 if the method did not need it; [`Orbit::multipliers`]
     /// then computes it.
     pub return_map: DMatrix<f64>,
-    /// No two motions of the system diverge: [`crate::model::System::contracts`].
+    /// No two motions of the system diverge: [`crate::model::System::is_incrementally_stable`].
     pub(crate) contracts: bool,
     pub(crate) path: Arc<dyn Path>,
 }
@@ -232,7 +232,7 @@ impl Orbit {
             joints: measured.joints,
             energy: measured.energy,
             return_map: DMatrix::zeros(0, 0),
-            contracts: system.contracts(),
+            contracts: system.is_incrementally_stable(),
             path,
         })
     }

@@ -6,7 +6,7 @@
 use super::{Energy, JointMotion, PlaceMotion, Symmetry};
 use crate::law::Contact;
 use crate::model::{Axis, System};
-use crate::structure::DampedModes;
+use crate::structure::ModalDamping;
 use num_complex::Complex64;
 use stickslip_numerics::radau::quintic;
 
@@ -137,7 +137,7 @@ pub(crate) fn results<S: PathSignals>(
         if half { (-most, most) } else { (low, high) }
     };
     let mut places = Vec::with_capacity(system.places().len());
-    for (name, place) in system.places().iter().zip(system.seen()) {
+    for (name, place) in system.places().iter().zip(system.place_axes()) {
         let (minimum, maximum) = mirrored(signals.range(place)?);
         let x = signals.place_displacement(place);
         places.push(PlaceMotion {
@@ -146,7 +146,7 @@ pub(crate) fn results<S: PathSignals>(
             minimum,
             mean: if half { 0.0 } else { signals.fourier(&x, 0.0).re / period },
             first_harmonic: signals.fourier(&x, omega) * (2.0 * times / period),
-            radius: place.is_rotation().then(|| place.length()),
+            radius: place.is_rotation().then(|| place.length_scale()),
         });
     }
     let forces: Vec<S::Signal> = system.axes().enumerate().map(|(axis, _)| signals.force(axis)).collect();
@@ -204,13 +204,13 @@ fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S:
             viscous += damping * signals.product(&velocity[row], &velocity[column]);
         }
     }
-    for shape in system.structure().damped_modes().into_iter().flat_map(DampedModes::iter) {
+    for shape in system.structure().damped_modes().into_iter().flat_map(ModalDamping::iter) {
         let mut along = signals.harmonics(&[]);
         shape.iter().zip(&velocity).for_each(|(share, velocity)| signals.add(&mut along, velocity, *share));
         viscous += signals.product(&along, &along);
     }
     let moved: Vec<[S::Signal; 3]> = system
-        .moved()
+        .moved_places()
         .iter()
         .map(|place| {
             let derivative = |order: u32| {
@@ -227,7 +227,7 @@ fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S:
             [derivative(0), derivative(1), derivative(2)]
         })
         .collect();
-    for (m, place) in system.moved().iter().enumerate() {
+    for (m, place) in system.moved_places().iter().enumerate() {
         let [motion, speed, _] = &moved[m];
         // The inertia that the place shares with degrees of freedom is omitted. Its work here is
         // ∫ m a ġ = -∫ m v g̈, and it is already part of their loads.

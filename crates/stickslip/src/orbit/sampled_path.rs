@@ -100,7 +100,7 @@ impl PathSignals for Sampled<'_> {
     fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
         let at = |i: usize| {
             let Sample { displacement, velocity, acceleration, .. } = &self.samples[i];
-            [displacement, velocity, acceleration].map(|values| place.along(values))
+            [displacement, velocity, acceleration].map(|values| place.component(values))
         };
         Ok(self.range_of(at))
     }
@@ -114,7 +114,7 @@ impl PathSignals for Sampled<'_> {
                 -rate * rate * (g * Complex64::cis(rate * time)).re
             });
             let motion = &sample.joints[joint];
-            let acceleration = along.along(&sample.acceleration) + imposed.sum::<f64>();
+            let acceleration = along.component(&sample.acceleration) + imposed.sum::<f64>();
             [motion.displacement[direction], motion.velocity[direction], acceleration]
         };
         Ok(self.range_of(at))

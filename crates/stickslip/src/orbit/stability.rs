@@ -1,10 +1,10 @@
 //! Stability of an orbit against small disturbances.
 //!
 //! If no two motions of the system diverge, every orbit is stable, and nothing is computed
-//! ([`System::contracts`]). Otherwise the Floquet multipliers of largest modulus decide. They
-//! are eigenvalues of the derivative of the return map.
+//! ([`System::is_incrementally_stable`]). Otherwise the Floquet multipliers of largest modulus
+//! decide. They are eigenvalues of the derivative of the return map.
 //!
-//! [`System::contracts`]: crate::model::System::contracts
+//! [`System::is_incrementally_stable`]: crate::model::System::is_incrementally_stable
 
 use super::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -20,7 +20,7 @@ const NEUTRAL: f64 = 1e-6;
 /// Knowledge about the stability of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stability {
-    /// No disturbance grows, by theorem: see [`crate::model::System::contracts`].
+    /// No disturbance grows, by theorem: see [`crate::model::System::is_incrementally_stable`].
     Proven,
     /// Determined by the Floquet multipliers.
     Computed {

@@ -4,11 +4,12 @@
 //! full or reduced form for observed places.
 
 use super::reduction::{
-    Damping, Deviation, EXTENTS, Free, MistunedModes, MistuningError, NominalRing, Reduce, Reduced, ReducedSector,
-    Reduction, ReductionError, ReductionKind, Reference, RingModes, Row, STEPS, Whole,
+    AutomaticReduction, EXTENTS, FullStructure, MistunedModes, MistuningError, NominalRing, ReducedMatrices,
+    ReducedSector, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, RingModes, Row,
+    RubinBasis, STEPS, StructureDamping,
 };
 use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
-use super::{DampedModes, StructureError, free_vibrations, symmetric};
+use super::{ModalDamping, StructureError, free_vibrations, symmetric};
 use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -45,7 +46,7 @@ pub struct Component(Arc<ComponentData>);
 struct ComponentData {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
-    whole: Whole,
+    whole: FullStructure,
     /// True if the mass matrix is positive definite.
     definite_mass: bool,
     /// Stored reductions by request, because the cases of a study repeat requests.
@@ -95,13 +96,13 @@ type Cache<K, V> = Mutex<Vec<(K, V)>>;
 type ReductionRequest = (Vec<Row>, Reduction);
 type ReducedResult = Result<Arc<ReducedComponent>, ReductionError>;
 /// Factor of the stiffness, s, and the remaining modal damping.
-type Damped = Result<(f64, DampedModes), ReductionError>;
+type Damped = Result<(f64, ModalDamping), ReductionError>;
 
 /// A reduced component, with its error relative to the full component.
 #[derive(Debug, Clone)]
 pub struct ReducedComponent {
     form: ReducedForm,
-    deviation: Deviation,
+    deviation: ReductionDeviation,
     /// Computed frequencies of the full component, rad/s.
     frequencies: Vec<f64>,
     /// Number of free motions among them.
@@ -112,13 +113,14 @@ pub struct ReducedComponent {
     serves: f64,
 }
 
-/// A reduced component that also serves a second stiffness; see [`Component::reduced_between`].
+/// A reduced component that also serves a second stiffness; see
+/// [`Component::reduced_for_two_stiffnesses`].
 #[derive(Debug, Clone)]
-pub struct BetweenComponent {
+pub struct CommonBasisComponent {
     /// The reduced component with its own stiffness.
     pub component: Component,
     /// The second stiffness in the same coordinates, N/m.
-    pub there: Matrix,
+    pub other_stiffness: Matrix,
     /// The observed displacements, over the coordinates.
     pub seen: Vec<Row>,
     /// Description of the reduction.
@@ -152,7 +154,7 @@ pub struct SectorComponent {
 #[derive(Debug, Clone)]
 pub(crate) enum ReducedForm {
     /// A single component, without its basis.
-    Alone(Arc<Reduced>),
+    Alone(Arc<ReducedMatrices>),
     /// One sector of a ring.
     Sector(Arc<ReducedSector>),
     /// A ring with different blades.
@@ -193,9 +195,10 @@ impl Component {
             }
         }
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
-        let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
+        let damping =
+            damping.map_or(StructureDamping::Rayleigh { mass: 0.0, stiffness: 0.0 }, StructureDamping::Matrix);
         // sizes and symmetry are already checked
-        let whole = Whole::without_ports(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
+        let whole = FullStructure::without_ports(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let definite = sparse_definite_in_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
@@ -233,9 +236,9 @@ impl Component {
 
     /// Returns mass (kg), damping (kg/s), if any, and stiffness (N/m).
     pub fn matrices(&self) -> (&Matrix, Option<&Matrix>, &Matrix) {
-        let Whole { mass, damping, stiffness, .. } = &self.0.whole;
+        let FullStructure { mass, damping, stiffness, .. } = &self.0.whole;
         let own = match damping {
-            Damping::Matrix(own) => Some(own),
+            StructureDamping::Matrix(own) => Some(own),
             _ => None,
         };
         (mass, own, stiffness)
@@ -252,7 +255,7 @@ impl Component {
     /// # Errors
     /// [`ReductionError::Modes`].
     pub fn frequencies(&self, count: usize) -> Result<Vec<f64>, ReductionError> {
-        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        let FullStructure { mass, stiffness, analysis, .. } = &self.0.whole;
         let modes = NaturalModes::new(analysis, stiffness, mass, Wanted::Lowest(count))?;
         Ok(natural(&modes))
     }
@@ -279,7 +282,7 @@ impl Component {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn free_vibration(&self, count: usize) -> Result<Option<Vec<f64>>, ReductionError> {
-        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        let FullStructure { mass, stiffness, analysis, .. } = &self.0.whole;
         let Some(damping) = self.matrices().1.filter(|damping| damping.asymmetry(0.0).is_some()) else {
             return Ok(None);
         };
@@ -305,7 +308,7 @@ impl Component {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn modes_below(&self, omega: f64) -> Option<usize> {
-        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        let FullStructure { mass, stiffness, analysis, .. } = &self.0.whole;
         cached(&self.0.counts, &omega, || {
             analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative())
         })
@@ -319,7 +322,7 @@ impl Component {
     /// the tolerance.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
         cached(&self.0.reductions, &(seen.to_vec(), *how), || {
-            self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
+            self.0.whole.with_ports(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
         })
     }
 
@@ -342,29 +345,29 @@ impl Component {
     /// let mass = Matrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
     /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 };
-    /// let few = rest.reduced_between(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
-    /// assert_eq!(few.component.dofs(), few.there.n());
+    /// let few = rest.reduced_for_two_stiffnesses(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
+    /// assert_eq!(few.component.dofs(), few.other_stiffness.n());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn reduced_between(
+    pub fn reduced_for_two_stiffnesses(
         &self,
         there: &Matrix,
         seen: &[Row],
         how: &Reduction,
-    ) -> Result<BetweenComponent, ReductionError> {
+    ) -> Result<CommonBasisComponent, ReductionError> {
         let tolerance = match *how {
             Reduction::UpTo { tolerance, .. } => tolerance,
             _ => f64::INFINITY,
         };
-        let reduce = |whole: &Whole| reduce_whole(whole, how).map(|few| (few.reduced, few.up_to));
-        let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
-        let Reduced { mass, damping, stiffness, ports, kind, .. } = few.own;
+        let reduce = |whole: &FullStructure| reduce_whole(whole, how).map(|few| (few.reduced, few.up_to));
+        let few = self.0.whole.with_ports(seen.to_vec())?.between(there, reduce, tolerance)?;
+        let ReducedMatrices { mass, damping, stiffness, ports, kind, .. } = few.own;
         let damping = if self.matrices().1.is_some() { Some(sparse(&damping)?) } else { None };
         let component = Component::new(vec![String::new(); mass.nrows()], sparse(&mass)?, damping, sparse(&stiffness)?);
         let seen = ports.row_iter().map(|row| row.iter().copied().enumerate().filter(|part| part.1 != 0.0).collect());
-        Ok(BetweenComponent {
+        Ok(CommonBasisComponent {
             component: component.map_err(|_| ReductionError::OutOfRange)?,
-            there: sparse(&few.other.stiffness)?,
+            other_stiffness: sparse(&few.other.stiffness)?,
             seen: seen.collect(),
             kind,
             error: few.deviation.error,
@@ -422,7 +425,7 @@ impl Component {
     pub(crate) fn modal_damping(&self, ratio: f64, up_to: f64) -> Damped {
         cached(&self.0.damped, &(ratio, up_to), || {
             let (beta, columns) = self.0.whole.modal_damping(ratio, up_to)?;
-            Ok((beta, DampedModes::new(self.dofs(), Arc::new(columns))))
+            Ok((beta, ModalDamping::new(self.dofs(), Arc::new(columns))))
         })
     }
 
@@ -515,7 +518,7 @@ impl SectorCache {
             Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
             _ => (0..1, f64::INFINITY),
         };
-        let mut best: Option<(Arc<ReducedRing>, MistunedModes, Deviation)> = None;
+        let mut best: Option<(Arc<ReducedRing>, MistunedModes, ReductionDeviation)> = None;
         for step in steps {
             // a later failure keeps the earlier result
             let few = match (self.reduced_ring(blade, seen, how, step), &best) {
@@ -588,7 +591,7 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
     modes.values.iter().map(|value| value.max(0.0).sqrt()).collect()
 }
 
-fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
+fn reduce(whole: &FullStructure, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
     let ReductionResult { reduced, deviation, modes, up_to, serves } = reduce_whole(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.free());
     let form = ReducedForm::Alone(Arc::new(reduced.scaled_to_metres()));
@@ -597,8 +600,8 @@ fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionE
 
 /// A reduced form of the whole component.
 struct ReductionResult {
-    reduced: Reduced,
-    deviation: Deviation,
+    reduced: ReducedMatrices,
+    deviation: ReductionDeviation,
     /// The modes that it uses.
     modes: NaturalModes,
     /// Upper end of the frequency range in which the error holds, rad/s.
@@ -607,11 +610,11 @@ struct ReductionResult {
     serves: f64,
 }
 
-fn reduce_whole(whole: &Whole, how: &Reduction) -> Result<ReductionResult, ReductionError> {
+fn reduce_whole(whole: &FullStructure, how: &Reduction) -> Result<ReductionResult, ReductionError> {
     Ok(match *how {
         Reduction::None { .. } => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
-            let chosen = Reduce { up_to, tolerance, kind }.of(whole)?;
+            let chosen = AutomaticReduction { up_to, tolerance, kind }.apply(whole)?;
             let (reduced, deviation, modes) = (chosen.reduced, chosen.deviation, chosen.modes);
             ReductionResult { reduced, deviation, modes, up_to, serves: up_to }
         }
@@ -620,10 +623,10 @@ fn reduce_whole(whole: &Whole, how: &Reduction) -> Result<ReductionResult, Reduc
             let serves = natural(&modes).last().map_or(0.0, |last| last / MODE_MARGIN);
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
-                ReductionKind::Rubin => Free::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
+                ReductionKind::Rubin => RubinBasis::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
                 ReductionKind::CraigBampton => whole.fixed_interface(Wanted::Lowest(count))?,
             };
-            let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
+            let deviation = ReferenceReceptance::new(whole, &modes, up_to)?.deviation(&reduced);
             ReductionResult { reduced, deviation, modes, up_to, serves }
         }
     })
@@ -667,7 +670,7 @@ impl ReducedComponent {
 
     /// Returns the highest frequency for which the basis is intended, rad/s. A damping ratio
     /// applies to all modes up to this frequency.
-    pub fn serves(&self) -> f64 {
+    pub fn intended_up_to(&self) -> f64 {
         self.serves
     }
 
@@ -677,7 +680,7 @@ impl ReducedComponent {
     }
 
     /// Returns the number of free motions among its modes.
-    pub fn free(&self) -> usize {
+    pub fn free_modes(&self) -> usize {
         self.free
     }
 

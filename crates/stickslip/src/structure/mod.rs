@@ -12,17 +12,17 @@ mod sector_boundary;
 mod sector_faces;
 mod uncoupled_modes;
 
-pub use component::{BetweenComponent, Component, ReducedComponent, SectorComponent};
 pub(crate) use component::{BladeCache, ReducedForm, SectorCache};
+pub use component::{CommonBasisComponent, Component, ReducedComponent, SectorComponent};
 pub use dynamic::DynamicStiffness;
 pub(crate) use free_vibration::free_vibrations;
-pub use modal_damping::DampedModes;
+pub use modal_damping::ModalDamping;
 pub use reduction::{Reduction, ReductionKind};
 pub(crate) use sector::unit_root;
-pub use sector::{Sector, Wave, WaveStiffness};
-pub use sector_boundary::{Axis, BladeError, Boundary, BoundaryError};
+pub use sector::{RingSector, Wave, WaveStiffness};
+pub use sector_boundary::{BladeError, Boundary, BoundaryError, CoordinateAxis};
 pub(crate) use sector_boundary::{CyclicSector, RingEntry, RingRow};
-pub use sector_faces::{Faces, FacesError, Node};
+pub use sector_faces::{FacesError, NodeCoordinates, SectorFaces};
 pub(crate) use uncoupled_modes::UncoupledModes;
 
 use nalgebra::DMatrix;
@@ -57,7 +57,7 @@ enum Storage {
         damping: Matrix,
         stiffness: Matrix,
         /// Modal damping in addition to the damping matrix.
-        modes: Option<DampedModes>,
+        modes: Option<ModalDamping>,
         analysis: OnceLock<Analysis>,
         /// Full copy, created when a method first requests it.
         full: OnceLock<Arc<Matrices>>,
@@ -77,9 +77,9 @@ pub struct Matrices {
 
 /// Largest number of degrees of freedom for methods with full matrices. At this size, a product
 /// of two takes seconds, and each uses 32 MB.
-pub const MOST_IN_FULL: usize = 2000;
+pub const MAX_FULL_DOFS: usize = 2000;
 /// Number of degrees of freedom from which matrices are stored sparse.
-pub const SPARSE: usize = 40;
+pub const MIN_SPARSE_DOFS: usize = 40;
 /// Fraction of nonzero entries above which matrices are stored full at any size.
 const FULL_FRACTION: f64 = 0.3;
 
@@ -132,7 +132,7 @@ pub enum StructureError {
     NegativeMass,
     /// Two places have the same name.
     #[error("the name `{0}` appears twice among the places")]
-    Twice(String),
+    DuplicateName(String),
 }
 
 /// Difference between an entry and its mirror image that counts as rounding, relative to the
@@ -262,7 +262,7 @@ impl Structure {
     /// # Panics
     /// If the length of the columns differs from the size of the structure.
     #[must_use]
-    pub fn with_damped_modes(&self, of: &DampedModes) -> Structure {
+    pub fn with_damped_modes(&self, of: &ModalDamping) -> Structure {
         let n = self.dofs();
         assert_eq!(of.n(), n, "columns of another length");
         let [mass, mut most, stiffness] = self.0.largest;
@@ -288,7 +288,7 @@ impl Structure {
         let mut names: Vec<&String> = places.iter().collect();
         names.sort_unstable();
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(StructureError::Twice(pair[0].clone()));
+            return Err(StructureError::DuplicateName(pair[0].clone()));
         }
         let largest = match &form {
             Storage::Full(full) => {
@@ -365,7 +365,7 @@ impl Structure {
     }
 
     /// Returns the diagonal entry of the mass matrix in a row, kg.
-    pub fn own_mass(&self, row: usize) -> f64 {
+    pub fn diagonal_mass(&self, row: usize) -> f64 {
         match &self.0.form {
             Storage::Full(full) => full.mass[(row, row)],
             Storage::Sparse { mass, .. } => mass.get(row, row),
@@ -388,7 +388,7 @@ impl Structure {
 
     /// Returns the modal damping in addition to [`Structure::entries`]. Full matrices contain
     /// all damping and return `None`.
-    pub fn damped_modes(&self) -> Option<&DampedModes> {
+    pub fn damped_modes(&self) -> Option<&ModalDamping> {
         match &self.0.form {
             Storage::Full(_) => None,
             Storage::Sparse { modes, .. } => modes.as_ref(),
@@ -431,7 +431,7 @@ impl Structure {
     ///
     /// `M`, `K` and the symmetric part of `C` are positive semidefinite, and their sum, each
     /// scaled by its largest entry, is definite.
-    pub fn dissipates(&self) -> bool {
+    pub fn is_dissipative(&self) -> bool {
         *self.0.dissipates.get_or_init(|| match &self.0.form {
             Storage::Full(full) => full.dissipates(),
             Storage::Sparse { mass, damping, stiffness, .. } => {
@@ -531,7 +531,7 @@ impl Matrices {
 /// Returns whether matrices with these numbers of entries are stored full.
 fn is_full(n: usize, entries: [usize; 3]) -> bool {
     let most = entries.into_iter().max().unwrap_or(0);
-    n < SPARSE || most as f64 > FULL_FRACTION * (n as f64) * (n as f64)
+    n < MIN_SPARSE_DOFS || most as f64 > FULL_FRACTION * (n as f64) * (n as f64)
 }
 
 fn to_full(mass: &Matrix, damping: &Matrix, stiffness: &Matrix) -> Matrices {
@@ -581,7 +581,7 @@ mod tests {
         let massless = dmatrix![1.0, 0.0; 0.0, 0.0];
         assert!(Structure::new(names(), massless, one.clone(), k.clone()).is_ok());
         let twice = vec!["a".to_owned(), "a".to_owned()];
-        assert_eq!(Structure::new(twice, one.clone(), one, k).unwrap_err(), StructureError::Twice("a".into()));
+        assert_eq!(Structure::new(twice, one.clone(), one, k).unwrap_err(), StructureError::DuplicateName("a".into()));
     }
 
     /// Full matrices of a chain between walls, with dampers to the ground, a gyroscopic pair
@@ -601,7 +601,7 @@ mod tests {
     /// A full and a sparse structure give the same results.
     #[test]
     fn full_and_sparse_agree() {
-        let n = SPARSE + 3;
+        let n = MIN_SPARSE_DOFS + 3;
         let [m, c, k] = chain(n);
         let sparse = Structure::new(numbered(n), m.clone(), c.clone(), k.clone()).unwrap();
         assert!(sparse.is_sparse());
@@ -610,8 +610,8 @@ mod tests {
             Structure::checked(numbered(n), Storage::Full(Arc::new(Matrices { mass: m, damping: c, stiffness: k })))
                 .unwrap();
         assert_eq!(sparse.largest(), full.largest());
-        assert_eq!((sparse.own_mass(7), sparse.dissipates()), (full.own_mass(7), full.dissipates()));
-        assert!(sparse.dissipates());
+        assert_eq!((sparse.diagonal_mass(7), sparse.is_dissipative()), (full.diagonal_mass(7), full.is_dissipative()));
+        assert!(sparse.is_dissipative());
         let sorted = |structure: &Structure| {
             let mut all: Vec<_> = structure.entries().collect();
             all.sort_by_key(|entry| (entry.0, entry.1));
@@ -632,7 +632,7 @@ mod tests {
     /// Large structures reject the same input as small ones, with the same messages.
     #[test]
     fn sparse_and_full_input_have_equal_checks() {
-        let n = 2 * SPARSE;
+        let n = 2 * MIN_SPARSE_DOFS;
         let [m, c, k] = chain(n);
         type One<'a> = &'a mut DMatrix<f64>;
         let error = |change: &dyn Fn(One, One, One)| {
@@ -658,7 +658,7 @@ mod tests {
         // a damper that supplies energy
         let mut driven = c;
         driven[(3, 3)] = -0.05;
-        assert!(!Structure::new(numbered(n), m, driven, k).unwrap().dissipates());
+        assert!(!Structure::new(numbered(n), m, driven, k).unwrap().is_dissipative());
     }
 
     /// A structure with 100,000 degrees of freedom is checked and solved in seconds.
@@ -673,7 +673,7 @@ mod tests {
             Matrix::from_triplets(n, all).unwrap()
         };
         let structure = Structure::sparse(numbered(n), triple(1.0, 0.2), triple(0.02, 0.0), triple(2.0, -1.0)).unwrap();
-        assert!(structure.dissipates());
+        assert!(structure.is_dissipative());
         // a wave that fits between the walls: k = 2 - 2 cos θ, m = 1 + 0.4 cos θ, θ ≈ π/2;
         // whole turns are removed before they cause rounding
         let (half_waves, walls) = (50_000, n + 1);

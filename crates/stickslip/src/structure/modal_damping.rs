@@ -16,19 +16,19 @@ use stickslip_numerics::sparse::{ComplexFactor, Singular};
 
 /// Columns of U, one after the other, each as long as the structure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DampedModes {
+pub struct ModalDamping {
     n: usize,
     columns: Arc<Vec<f64>>,
 }
 
-impl DampedModes {
+impl ModalDamping {
     /// Creates modal damping from columns of length n.
     ///
     /// # Panics
     /// If the length of `columns` is not a multiple of n.
     pub fn new(n: usize, columns: Arc<Vec<f64>>) -> Self {
         assert!(columns.len().is_multiple_of(n.max(1)), "{} numbers are no columns of {n}", columns.len());
-        DampedModes { n, columns }
+        ModalDamping { n, columns }
     }
 
     /// Returns the length of the columns, n.
@@ -71,7 +71,7 @@ fn dot(u: &[f64], v: &[f64]) -> f64 {
 #[derive(Debug, Clone)]
 pub(super) struct ModallyDampedFactor {
     without: ComplexFactor,
-    modes: DampedModes,
+    modes: ModalDamping,
     /// `s Z⁻¹ U`.
     answers: Vec<Complex64>,
     /// `1 + s Uᵀ Z⁻¹ U`.
@@ -80,7 +80,7 @@ pub(super) struct ModallyDampedFactor {
 
 impl ModallyDampedFactor {
     /// Creates it from the factor at complex frequency s.
-    pub fn new(without: ComplexFactor, modes: &DampedModes, s: Complex64) -> Result<Self, Singular> {
+    pub fn new(without: ComplexFactor, modes: &ModalDamping, s: Complex64) -> Result<Self, Singular> {
         let mut answers: Vec<Complex64> = modes.columns.iter().map(|u| s * u).collect();
         without.solve(&mut answers);
         let count = modes.iter().count();
@@ -109,7 +109,7 @@ impl ModallyDampedFactor {
 }
 
 /// Returns `Uᵀ X`, column by column.
-fn along(modes: &DampedModes, x: &[Complex64]) -> Vec<Complex64> {
+fn along(modes: &ModalDamping, x: &[Complex64]) -> Vec<Complex64> {
     let each = |x: &[Complex64], u: &[f64]| -> Complex64 { x.iter().zip(u).map(|(x, u)| x * u).sum() };
     x.chunks_exact(modes.n).flat_map(|x| modes.iter().map(move |u| each(x, u))).collect()
 }
@@ -117,22 +117,22 @@ fn along(modes: &DampedModes, x: &[Complex64]) -> Vec<Complex64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::structure::{SPARSE, Structure};
+    use crate::structure::{MIN_SPARSE_DOFS, Structure};
     use nalgebra::DVector;
 
     /// Sparse and full structures give the same modal damping, that of the dense product.
     #[test]
     fn sparse_and_full_modal_damping_agree() {
-        let n = SPARSE + 5;
+        let n = MIN_SPARSE_DOFS + 5;
         let beside = |own: f64, next: f64| DMatrix::from_fn(n, n, |i, k| [own, next, 0.0][i.abs_diff(k).min(2)]);
         let (m, c, k) = (beside(1.0, 0.2), beside(0.01, 0.0), beside(2.0, -1.0));
         let u = DMatrix::from_fn(n, 3, |i, mode| 0.3 * (0.7 * (i * (mode + 1)) as f64).sin());
-        let modes = DampedModes::new(n, Arc::new(u.as_slice().to_vec()));
+        let modes = ModalDamping::new(n, Arc::new(u.as_slice().to_vec()));
         let all = &c + &u * u.transpose();
         let places: Vec<String> = (0..n).map(|i| i.to_string()).collect();
         let sparse = Structure::new(places.clone(), m.clone(), c, k.clone()).unwrap().with_damped_modes(&modes);
         let full = Structure::new(places, m.clone(), all.clone(), k.clone()).unwrap();
-        assert!(sparse.is_sparse() && !full.is_sparse() && sparse.dissipates());
+        assert!(sparse.is_sparse() && !full.is_sparse() && sparse.is_dissipative());
         assert!((sparse.damping() - &all).amax() < 1e-15);
         assert!((sparse.largest()[1] - all.amax()).abs() < 1e-15);
         assert_ne!(sparse, Structure::new(sparse.places().to_vec(), m.clone(), beside(0.01, 0.0), k.clone()).unwrap());

@@ -22,7 +22,7 @@ const EQUAL: f64 = 1e-12;
 
 /// The rows of the first sector in the matrices of a ring.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sector {
+pub struct RingSector {
     sectors: usize,
     places: Vec<String>,
     /// Row, column, offset of the column in sectors, values of mass, damping, stiffness.
@@ -88,12 +88,12 @@ pub(super) fn wave_entries(
     triplets
 }
 
-impl Sector {
+impl RingSector {
     /// Returns the first of `sectors` equal sectors, whose degrees of freedom are stored sector
     /// by sector in `cyclic_basis`.
     ///
     /// Returns `None` if the sectors differ, or if modal damping couples all sectors.
-    pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {
+    pub fn from_ring(ring: &Structure, sectors: usize) -> Option<RingSector> {
         let all = ring.dofs();
         if sectors == 0 || !all.is_multiple_of(sectors) || ring.damped_modes().is_some() {
             return None;
@@ -122,7 +122,7 @@ impl Sector {
                 _ => return None,
             }
         }
-        (met == sectors * entries.len()).then(|| Sector { sectors, places: ring.places()[..n].to_vec(), entries })
+        (met == sectors * entries.len()).then(|| RingSector { sectors, places: ring.places()[..n].to_vec(), entries })
     }
 
     /// Returns the number of degrees of freedom of a sector.
@@ -146,7 +146,7 @@ impl Sector {
     /// `k + 2 kc (1 - cos 2πd/N)`.
     /// ```
     /// use num_complex::Complex64;
-    /// use stickslip::structure::{Sector, Structure};
+    /// use stickslip::structure::{RingSector, Structure};
     /// use stickslip_numerics::sparse::Matrix;
     /// let (n, d) = (12, 5);
     /// let entries = |own: f64, beside: f64| {
@@ -155,7 +155,7 @@ impl Sector {
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
     /// let ring = Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5)).unwrap();
-    /// let wave = Sector::of(&ring, n).unwrap().wave(d).unwrap();
+    /// let wave = RingSector::from_ring(&ring, n).unwrap().wave(d).unwrap();
     /// let mut x = vec![Complex64::new(1.0, 0.0)];
     /// wave.dynamic_stiffness(Complex64::ZERO, 0.0).unwrap().solve(&mut x);
     /// let stiffness = 2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
@@ -276,7 +276,7 @@ mod tests {
     fn a_sector_is_its_ring() {
         for sectors in [2, 3, 7, 24, 30] {
             let ring = ring(sectors, 0.0);
-            let sector = Sector::of(&ring, sectors).unwrap();
+            let sector = RingSector::from_ring(&ring, sectors).unwrap();
             for diameter in 0..sectors {
                 let wave = sector.wave(diameter).unwrap();
                 assert_eq!(wave.is_double(), 2 * diameter % sectors != 0);
@@ -298,12 +298,12 @@ mod tests {
 
     #[test]
     fn unequal_sectors_are_none() {
-        assert!(Sector::of(&ring(7, 1e-6), 7).is_none());
-        assert!(Sector::of(&ring(7, 0.0), 4).is_none());
-        assert!(Sector::of(&ring(7, 0.0), 0).is_none());
+        assert!(RingSector::from_ring(&ring(7, 1e-6), 7).is_none());
+        assert!(RingSector::from_ring(&ring(7, 0.0), 4).is_none());
+        assert!(RingSector::from_ring(&ring(7, 0.0), 0).is_none());
         // a smaller number of sectors is valid: each then comprises several of the original
         // ones
-        assert_eq!(Sector::of(&ring(6, 0.0), 3).unwrap().dofs(), 4);
+        assert_eq!(RingSector::from_ring(&ring(6, 0.0), 3).unwrap().dofs(), 4);
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth.
 //! Engng 14, 81-102.
 
-use super::reduction::{Damping, ReductionError, Row, Whole};
+use super::reduction::{FullStructure, ReductionError, Row, StructureDamping};
 use super::sector::wave_entries;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
@@ -37,13 +37,13 @@ pub struct Boundary {
     /// Rows along x, y, z of the low and of the high side, which are rotated in the next
     /// sector.
     rotated_rows: Vec<[[Option<usize>; 3]; 2]>,
-    axis: Option<Axis>,
+    axis: Option<CoordinateAxis>,
 }
 
 /// The axis of a disk. Displacements are along x, y and z; the next sector is rotated about the
 /// axis by the right-hand rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Axis {
+pub enum CoordinateAxis {
     /// x
     X,
     /// y
@@ -63,7 +63,7 @@ pub enum BoundaryError {
     NoRows(String),
     /// A node occurs twice on one side.
     #[error("node `{0}` appears twice on the {1} side")]
-    Twice(String, &'static str),
+    Duplicate(String, &'static str),
     /// A node occurs on both sides.
     #[error(
         "node `{0}` is on both sides, but a node on the axis cannot be coupled to itself; constrain it, or remove it from the model"
@@ -97,13 +97,13 @@ pub enum BoundaryError {
 /// Names of directions that rotate together.
 const DIRECTIONS: [[&str; 3]; 2] = [["x", "y", "z"], ["rx", "ry", "rz"]];
 
-impl std::fmt::Display for Axis {
+impl std::fmt::Display for CoordinateAxis {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(DIRECTIONS[0][*self as usize])
     }
 }
 
-impl Axis {
+impl CoordinateAxis {
     /// Returns the distance of a point from the axis.
     pub(super) fn radius(self, at: [f64; 3]) -> f64 {
         let [a, b] = self.across(at);
@@ -144,7 +144,11 @@ impl Boundary {
     ///
     /// # Errors
     /// [`BoundaryError`]: nodes without rows, or nodes whose rows do not match.
-    pub fn of_nodes(rows: &[String], pairs: &[(String, String)], axis: Option<Axis>) -> Result<Self, BoundaryError> {
+    pub fn of_nodes(
+        rows: &[String],
+        pairs: &[(String, String)],
+        axis: Option<CoordinateAxis>,
+    ) -> Result<Self, BoundaryError> {
         if pairs.is_empty() {
             return Err(BoundaryError::Empty);
         }
@@ -158,7 +162,7 @@ impl Boundary {
         for (low, high) in pairs {
             for (node, side) in [(low, "low"), (high, "high")] {
                 match sides.insert(node.as_str(), side) {
-                    Some(before) if before == side => return Err(BoundaryError::Twice(node.clone(), side)),
+                    Some(before) if before == side => return Err(BoundaryError::Duplicate(node.clone(), side)),
                     Some(_) => return Err(BoundaryError::Both(node.clone())),
                     None => {}
                 }
@@ -327,7 +331,7 @@ impl CyclicSector {
     /// Returns the structure of a wave, observed at these weighted sums of the component's
     /// rows. There is one port for the real part and, if the wave is complex, one for the
     /// imaginary part.
-    pub fn wave(&self, diameter: usize, seen: &[Row]) -> Result<Whole, ReductionError> {
+    pub fn wave(&self, diameter: usize, seen: &[Row]) -> Result<FullStructure, ReductionError> {
         let (n, sectors) = (self.dofs, self.sectors);
         let copies = if super::sector::is_real(diameter, sectors) { 1 } else { 2 };
         let matrix = |entries: &[RingEntry]| {
@@ -335,10 +339,10 @@ impl CyclicSector {
             Matrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange)
         };
         let damping = match &self.damping {
-            Some(damping) => Damping::Matrix(matrix(damping)?),
-            None => Damping::Rayleigh { mass: 0.0, stiffness: 0.0 },
+            Some(damping) => StructureDamping::Matrix(matrix(damping)?),
+            None => StructureDamping::Rayleigh { mass: 0.0, stiffness: 0.0 },
         };
-        let whole = Whole::without_ports(matrix(&self.mass)?, damping, matrix(&self.stiffness)?)?;
+        let whole = FullStructure::without_ports(matrix(&self.mass)?, damping, matrix(&self.stiffness)?)?;
         let mut ports = vec![Row::new(); copies * seen.len()];
         for (p, row) in seen.iter().enumerate() {
             let all = self.row(row).into_iter().map(|(at, shift, weight)| (p, at, shift, weight));
@@ -347,7 +351,7 @@ impl CyclicSector {
                 ports[port].push((at, weight));
             }
         }
-        whole.seen_at(ports)
+        whole.with_ports(ports)
     }
 
     /// Returns the stiffness change per unit `δ` if the component's rows `blade` have their
@@ -525,7 +529,7 @@ mod tests {
     #[test]
     fn the_next_sector_is_turned_by_the_right_hand_rule() {
         let rows = ["1.x", "1.y", "1.z", "2.x", "2.y", "2.z"];
-        for (axis, across) in [(Axis::X, [1, 2]), (Axis::Y, [2, 0]), (Axis::Z, [0, 1])] {
+        for (axis, across) in [(CoordinateAxis::X, [1, 2]), (CoordinateAxis::Y, [2, 0]), (CoordinateAxis::Z, [0, 1])] {
             let boundary = Boundary::of_nodes(&named(&rows), &pairs(&[("1", "2")]), Some(axis)).unwrap();
             let angle = TAU / 5.0;
             // along the first direction across the axis, which the next sector sees rotated
@@ -552,15 +556,15 @@ mod tests {
         assert!(refused(&free, &[("1", "2"), ("1", "3")], None).contains("twice on the low side"));
         assert!(refused(&free, &[("8", "9")], None).contains("no rows of node `9`"));
         let held = named(&["1.x", "1.z", "2.x", "2.y", "2.z"]);
-        assert!(refused(&held, &[("1", "2")], Some(Axis::Z)).contains("constrain both equally"));
+        assert!(refused(&held, &[("1", "2")], Some(CoordinateAxis::Z)).contains("constrain both equally"));
         // a direction that both sides lack is fixed
         let held = named(&["1.z", "2.z"]);
         assert_eq!(
-            Boundary::of_nodes(&held, &pairs(&[("1", "2")]), Some(Axis::Z)).unwrap().constraints(7),
+            Boundary::of_nodes(&held, &pairs(&[("1", "2")]), Some(CoordinateAxis::Z)).unwrap().constraints(7),
             [(1, vec![(0, 1.0)])]
         );
         let radial = named(&["1.r", "2.r"]);
-        assert!(refused(&radial, &[("1", "2")], Some(Axis::Z)).contains("row `2.r`"));
+        assert!(refused(&radial, &[("1", "2")], Some(CoordinateAxis::Z)).contains("row `2.r`"));
         assert_eq!(
             Boundary::of_nodes(&radial, &pairs(&[("1", "2")]), None).unwrap().constraints(7),
             [(1, vec![(0, 1.0)])]

@@ -4,12 +4,12 @@
 //! matrices do not contain the coordinates of the nodes. A wrong pair defines another disk with
 //! valid matrices, which only coordinates can detect.
 
-use super::Axis;
+use super::CoordinateAxis;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// A node and its coordinates, in any unit of length.
-pub type Node = (String, [f64; 3]);
+pub type NodeCoordinates = (String, [f64; 3]);
 
 /// Tolerance for the distance between a node and its rotated counterpart, relative to the
 /// largest distance of a node from the axis. Meshes are written with six digits or more, and
@@ -36,7 +36,7 @@ pub enum FacesError {
         /// Number of sectors.
         sectors: usize,
         /// Axis of the disk.
-        axis: Axis,
+        axis: CoordinateAxis,
         /// Distance, in the unit of the coordinates.
         apart: f64,
         /// Largest distance of a node from the axis.
@@ -64,7 +64,7 @@ pub enum FacesError {
         /// Number of sectors.
         sectors: usize,
         /// Axis of the disk.
-        axis: Axis,
+        axis: CoordinateAxis,
     },
 }
 
@@ -73,31 +73,31 @@ pub enum FacesError {
 /// # Example
 /// A quarter of a disk: nodes 1 and 2 are its low side, 3 and 4 its high side.
 /// ```
-/// use stickslip::structure::{Axis, Faces};
+/// use stickslip::structure::{CoordinateAxis, SectorFaces};
 /// let nodes = [("1", [1.0, 0.0]), ("2", [2.0, 0.0]), ("3", [0.0, 1.0]), ("4", [0.0, 2.0]), ("5", [1.0, 1.0])];
 /// let nodes = nodes.map(|(name, [x, y])| (name.to_owned(), [x, y, 0.0]));
-/// let faces = Faces::new(&nodes, Axis::Z, 4);
+/// let faces = SectorFaces::new(&nodes, CoordinateAxis::Z, 4);
 /// let pairs = faces.pairs().unwrap();
 /// assert_eq!(pairs, [("1".into(), "3".into()), ("2".into(), "4".into())]);
 /// assert!(faces.check(&pairs).is_ok());
 /// assert!(faces.check(&[("3".into(), "1".into())]).unwrap_err().to_string().contains("exchanged"));
 /// ```
 #[derive(Debug, Clone)]
-pub struct Faces<'a> {
-    nodes: &'a [Node],
-    axis: Axis,
+pub struct SectorFaces<'a> {
+    nodes: &'a [NodeCoordinates],
+    axis: CoordinateAxis,
     sectors: usize,
     radius: f64,
     /// Nodes by grid cell.
     cells: BTreeMap<[i64; 3], Vec<usize>>,
 }
 
-impl<'a> Faces<'a> {
+impl<'a> SectorFaces<'a> {
     /// Creates it from the nodes of a sector, or from a selection of them, and the number of
     /// sectors.
-    pub fn new(nodes: &'a [Node], axis: Axis, sectors: usize) -> Self {
+    pub fn new(nodes: &'a [NodeCoordinates], axis: CoordinateAxis, sectors: usize) -> Self {
         let radius = nodes.iter().map(|(_, at)| axis.radius(*at)).fold(0.0, f64::max);
-        let mut faces = Faces { nodes, axis, sectors, radius, cells: BTreeMap::new() };
+        let mut faces = SectorFaces { nodes, axis, sectors, radius, cells: BTreeMap::new() };
         for (index, (_, at)) in nodes.iter().enumerate() {
             faces.cells.entry(faces.cell(*at)).or_default().push(index);
         }
@@ -176,21 +176,22 @@ impl<'a> Faces<'a> {
         }
     }
 
-    fn rotated_distance(&self, axis: Axis, angle: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
+    fn rotated_distance(&self, axis: CoordinateAxis, angle: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
         distance(turned(&axis.rotation(angle), from), to)
     }
 
     /// Returns a suggestion that makes a pair fit.
     fn hint(&self, from: [f64; 3], to: [f64; 3]) -> Option<String> {
         let angle = TAU / self.sectors as f64;
-        let fits = |axis: Axis, angle: f64| self.rotated_distance(axis, angle, from, to) <= self.tolerance();
+        let fits = |axis: CoordinateAxis, angle: f64| self.rotated_distance(axis, angle, from, to) <= self.tolerance();
         if fits(self.axis, -angle) {
             return Some(format!(
                 "the sides are exchanged: the low side is the start of the sector by the right-hand rule about {}",
                 self.axis
             ));
         }
-        let others = [Axis::X, Axis::Y, Axis::Z].into_iter().filter(|axis| *axis != self.axis);
+        let others =
+            [CoordinateAxis::X, CoordinateAxis::Y, CoordinateAxis::Z].into_iter().filter(|axis| *axis != self.axis);
         for axis in others {
             if fits(axis, angle) {
                 return Some(format!("they coincide for a rotation about {axis}"));
@@ -222,7 +223,7 @@ mod tests {
 
     /// Two radii and two heights on both sides of one of ten sectors, and a blade in its
     /// middle.
-    fn nodes(axis: Axis) -> Vec<Node> {
+    fn nodes(axis: CoordinateAxis) -> Vec<NodeCoordinates> {
         let turn = |angle: f64, at: [f64; 3]| turned(&axis.rotation(angle), at);
         let mut nodes = Vec::new();
         for (k, angle) in [0.3, 0.3 + TAU / 10.0, 0.6].into_iter().enumerate() {
@@ -243,37 +244,44 @@ mod tests {
 
     #[test]
     fn coordinates_tell_the_pairs() {
-        for axis in [Axis::X, Axis::Y, Axis::Z] {
+        for axis in [CoordinateAxis::X, CoordinateAxis::Y, CoordinateAxis::Z] {
             let nodes = nodes(axis);
-            let pairs = Faces::new(&nodes, axis, 10).pairs().unwrap();
+            let pairs = SectorFaces::new(&nodes, axis, 10).pairs().unwrap();
             assert_eq!(pairs, named(&[("0", "10"), ("1", "11"), ("2", "12"), ("3", "13")]), "{axis}");
         }
     }
 
     #[test]
     fn wrong_pairs_are_refused_with_what_would_fit() {
-        let nodes = nodes(Axis::Z);
+        let nodes = nodes(CoordinateAxis::Z);
         let right = [("0", "10"), ("1", "11"), ("2", "12"), ("3", "13")];
-        let refused = |axis: Axis, sectors: usize, pairs: &[(&str, &str)]| {
-            Faces::new(&nodes, axis, sectors).check(&named(pairs)).map_err(|error| error.to_string())
+        let refused = |axis: CoordinateAxis, sectors: usize, pairs: &[(&str, &str)]| {
+            SectorFaces::new(&nodes, axis, sectors).check(&named(pairs)).map_err(|error| error.to_string())
         };
-        assert_eq!(refused(Axis::Z, 10, &right), Ok(()));
+        assert_eq!(refused(CoordinateAxis::Z, 10, &right), Ok(()));
         for (axis, sectors, pairs, words) in [
-            (Axis::Z, 10, &right.map(|(low, high)| (high, low))[..], "sides are exchanged"),
-            (Axis::Z, 12, &right[..], "as in a disk with 10.00 sectors"),
-            (Axis::X, 10, &right[..], "they coincide for a rotation about z"),
-            (Axis::Z, 10, &[("0", "11"), ("1", "10")][..], "8.000e0 away from node `11`"),
-            (Axis::Z, 10, &right[..3], "nodes `3` and `13` coincide after rotation, but no pair names them"),
-            (Axis::Z, 10, &[("0", "99")][..], "node `99` has no coordinates"),
+            (CoordinateAxis::Z, 10, &right.map(|(low, high)| (high, low))[..], "sides are exchanged"),
+            (CoordinateAxis::Z, 12, &right[..], "as in a disk with 10.00 sectors"),
+            (CoordinateAxis::X, 10, &right[..], "they coincide for a rotation about z"),
+            (CoordinateAxis::Z, 10, &[("0", "11"), ("1", "10")][..], "8.000e0 away from node `11`"),
+            (CoordinateAxis::Z, 10, &right[..3], "nodes `3` and `13` coincide after rotation, but no pair names them"),
+            (CoordinateAxis::Z, 10, &[("0", "99")][..], "node `99` has no coordinates"),
         ] {
             let message = refused(axis, sectors, pairs).unwrap_err();
             assert!(message.contains(words), "{words}: {message}");
         }
         // with two sectors, the order of the sides does not matter
-        let half: Vec<Node> = [("1", 3.0), ("2", -3.0)].map(|(name, x)| (name.to_owned(), [x, 0.0, 1.0])).to_vec();
-        let faces = Faces::new(&half, Axis::Z, 2);
+        let half: Vec<NodeCoordinates> =
+            [("1", 3.0), ("2", -3.0)].map(|(name, x)| (name.to_owned(), [x, 0.0, 1.0])).to_vec();
+        let faces = SectorFaces::new(&half, CoordinateAxis::Z, 2);
         assert_eq!(faces.pairs().unwrap(), named(&[("1", "2")]));
         assert!([[("1", "2")], [("2", "1")]].iter().all(|pairs| faces.check(&named(pairs)).is_ok()));
-        assert!(Faces::new(&nodes, Axis::Z, 11).pairs().unwrap_err().to_string().contains("number of sectors"));
+        assert!(
+            SectorFaces::new(&nodes, CoordinateAxis::Z, 11)
+                .pairs()
+                .unwrap_err()
+                .to_string()
+                .contains("number of sectors")
+        );
     }
 }

@@ -22,7 +22,7 @@ use crate::values::{Values, hertz};
 use crate::work::{CONVERGED, Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::model::{Model, ReductionEvidence};
+use stickslip::model::{Model, ReductionAccuracy};
 
 const TABLE: &str = "campbell";
 const CROSSINGS: &str = "crossings";
@@ -122,7 +122,7 @@ struct Natural {
     mode: usize,
     omega: f64,
     /// Reduction error of the structure at that speed.
-    reduction: Option<ReductionEvidence>,
+    reduction: Option<ReductionAccuracy>,
 }
 
 impl Natural {
@@ -134,7 +134,7 @@ impl Natural {
 /// Returns the natural frequencies of a model.
 fn naturals(model: &Model, most: usize) -> Result<Vec<Natural>, String> {
     let mut found = Vec::new();
-    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes, reduction| {
+    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::LinearModes, reduction| {
         let all = modes.elastic.iter().take(most).enumerate();
         found.extend(all.map(|(mode, one)| Natural { state, diameter, mode, omega: one.omega, reduction }));
     };

@@ -166,7 +166,7 @@ impl Source {
             }
             Of::Moved(m) => sample.moved[*m],
         };
-        (self.against.as_ref().map_or(displacement, |place| place.along(&sample.displacement)), force)
+        (self.against.as_ref().map_or(displacement, |place| place.component(&sample.displacement)), force)
     }
 }
 
@@ -217,7 +217,7 @@ fn compute(work: &Work<'_>) -> Computed {
 fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
-    let against = against.map(|place| system.seen()[place].clone());
+    let against = against.map(|place| system.place_axes()[place].clone());
     let axes: Vec<(String, (usize, usize))> = system
         .joints()
         .iter()
@@ -226,7 +226,7 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
         .collect();
     let mut names = wanted(values, &prepared.case.model);
     if names.is_empty() {
-        let moved = system.moved().iter().filter(|place| !prepared.case.model.is_rotation(&place.name));
+        let moved = system.moved_places().iter().filter(|place| !prepared.case.model.is_rotation(&place.name));
         names = moved.map(|place| place.name.clone()).collect();
     }
     let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
@@ -248,7 +248,7 @@ fn sources(prepared: &Prepared) -> Vec<(String, Source)> {
     }
     let find = |name: &String| {
         let joint = joint(name).map(|joint| Of::Joints(vec![joint]));
-        joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(Of::Moved))
+        joint.or_else(|| system.moved_places().iter().position(|place| place.name == *name).map(Of::Moved))
     };
     names
         .iter()
@@ -274,7 +274,7 @@ fn exact_loss(prepared: &Prepared, orbit: &Orbit, source: &Source) -> Option<f64
         // the dissipation of a joint is not known per direction
         Of::Joints(joints) if joints.iter().any(|(j, _)| prepared.system.joints()[*j].axes().len() > 1) => None,
         Of::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
-        Of::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
+        Of::Moved(_) if prepared.system.moved_places().len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }
         Of::Moved(_) => None,

@@ -137,7 +137,7 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
         let motions = point.places.iter().zip(&point.amplitudes).zip(point.phases());
-        let places = prepared.system.places().iter().zip(prepared.system.seen());
+        let places = prepared.system.places().iter().zip(prepared.system.place_axes());
         for ((place, along), ((x, amplitude), phase)) in places.zip(motions) {
             rows.number(&amplitude_in(place, along.unit()), *amplitude);
             rows.number(&first_harmonic_in(place, along.unit()), x.norm());
@@ -268,7 +268,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
     let displacements: Vec<String> = system
         .places()
         .iter()
-        .zip(system.seen())
+        .zip(system.place_axes())
         .filter(|(_, a)| !a.is_rotation())
         .map(|(name, _)| name.clone())
         .collect();

@@ -141,10 +141,10 @@ fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
 /// Writes the cells of one instant.
 pub(super) fn write_sample(prepared: &Prepared, sample: &Sample, rows: &mut Rows) {
     let system = &prepared.system;
-    for (place, along) in system.places().iter().zip(system.seen()) {
+    for (place, along) in system.places().iter().zip(system.place_axes()) {
         let (what, unit) = if along.is_rotation() { ("rotation", "rad") } else { ("displacement", "m") };
-        rows.number(&format!("{place}_{what}_{unit}"), along.along(&sample.displacement));
-        rows.number(&format!("{place}_velocity_{unit}_per_s"), along.along(&sample.velocity));
+        rows.number(&format!("{place}_{what}_{unit}"), along.component(&sample.displacement));
+        rows.number(&format!("{place}_velocity_{unit}_per_s"), along.component(&sample.velocity));
     }
     for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
         for (a, label) in joint.labels().enumerate() {

@@ -238,7 +238,7 @@ fn orbit_row(prepared: &Prepared, omega: f64, summary: &Summary, rows: &mut Rows
 fn shape(prepared: &Prepared, found: &Found, rows: &mut Rows) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(found.peak.omega));
-    let places = prepared.system.places().iter().zip(prepared.system.seen());
+    let places = prepared.system.places().iter().zip(prepared.system.place_axes());
     for ((place, along), of) in places.zip(found.shape.chunks_exact(2)) {
         rows.number(&amplitude_in(place, along.unit()), of[0]);
         rows.number(&phase_of(place), of[1]);
@@ -367,8 +367,8 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
     let mut ways = BothWays::of(&prepared.system);
     for (mut point, (kept, shape)) in curve {
         if let Some(ways) = &mut ways {
-            let places = kept.0.places.iter().zip(prepared.system.seen());
-            let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length());
+            let places = kept.0.places.iter().zip(prepared.system.place_axes());
+            let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length_scale());
             ways.add_point(Point { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
         }
         stretch.add(point.omega, Some(kept));

@@ -258,8 +258,8 @@ fn compute(work: &Work<'_>) -> Computed {
             sampled = true;
             // the turning points are located exactly only for the place that moves most
             let most = leader(&decays).filter(|_| excitation == Excitation::Free);
-            for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
-                let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
+            for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.place_axes()).enumerate() {
+                let of_place = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.component(x));
                 let [x, v] = of_place(sample);
                 let motion = |time: f64| of_place(&since(time));
                 decay.add([time, x, v], (Some(i) == most).then_some(&motion as &Motion<'_>));
@@ -271,7 +271,7 @@ fn compute(work: &Work<'_>) -> Computed {
             !stopped
         });
         // a motion without a sample has no largest displacement
-        let displacements = prepared.system.seen().iter().map(|along| !along.is_rotation());
+        let displacements = prepared.system.place_axes().iter().map(|along| !along.is_rotation());
         let places = prepared.system.places().iter().zip(largest).zip(displacements).filter(|(_, counts)| *counts);
         for (place, (displacement, time)) in places.map(|(of, _)| of).filter(|_| sampled) {
             extremes.varied(case);
@@ -325,7 +325,7 @@ fn read_off(
     rows: &mut Rows,
     summary: &mut Rows,
 ) -> Option<&'static str> {
-    let displacements = (0..decays.len()).filter(|place| !prepared.system.seen()[*place].is_rotation());
+    let displacements = (0..decays.len()).filter(|place| !prepared.system.place_axes()[*place].is_rotation());
     let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
@@ -395,7 +395,7 @@ fn draw(drawing: &Drawing<'_>) -> Figure {
         // draws in one panel share one unit
         let scope = if drawing.study.draws().is_some() { 0..motion.rows() } else { rows.clone() };
         let shown = drawing.displacements(&system);
-        let places = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
+        let places = system.places().iter().zip(system.place_axes()).filter(|(_, along)| !along.is_rotation());
         let all = places.flat_map(|(place, _)| numbers(motion, &column(place), scope.clone()));
         let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
         let (y, factor) = drawing.axis(1, "displacement", highest, "m");

@@ -5,7 +5,7 @@ use crate::survey::Surveyed;
 use crate::words::{plural, significant};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{ReductionEvidence, Substructure};
+use stickslip::model::{ReductionAccuracy, Substructure};
 use stickslip_numerics::sparse::Matrix;
 
 /// Largest number of listed frequencies.
@@ -30,7 +30,7 @@ pub struct StructureSummary {
     /// row name has.
     pub mass: [Option<f64>; 3],
     /// Error of an earlier reduction that produced the files.
-    pub earlier: Option<ReductionEvidence>,
+    pub earlier: Option<ReductionAccuracy>,
     /// The reduced model; `None` if all rows are degrees of freedom.
     pub reduced: Option<ReducedSummary>,
 }
@@ -55,22 +55,22 @@ pub struct ReducedSummary {
 
 impl StructureSummary {
     pub(super) fn new(study: &Study, one: &Surveyed) -> Option<Self> {
-        let Substructure { component, earlier, .. } = one.case.model.substructure.as_ref()?;
+        let Substructure { component, earlier_reduction, .. } = one.case.model.substructure.as_ref()?;
         let (mass, _, stiffness) = component.matrices();
         let reduced = one.survey.system().reduced().map(|reduced| ReducedSummary {
             coordinates: reduced.dofs(),
             kind: reduced.kind().to_owned(),
             error: reduced.error(),
             up_to: reduced.up_to(),
-            free: Some(reduced.free()).filter(|_| one.case.model.ring.is_none()),
-            frequencies: reduced.frequencies().iter().skip(reduced.free()).take(LISTED).copied().collect(),
+            free: Some(reduced.free_modes()).filter(|_| one.case.model.ring.is_none()),
+            frequencies: reduced.frequencies().iter().skip(reduced.free_modes()).take(LISTED).copied().collect(),
         });
         Some(StructureSummary {
             rows: component.dofs(),
             left_out: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.left_out),
             entries: [stiffness.len(), mass.len()],
             mass: DIRECTIONS.map(|along| mass_along(component.rows(), component.matrices().0, along)),
-            earlier: *earlier,
+            earlier: *earlier_reduction,
             reduced,
         })
     }

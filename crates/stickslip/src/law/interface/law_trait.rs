@@ -131,9 +131,9 @@ pub trait Law: Debug + Send + Sync {
     /// Tells whether the law is incrementally passive. For two motions of the contact from equal
     /// states, `∫ δf δu' dt` is never negative: the contact gives no energy to their difference.
     /// The stored elastic energy of the difference is then bounded, and two motions do not
-    /// diverge ([`crate::model::System::contracts`]). At a constant slip limit, friction that
-    /// grows with velocity or does not depend on it is passive; friction that falls with
-    /// velocity is not.
+    /// diverge ([`crate::model::System::is_incrementally_stable`]). At a constant slip limit,
+    /// friction that grows with velocity or does not depend on it is passive; friction that falls
+    /// with velocity is not.
     fn is_incrementally_passive(&self) -> bool {
         false
     }

@@ -265,7 +265,7 @@ pub(crate) struct Mechanics {
 /// adjacent mass.
 fn light(system: &System, parts: &[Part], method: &'static str) -> Option<MethodError> {
     let rigid = || parts.iter().filter(|part| matches!(part.kind, Kind::Rigid { .. }));
-    let mass = |row: usize| system.structure().own_mass(row);
+    let mass = |row: usize| system.structure().diagonal_mass(row);
     rigid().find_map(|part| {
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
@@ -311,7 +311,7 @@ impl Mechanics {
         if let Some(error) = MethodError::too_large(method, system) {
             return Err(error);
         }
-        if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
+        if let Some(i) = (0..n).find(|&i| system.structure().diagonal_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(method, system, i));
         }
         let mut gathered = Gathered::default();

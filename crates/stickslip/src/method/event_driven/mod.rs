@@ -184,7 +184,7 @@ impl<'a> Exact<'a> {
             weights,
             duration: 0.0,
             periods,
-            contracts: system.contracts(),
+            contracts: system.is_incrementally_stable(),
             equilibrium: StaticEquilibrium::under_load(system),
         })
     }

@@ -164,7 +164,7 @@ impl ExactPath {
     /// Returns displacement and velocity of a moved place as signals.
     fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
         let mut motion = vec![ZERO; piece.basis().len()];
-        self.add_imposed(piece, &self.system.moved()[m].motion, &mut motion);
+        self.add_imposed(piece, &self.system.moved_places()[m].motion, &mut motion);
         let mut speed = motion.clone();
         piece.basis().differentiate(&motion, &mut speed);
         (motion, speed)
@@ -172,7 +172,7 @@ impl ExactPath {
 
     /// Returns the force that moves a place, as a signal.
     fn reaction(&self, piece: &Piece, m: usize) -> Vec<Complex64> {
-        let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved()[m]);
+        let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved_places()[m]);
         let mut force = vec![ZERO; nb];
         let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
             if factor != 0.0 {
@@ -439,7 +439,7 @@ impl Path for ExactPath {
                 self.add_imposed(piece, joint.axes()[0].imposed(), &mut imposed);
                 let mut speed = vec![ZERO; nb];
                 piece.basis().differentiate(&imposed, &mut speed);
-                let along = |v: &[f64]| joint.axes()[0].along(v);
+                let along = |v: &[f64]| joint.axes()[0].component(v);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
                 let contact = match self.contact_of(j, &piece.segment) {
                     None => Contact::slip(joint_velocity),
@@ -452,7 +452,7 @@ impl Path for ExactPath {
                 JointSample::along(joint_displacement, joint_velocity, force, contact)
             })
             .collect();
-        let moved = (0..self.system.moved().len())
+        let moved = (0..self.system.moved_places().len())
             .map(|m| {
                 let (motion, _) = self.moved_motion(piece, m);
                 let reaction = self.reaction(piece, m);

@@ -85,7 +85,7 @@ impl Balance {
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &few, places: x, along: &motion.c };
         let at = (self.kept, omega, self.steep);
-        let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
+        let error = estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
         Ok((error, better))
     }
 

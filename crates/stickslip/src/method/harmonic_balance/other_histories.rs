@@ -58,8 +58,8 @@ impl Balance {
         let moving: Vec<usize> = (0..one.len()).filter(|k| harmonics[*k] > 0).collect();
         let vibration = |of: &dyn Fn(usize) -> Complex64| moving.iter().map(|k| of(*k).norm_sqr()).sum::<f64>().sqrt();
         let (mut apart, mut size) = (0.0f64, 0.0f64);
-        for axis in self.system.seen() {
-            let (a, b) = (|k: usize| axis.along_complex(&one[k]), |k: usize| axis.along_complex(&other[k]));
+        for axis in self.system.place_axes() {
+            let (a, b) = (|k: usize| axis.complex_component(&one[k]), |k: usize| axis.complex_component(&other[k]));
             size = size.max(vibration(&a));
             apart = apart.max((vibration(&a) - vibration(&b)).abs());
         }

@@ -154,8 +154,8 @@ pub(super) fn orbit(
         level: RefCell::new(level),
     };
     let Ok(mut measured) = results(system, &measuring, omega, (symmetry, period));
-    for (place, axis) in measured.places.iter_mut().zip(system.seen()) {
-        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| axis.along_complex(&x[k]));
+    for (place, axis) in measured.places.iter_mut().zip(system.place_axes()) {
+        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| axis.complex_component(&x[k]));
     }
     let n = system.dofs();
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
@@ -279,7 +279,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
 
 /// Returns the harmonics of the relative displacement along an axis.
 fn relative(axis: &Axis, harmonics: &[usize], x: &[DVector<Complex64>]) -> Vec<Complex64> {
-    harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.along_complex(x)).collect()
+    harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.complex_component(x)).collect()
 }
 
 /// Returns the unknowns along each axis, by their numbers among all ports, with the share of
@@ -351,7 +351,7 @@ impl PathSignals for Measuring<'_> {
     }
     // with modal coordinates, there is one row for each mode
     fn place_displacement(&self, place: &Axis) -> Vec<Complex64> {
-        self.x.iter().map(|x| place.along_complex(x)).collect()
+        self.x.iter().map(|x| place.complex_component(x)).collect()
     }
     fn velocity(&self, row: usize) -> Vec<Complex64> {
         self.derivative(self.displacement(row))
@@ -443,10 +443,10 @@ fn amplitude_at(harmonics: &[(u32, Complex64)], h: usize) -> Complex64 {
 
 /// Returns harmonic `h` of the force that moves a place, without the joint forces.
 fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVector<Complex64>) -> Complex64 {
-    let place = &system.moved()[m];
+    let place = &system.moved_places()[m];
     let mut force = -amplitude_at(&place.force, h);
     for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-        force += moved(&system.moved()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
+        force += moved(&system.moved_places()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
     }
     for i in 0..x.len() {
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
@@ -465,7 +465,7 @@ impl Path for Series {
     fn sample(&self, time: f64) -> Sample {
         let n = self.system.dofs();
         let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let mut moved_now = vec![(0.0, 0.0); self.system.moved().len()];
+        let mut moved_now = vec![(0.0, 0.0); self.system.moved_places().len()];
         for (&h, amplitude) in self.harmonics.iter().zip(&self.x) {
             let s = Complex64::new(0.0, h as f64 * self.omega);
             let turn = Complex64::cis(h as f64 * self.omega * time);
@@ -476,7 +476,7 @@ impl Path for Series {
                 a[i] += (s * s * z).re;
             }
             for (m, now) in moved_now.iter_mut().enumerate() {
-                now.0 += (moved(&self.system.moved()[m], h) * turn).re;
+                now.0 += (moved(&self.system.moved_places()[m], h) * turn).re;
                 now.1 += (linear_reaction(&self.system, m, h, s, amplitude) * turn).re;
             }
         }
@@ -493,8 +493,8 @@ impl Path for Series {
                 let (before, after) = (self.force[j][low % samples], self.force[j][(low + 1) % samples]);
                 let mut sample = JointSample::along(0.0, 0.0, 0.0, self.contact[j][(at.round() as usize) % samples]);
                 for (a, axis) in joint.axes().iter().enumerate() {
-                    sample.displacement[a] = axis.along(&x);
-                    sample.velocity[a] = axis.along(&v);
+                    sample.displacement[a] = axis.component(&x);
+                    sample.velocity[a] = axis.component(&v);
                     for &(h, g) in axis.imposed() {
                         let rate = f64::from(h) * self.omega;
                         let z = g * Complex64::cis(rate * time);
@@ -512,7 +512,8 @@ impl Path for Series {
             .flat_map(|(now, joint)| now.force[..joint.axes().len()].to_vec())
             .collect();
         for (m, now) in moved_now.iter_mut().enumerate() {
-            now.1 += forces.iter().zip(&self.system.moved()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
+            now.1 +=
+                forces.iter().zip(&self.system.moved_places()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
         }
         Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
     }

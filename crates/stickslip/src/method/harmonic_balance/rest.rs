@@ -483,7 +483,7 @@ impl Rest {
         let mut force = DVector::from_element(self.n, ZERO);
         let (sectors, size) = self.sectors();
         for sector in 0..sectors {
-            let lead = self.waves.as_ref().map(|waves| waves.cyclic.lead(harmonic, sector));
+            let lead = self.waves.as_ref().map(|waves| waves.cyclic.phase_factor(harmonic, sector));
             for (q, rows) in self.directions.iter().enumerate() {
                 let f = lead.map_or_else(|| along(q), |lead| along(q) * lead);
                 rows.iter().for_each(|&(i, w)| force[(i + sector * size) % self.n] += f * w);

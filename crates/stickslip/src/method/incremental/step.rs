@@ -150,8 +150,8 @@ impl Step {
         self.sum.gemv(1.0, &eliminated.from_force, &self.before, 1.0);
         self.z.copy_from_slice(&state[2 * n..]);
         for (axis, along) in assembly.axes.iter().enumerate() {
-            self.free[axis] = along.along(self.sum.as_slice());
-            self.unknown[axis] = along.along(&state[n..2 * n]);
+            self.free[axis] = along.component(self.sum.as_slice());
+            self.unknown[axis] = along.component(&state[n..2 * n]);
         }
         for (q, joint) in assembly.joints.iter().enumerate() {
             let at = At { motion: self.from[q], z: &self.z[joint.internal()] };
@@ -218,7 +218,7 @@ impl Step {
             for (d, axis) in joint.axes().enumerate() {
                 let (g, speed) = drive.relative_at(axis, time + h);
                 let (before, _) = drive.relative_at(axis, time);
-                let travel = 0.5 * h * (assembly.axes[axis].along(v) + self.unknown[axis]);
+                let travel = 0.5 * h * (assembly.axes[axis].component(v) + self.unknown[axis]);
                 self.to[q].displacement[d] = self.from[q].displacement[d] + travel + g - before;
                 self.to[q].velocity[d] = self.unknown[axis] + speed;
             }

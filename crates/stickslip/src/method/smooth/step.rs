@@ -238,7 +238,7 @@ impl Step {
             *free += velocity;
         }
         for (structural, axis) in self.structural.iter_mut().zip(&assembly.axes) {
-            *structural = axis.along(&state[..n]);
+            *structural = axis.component(&state[..n]);
         }
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
@@ -669,7 +669,7 @@ impl Filter {
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
             let (directions, states) = (joint.directions, joint.states);
             let mut u = [0.0; crate::law::MAX_DIRECTIONS];
-            joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].along(x) / rate);
+            joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].component(x) / rate);
             for (s, own) in joint.internal().enumerate() {
                 let slope = point.rate_slope(s);
                 self.z[s] = internal[own] + (0..directions).map(|e| slope[e] * u[e]).sum::<f64>();
@@ -684,7 +684,8 @@ impl Filter {
             }
         }
         for (row, (w, axis)) in self.w.iter_mut().zip(&assembly.axes).enumerate() {
-            *w = axis.along(self.v.as_slice()) - g.row(row).iter().zip(&self.force).map(|(g, t)| g * t).sum::<f64>();
+            *w =
+                axis.component(self.v.as_slice()) - g.row(row).iter().zip(&self.force).map(|(g, t)| g * t).sum::<f64>();
         }
         self.axes.solve(&mut self.w);
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {

@@ -177,7 +177,7 @@ impl SwitchedFlow {
     /// Returns the relative acceleration along an axis for the present time derivative, m/s².
     fn acceleration(&self, axis: usize, time: f64) -> f64 {
         let n = self.assembly.n;
-        self.assembly.axes[axis].along(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
+        self.assembly.axes[axis].component(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
     }
 
     fn held(&self) -> impl Iterator<Item = &Friction> {

@@ -4,7 +4,7 @@
 //! split into levels: for the lower modes, the stiffest springs count as rigid.
 
 use super::rigid_body::DisjointSets;
-use super::{LinearMode, Modes};
+use super::{LinearModes, NaturalMode};
 use crate::structure::reduction::natural;
 use crate::structure::{Matrices, free_vibrations};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -20,7 +20,7 @@ pub(super) struct SpringDamper {
 /// The modes of a linear structure, with their shapes.
 #[derive(Debug, Clone)]
 pub(super) struct LinearStructure {
-    pub(super) modes: Modes,
+    pub(super) modes: LinearModes,
     /// Shapes of the elastic modes with `φᵀMφ = 1`, one per column. `None` if some stiffnesses
     /// had to count as rigid.
     pub(super) shapes: Option<DMatrix<f64>>,
@@ -88,24 +88,24 @@ impl ModalStructure {
     }
 
     /// Returns a mode without the gyroscopic part of the damping.
-    fn mode(&self, k: usize) -> LinearMode {
+    fn mode(&self, k: usize) -> NaturalMode {
         let omega = self.squares[k].max(0.0).sqrt();
-        LinearMode { omega, damping: self.damping[(k, k)] / (2.0 * omega) }
+        NaturalMode { omega, damping: self.damping[(k, k)] / (2.0 * omega) }
     }
 
     fn linear(self) -> LinearStructure {
         let elastic = (self.free..self.squares.len()).map(|k| self.mode(k)).collect();
-        let modes = Modes { elastic, rigid: self.free, lost: 0 };
+        let modes = LinearModes { elastic, rigid: self.free, unresolved: 0 };
         LinearStructure { modes, shapes: Some(self.elastic_shapes()), gyroscopic: false }
     }
 
     /// Returns the modes of free vibration if the damping has a gyroscopic part, otherwise
     /// `None`. Only the 200 lowest modes include that part.
-    fn gyroscopic_modes(&self) -> Option<Vec<LinearMode>> {
+    fn gyroscopic_modes(&self) -> Option<Vec<NaturalMode>> {
         let n = self.squares.len().min(200);
         let found = free_vibrations(&self.squares[..n], &self.damping.view((0, 0), (n, n)).into_owned())?;
-        let found = found.into_iter().map(|one| LinearMode { omega: one.omega, damping: one.damping });
-        let mut elastic: Vec<LinearMode> = found.chain((n..self.squares.len()).map(|k| self.mode(k))).collect();
+        let found = found.into_iter().map(|one| NaturalMode { omega: one.omega, damping: one.damping });
+        let mut elastic: Vec<NaturalMode> = found.chain((n..self.squares.len()).map(|k| self.mode(k))).collect();
         elastic.sort_by(|a, b| a.omega.total_cmp(&b.omega));
         Some(elastic)
     }
@@ -118,7 +118,7 @@ impl LinearStructure {
         let Some(modal) = ModalStructure::new(full, links, rigid) else { return LinearStructure::unknown(full) };
         match modal.gyroscopic_modes() {
             Some(elastic) => {
-                let modes = Modes { elastic, rigid: modal.free, lost: 0 };
+                let modes = LinearModes { elastic, rigid: modal.free, unresolved: 0 };
                 LinearStructure { modes, shapes: Some(modal.elastic_shapes()), gyroscopic: true }
             }
             None => modal.linear(),
@@ -133,7 +133,7 @@ impl LinearStructure {
 
     fn unknown(full: &Matrices) -> LinearStructure {
         LinearStructure {
-            modes: Modes { lost: full.mass.nrows(), ..Modes::default() },
+            modes: LinearModes { unresolved: full.mass.nrows(), ..LinearModes::default() },
             shapes: None,
             gyroscopic: false,
         }
@@ -149,7 +149,7 @@ impl LinearStructure {
         if elastic.len() >= expected {
             let shapes = total.shapes(expected);
             let lowest = elastic.len() - expected; // rounding can give a rigid motion a frequency
-            let modes = Modes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, lost: 0 };
+            let modes = LinearModes { elastic: elastic[lowest..].to_vec(), rigid: rigid_motions, unresolved: 0 };
             return LinearStructure { modes, shapes: Some(shapes), gyroscopic: false };
         }
         // some modes are too far below the stiffest springs; those springs count as rigid for
@@ -185,8 +185,12 @@ impl LinearStructure {
                 high = all;
             }
         }
-        let lost = expected - high.len();
-        LinearStructure { modes: Modes { elastic: high, rigid: rigid_motions, lost }, shapes: None, gyroscopic: false }
+        let unresolved = expected - high.len();
+        LinearStructure {
+            modes: LinearModes { elastic: high, rigid: rigid_motions, unresolved },
+            shapes: None,
+            gyroscopic: false,
+        }
     }
 }
 
@@ -200,13 +204,13 @@ struct CondensedModes {
 }
 
 impl CondensedModes {
-    fn above(&self, share: f64) -> Vec<LinearMode> {
+    fn above(&self, share: f64) -> Vec<NaturalMode> {
         let floor = share * self.frequencies.last().map_or(0.0, |w| w.abs());
         let pairs = self.frequencies.iter().zip(&self.damping).filter(|(w, _)| **w > floor);
-        pairs.map(|(w, c)| LinearMode { omega: w.sqrt(), damping: c / (2.0 * w.sqrt()) }).collect()
+        pairs.map(|(w, c)| NaturalMode { omega: w.sqrt(), damping: c / (2.0 * w.sqrt()) }).collect()
     }
 
-    fn elastic(&self) -> Vec<LinearMode> {
+    fn elastic(&self) -> Vec<NaturalMode> {
         self.above(RESOLVED_EIGENVALUE)
     }
 

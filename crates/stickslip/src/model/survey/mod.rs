@@ -16,7 +16,7 @@ mod slip_onset;
 mod stuck_joint;
 mod wave_modes;
 
-pub use results::{FirstSlip, LinearMode, Loose, Modes, Onset, Unpressed};
+pub use results::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, UnloadedContacts};
 pub use wave_modes::WaveModes;
 
 use super::{Model, ModelError, System, SystemJoint};
@@ -35,10 +35,10 @@ pub struct Survey {
     /// Modes with open faces closed, if any faces are apart in static equilibrium.
     closed: Option<LinearStructure>,
     /// Contact forces in static equilibrium without rigid friction, N; see
-    /// [`FirstSlip::at_rest`].
+    /// [`FirstSlip::equilibrium_force`].
     at_rest: Vec<Option<f64>>,
-    loose: Vec<Loose>,
-    unpressed: Option<Unpressed>,
+    loose: Vec<LooseBody>,
+    unpressed: Option<UnloadedContacts>,
 }
 
 impl Model {
@@ -86,7 +86,7 @@ impl Model {
     /// };
     /// let survey = model.survey_under_load(&|system| Some(StaticEquilibrium::of(system)?.forces())).unwrap();
     /// let slip = survey.first_slip();
-    /// assert!((slip[0].limit - 6.0).abs() < 1e-9 && (slip[1].at_rest.unwrap() - 20.0).abs() < 1e-9);
+    /// assert!((slip[0].limit - 6.0).abs() < 1e-9 && (slip[1].equilibrium_force.unwrap() - 20.0).abs() < 1e-9);
     /// assert_eq!(model.survey().unwrap().first_slip()[0].limit, 0.0);
     /// ```
     pub fn survey_under_load(
@@ -115,9 +115,12 @@ impl Model {
         }
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
         if system.dofs() > MAX_DOFS {
-            let lost = system.dofs();
-            let unknown =
-                || LinearStructure { modes: Modes { lost, ..Modes::default() }, shapes: None, gyroscopic: false };
+            let unresolved = system.dofs();
+            let unknown = || LinearStructure {
+                modes: LinearModes { unresolved, ..LinearModes::default() },
+                shapes: None,
+                gyroscopic: false,
+            };
             let (free, stuck) = (unknown(), unknown());
             return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
         }
@@ -144,7 +147,8 @@ impl Model {
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
             let ends = between.iter().zip([1.0, -1.0]);
-            let rows = ends.filter_map(|(name, sign)| Some((system.seen()[*index.get(name.as_str())?].rows(), sign)));
+            let rows =
+                ends.filter_map(|(name, sign)| Some((system.place_axes()[*index.get(name.as_str())?].rows(), sign)));
             rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
         };
         let springs: Vec<SpringDamper> = self
@@ -153,7 +157,7 @@ impl Model {
             .map(|s| SpringDamper { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
             .filter(|link| !link.at.is_empty())
             .collect();
-        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
+        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().diagonal_mass(i)).collect();
         let free = LinearStructure::new(&mass, &springs.iter().chain(dampers).collect::<Vec<_>>(), &[]);
         let stuck = |held: &[&SpringDamper]| {
             let all: Vec<&SpringDamper> = springs.iter().chain(held.iter().copied()).collect();
@@ -188,30 +192,30 @@ impl Survey {
     }
 
     /// Returns whether the model has too many degrees of freedom for its modes. All modes then
-    /// count as lost.
+    /// count as unresolved.
     pub fn is_too_large(&self) -> bool {
         self.dofs() > MAX_DOFS
     }
 
     /// Returns the modes with all joints free.
-    pub fn free(&self) -> &Modes {
+    pub fn free(&self) -> &LinearModes {
         &self.free.modes
     }
 
     /// Returns the modes with all joints stuck. All faces are closed, including those that are
     /// apart in static equilibrium.
-    pub fn stuck(&self) -> &Modes {
+    pub fn stuck(&self) -> &LinearModes {
         &self.closed.as_ref().unwrap_or(&self.stuck).modes
     }
 
     /// Returns the bodies that no spring holds.
-    pub fn loose(&self) -> &[Loose] {
+    pub fn loose(&self) -> &[LooseBody] {
         &self.loose
     }
 
     /// Returns preloaded contacts that carry no force in static equilibrium, if a body is
     /// loose. No constant force balances their preload.
-    pub fn unpressed(&self) -> Option<&Unpressed> {
+    pub fn unpressed(&self) -> Option<&UnloadedContacts> {
         self.unpressed.as_ref()
     }
 
@@ -229,8 +233,8 @@ impl Survey {
                 limit,
                 displacement,
                 gradual: joint.gradual,
-                pressed: joint.pressed,
-                at_rest: carried.filter(|_| !rigid),
+                preload: joint.pressed,
+                equilibrium_force: carried.filter(|_| !rigid),
             }
         };
         self.joints.iter().zip(&self.at_rest).map(one).collect()

@@ -4,7 +4,7 @@
 //! `f₀`.
 
 use super::super::System;
-use super::Unpressed;
+use super::UnloadedContacts;
 use super::linear_modes::MAX_DOFS;
 use super::stuck_joint::{StuckAxis, StuckState};
 use nalgebra::{DMatrix, DVector};
@@ -61,8 +61,8 @@ pub(super) fn equilibrium_forces(system: &System, joints: &[StuckAxis]) -> Vec<O
 }
 
 /// Returns the preloaded contacts that carry no force; `None` if each carries some.
-pub(super) fn unpressed(system: &System, joints: &[StuckAxis], carried: &[Option<f64>]) -> Option<Unpressed> {
-    let mut found = Unpressed { joints: Vec::new(), preload: 0.0 };
+pub(super) fn unpressed(system: &System, joints: &[StuckAxis], carried: &[Option<f64>]) -> Option<UnloadedContacts> {
+    let mut found = UnloadedContacts { joints: Vec::new(), preload: 0.0 };
     for (joint, _) in joints.iter().zip(carried).filter(|(_, carried)| carried.is_some_and(|force| force <= 0.0)) {
         found.joints.push(system.joints()[joint.joint].name().to_owned());
         found.preload += joint.pressed.unwrap_or(0.0);

@@ -2,7 +2,7 @@
 
 /// A mode of the linear structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearMode {
+pub struct NaturalMode {
     /// Undamped natural frequency, rad/s. If the damping has a gyroscopic part, the frequency
     /// of free vibration, `Im λ`.
     pub omega: f64,
@@ -15,14 +15,14 @@ pub struct LinearMode {
 
 /// The modes of a linear structure.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Modes {
+pub struct LinearModes {
     /// Modes with a nonzero frequency, in ascending order.
-    pub elastic: Vec<LinearMode>,
+    pub elastic: Vec<NaturalMode>,
     /// Number of motions without a restoring spring.
     pub rigid: usize,
     /// Number of modes whose frequency is lost in rounding, because other stiffnesses are many
     /// orders of magnitude higher.
-    pub lost: usize,
+    pub unresolved: usize,
 }
 
 /// The stuck state of a joint, and the load at which it slips.
@@ -41,32 +41,32 @@ pub struct FirstSlip {
     /// For a normal direction, which opens and closes but never slips: the force that presses
     /// the faces together at zero displacement, N; zero if they are apart. `None` for other
     /// directions.
-    pub pressed: Option<f64>,
+    pub preload: Option<f64>,
     /// Contact force in static equilibrium under the constant forces, N, with the deformation
     /// of the structure. It is zero or negative if the contact opens.
     ///
     /// `None` if it is unknown: without preload, in models with rigid friction, or in models
     /// too large for a quick answer.
-    pub at_rest: Option<f64>,
+    pub equilibrium_force: Option<f64>,
 }
 
 /// Load of a stuck joint relative to its limit under the model's excitation, over a range of
 /// excitation frequencies.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Onset {
+pub struct SlipOnset {
     /// Largest amplitude of the joint's load divided by its limit. The joint slips where this
     /// is above 1. The excitation times `1 / largest` is the smallest one that makes it slip.
     pub largest: f64,
     /// Frequency of the largest load, rad/s.
-    pub at: f64,
+    pub omega: f64,
     /// Intervals of the range with a load above 1, rad/s. They are valid for the joint that
     /// slips first: after that, the slip of other joints changes the structure.
-    pub slips: Vec<(f64, f64)>,
+    pub slip_ranges: Vec<(f64, f64)>,
 }
 
 /// Places of a body that no spring holds, so that it can drift.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Loose {
+pub struct LooseBody {
     /// Names of the places.
     pub masses: Vec<String>,
     /// True if stuck joints hold the body.
@@ -82,7 +82,7 @@ pub struct Loose {
 /// Contacts with a preload that carry no force in static equilibrium. Their preload moves a
 /// body that nothing else holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unpressed {
+pub struct UnloadedContacts {
     /// Names of the joints.
     pub joints: Vec<String>,
     /// The sum of their preloads, N.

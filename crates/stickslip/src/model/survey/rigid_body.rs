@@ -1,20 +1,20 @@
 //! Detects bodies that no spring holds.
 
 use super::super::{Body, GROUND, Mass, Model, Place, System};
-use super::Loose;
+use super::LooseBody;
 use super::stuck_joint::{StuckAxis, StuckState};
 use std::collections::{BTreeSet, HashMap};
 
 impl Model {
     /// Returns the bodies that no spring connects to the ground or to a moved place.
-    pub(super) fn loose(&self, system: &System, joints: &[StuckAxis]) -> Vec<Loose> {
+    pub(super) fn loose(&self, system: &System, joints: &[StuckAxis]) -> Vec<LooseBody> {
         let mut index: HashMap<String, usize> = HashMap::from([(GROUND.to_owned(), 0)]);
         for motion in &self.motions {
             index.insert(motion.on.clone(), 0); // moved places count as fixed, like the ground
         }
         // a component is one body, which is held if it has no free motion
-        let held = system.reduced().is_none_or(|component| component.free() == 0);
-        let own = self.places.iter().filter(|place| place.of.is_none());
+        let held = system.reduced().is_none_or(|component| component.free_modes() == 0);
+        let own = self.places.iter().filter(|place| place.view_of.is_none());
         let of_component: Vec<String> = own.flat_map(Place::places).collect();
         let of_bodies = self.bodies.iter().flat_map(Body::places);
         let mut places: Vec<String> = self.masses.iter().flat_map(Mass::places).chain(of_bodies).collect();
@@ -34,8 +34,8 @@ impl Model {
         }
         for place in &self.places {
             // a second view of a node belongs to the body of the node
-            let mass = self.masses.iter().find(|mass| place.of.as_ref() == Some(&mass.name)).map(Mass::places);
-            let body = || self.bodies.iter().find(|body| place.of.as_ref() == Some(&body.name)).map(Body::places);
+            let mass = self.masses.iter().find(|mass| place.view_of.as_ref() == Some(&mass.name)).map(Mass::places);
+            let body = || self.bodies.iter().find(|body| place.view_of.as_ref() == Some(&body.name)).map(Body::places);
             let node = mass.or_else(body);
             let node: Vec<usize> = node.unwrap_or_default().iter().map(|name| index[name]).collect();
             node.windows(2).for_each(|pair| bodies.union((pair[0], pair[1])));
@@ -77,7 +77,7 @@ impl Model {
                 }
             }
         }
-        let mut loose: Vec<Loose> = Vec::new();
+        let mut loose: Vec<LooseBody> = Vec::new();
         let mut known: HashMap<usize, usize> = HashMap::new();
         for place in &places {
             let at = index[place];
@@ -101,7 +101,7 @@ impl Model {
                         names
                     };
                     let (contacts, faces) = (of_body(&touched), of_body(&beside));
-                    loose.push(Loose {
+                    loose.push(LooseBody {
                         masses: vec![place.clone()],
                         held_by_friction,
                         held_in_motion,

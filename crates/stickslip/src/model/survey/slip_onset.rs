@@ -2,7 +2,7 @@
 
 use super::linear_modes::SpringDamper;
 use super::stuck_joint::{StuckAxis, StuckState};
-use super::{Onset, Survey};
+use super::{SlipOnset, Survey};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -55,7 +55,7 @@ impl Survey {
     ///
     /// Returns `None` if the model is too large for a quick answer, or if it has no linear
     /// response in the range.
-    pub fn onset(&self, from: f64, to: f64) -> Option<Vec<Onset>> {
+    pub fn onset(&self, from: f64, to: f64) -> Option<Vec<SlipOnset>> {
         let omegas = self.frequencies(from, to)?;
         if self.joints.is_empty() {
             return Some(Vec::new());
@@ -71,14 +71,14 @@ impl Survey {
     /// resonance, with all joints free.
     ///
     /// Linear motion is unbounded there. The range applies to the excitation frequency.
-    pub fn undamped(&self, from: f64, to: f64) -> Vec<f64> {
+    pub fn undamped_resonances(&self, from: f64, to: f64) -> Vec<f64> {
         let Some(shapes) = &self.free.shapes else { return Vec::new() };
         let driven = |index: usize, omega: f64| {
             let shape = shapes.column(index);
-            self.system.loads().iter().filter(|load| load.harmonic > 0).any(|load| {
+            self.system.excitation_harmonics().iter().filter(|load| load.harmonic > 0).any(|load| {
                 let at = omega / f64::from(load.harmonic);
                 let (mut power, mut size) = (Complex64::ZERO, 0.0);
-                for (force, x) in load.at(at).iter().zip(shape.iter()) {
+                for (force, x) in load.amplitudes_at(at).iter().zip(shape.iter()) {
                     power += *force * *x;
                     size += (*force * *x).norm();
                 }
@@ -248,7 +248,9 @@ impl Survey {
                 a[(i, j)] = Complex64::new(real, w * system.structure().damping()[(i, j)]);
             }
         }
-        if let Some(excitation) = system.loads().iter().find(|load| load.harmonic == h).map(|load| load.at(omega)) {
+        if let Some(excitation) =
+            system.excitation_harmonics().iter().find(|load| load.harmonic == h).map(|load| load.amplitudes_at(omega))
+        {
             for i in 0..n {
                 b[i] = excitation[i];
             }
@@ -295,7 +297,7 @@ impl Survey {
     }
 
     /// Returns the onset of one joint from the samples, with refined maximum and borders.
-    fn onset_of(&self, joint: usize, omegas: &[f64], shares: &[Vec<f64>]) -> Option<Onset> {
+    fn onset_of(&self, joint: usize, omegas: &[f64], shares: &[Vec<f64>]) -> Option<SlipOnset> {
         let at = |omega: f64| Some(self.relative_loads(omega)?[joint]);
         let value = |i: usize| shares[i][joint];
         let top = (0..omegas.len()).max_by(|&a, &b| value(a).total_cmp(&value(b)))?;
@@ -323,17 +325,17 @@ impl Survey {
         let mut points: Vec<(f64, f64)> = omegas.iter().copied().zip((0..omegas.len()).map(value)).collect();
         points.push(best);
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut slips: Vec<(f64, f64)> = Vec::new();
+        let mut slip_ranges: Vec<(f64, f64)> = Vec::new();
         let mut begin = points.first().filter(|p| p.1 > 1.0).map(|p| p.0);
         for pair in points.windows(2) {
             let ((w, a), (v, b)) = (pair[0], pair[1]);
             match (a > 1.0, b > 1.0) {
                 (false, true) => begin = Some(border(v, w)?),
-                (true, false) => slips.extend(begin.take().zip(Some(border(w, v)?))),
+                (true, false) => slip_ranges.extend(begin.take().zip(Some(border(w, v)?))),
                 _ => {}
             }
         }
-        slips.extend(begin.zip(points.last().map(|p| p.0)));
-        Some(Onset { largest: best.1, at: best.0, slips })
+        slip_ranges.extend(begin.zip(points.last().map(|p| p.0)));
+        Some(SlipOnset { largest: best.1, omega: best.0, slip_ranges })
     }
 }

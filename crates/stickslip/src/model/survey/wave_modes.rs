@@ -8,9 +8,9 @@
 
 use super::linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
 use super::stuck_joint::{StuckAxis, StuckState};
-use super::{LinearMode, Model, ModelError, Modes, System};
+use super::{LinearModes, Model, ModelError, NaturalMode, System};
 use crate::model::{Body, Mass, Place};
-use crate::structure::{Sector, Structure, unit_root};
+use crate::structure::{RingSector, Structure, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
@@ -24,9 +24,9 @@ pub struct WaveModes {
     pub diameter: usize,
     /// Modes with all joints free. Modes of travelling waves occur in pairs; each pair is
     /// listed once.
-    pub free: Modes,
+    pub free: LinearModes,
     /// Modes with all joints stuck.
-    pub stuck: Modes,
+    pub stuck: LinearModes,
     /// Shapes of the modes of `free`, [mode][place of the sector] in the order of
     /// [`Model::sector_places`], 1/√kg.
     ///
@@ -90,7 +90,7 @@ impl WaveRows {
     /// larger space. This function splits that space into orthogonal complex shapes.
     fn select_modes(
         &self,
-        mut modes: Modes,
+        mut modes: LinearModes,
         shapes: Option<DMatrix<f64>>,
         lowest: usize,
         weigh: &dyn Fn(&DVector<f64>) -> DVector<f64>,
@@ -102,7 +102,7 @@ impl WaveRows {
             modes.elastic.truncate(lowest);
             return SelectedModes { modes, shapes: shapes.map_or_else(Vec::new, columns) };
         }
-        (modes.rigid, modes.lost) = (modes.rigid / 2, modes.lost / 2);
+        (modes.rigid, modes.unresolved) = (modes.rigid / 2, modes.unresolved / 2);
         let most = lowest.min(modes.elastic.len() / 2);
         let split = shapes.and_then(|shapes| self.split(&modes.elastic, &shapes, most, weigh));
         let (kept, shapes) = split.unwrap_or_else(|| ((0..most).map(|mode| 2 * mode).collect(), Vec::new()));
@@ -114,7 +114,7 @@ impl WaveRows {
     /// orthogonal vectors `(a, b)`.
     fn split(
         &self,
-        elastic: &[LinearMode],
+        elastic: &[NaturalMode],
         shapes: &DMatrix<f64>,
         most: usize,
         weigh: &dyn Fn(&DVector<f64>) -> DVector<f64>,
@@ -177,7 +177,7 @@ impl WaveRows {
 
 /// The modes of a wave, each once, with their shapes `(a, b)` if they are known.
 struct SelectedModes {
-    modes: Modes,
+    modes: LinearModes,
     shapes: Vec<DVector<f64>>,
 }
 
@@ -230,14 +230,15 @@ impl Model {
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Row {
             let ends = between.iter().zip([1.0, -1.0]);
-            let rows = ends.filter_map(|(name, sign)| Some((system.seen()[*index.get(name.as_str())?].rows(), sign)));
+            let rows =
+                ends.filter_map(|(name, sign)| Some((system.place_axes()[*index.get(name.as_str())?].rows(), sign)));
             rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
         };
         let springs = &self.springs[..self.springs.len() / sectors];
         let joints = &system.joints()[..system.joints().len() / sectors];
         let stuck: Vec<StuckAxis> =
             joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint((i, joint), &**joint.law())).collect();
-        let own: Vec<f64> = (0..n).map(|i| system.structure().own_mass(i)).collect();
+        let own: Vec<f64> = (0..n).map(|i| system.structure().diagonal_mass(i)).collect();
         let places = self.sector_axes(&system);
         let wave = |diameter: usize| {
             let double = !(2 * diameter).is_multiple_of(sectors);
@@ -284,14 +285,15 @@ impl Model {
     /// Returns the places of the first sector as weighted sums of the ring's coordinates.
     fn sector_axes(&self, system: &System) -> Vec<Row> {
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
-        let seen = |name: String| index.get(name.as_str()).map_or_else(Vec::new, |i| system.seen()[*i].rows().to_vec());
+        let seen =
+            |name: String| index.get(name.as_str()).map_or_else(Vec::new, |i| system.place_axes()[*i].rows().to_vec());
         self.sector_places().into_iter().map(seen).collect()
     }
 }
 
 /// Returns the modes of the waves of equal sectors given by matrices.
 fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -> Option<Vec<WaveModes>> {
-    let sector = Sector::of(system.structure(), sectors)?;
+    let sector = RingSector::from_ring(system.structure(), sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
     let stuck: Vec<StuckAxis> =
         joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint((i, joint), &**joint.law())).collect();
@@ -335,7 +337,11 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
 
 /// Returns the mass matrix and the lowest modes of a large structure, with both modes of each
 /// pair and their shapes.
-fn of_large(structure: &Structure, links: &[SpringDamper], count: usize) -> Option<(Matrix, Modes, DMatrix<f64>)> {
+fn of_large(
+    structure: &Structure,
+    links: &[SpringDamper],
+    count: usize,
+) -> Option<(Matrix, LinearModes, DMatrix<f64>)> {
     let n = structure.dofs();
     let part = |kind: usize, more: Vec<(usize, usize, f64)>| {
         let own = structure.entries().map(|(row, column, values)| (row, column, values[kind]));
@@ -358,10 +364,10 @@ fn of_large(structure: &Structure, links: &[SpringDamper], count: usize) -> Opti
         let (omega, shape) = (found.values[k].max(0.0).sqrt(), found.shape(k));
         let power: f64 = damping.times(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
         let power = power + structure.damped_modes().map_or(0.0, |modes| modes.power(shape));
-        LinearMode { omega, damping: power / (2.0 * omega) }
+        NaturalMode { omega, damping: power / (2.0 * omega) }
     };
     let shapes = DMatrix::from_fn(n, found.count() - free, |row, k| found.shape(free + k)[row]);
-    let modes = Modes { elastic: (free..found.count()).map(mode).collect(), rigid: free, lost: 0 };
+    let modes = LinearModes { elastic: (free..found.count()).map(mode).collect(), rigid: free, unresolved: 0 };
     Some((mass, modes, shapes))
 }
 

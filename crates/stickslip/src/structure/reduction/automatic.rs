@@ -1,6 +1,8 @@
 //! Selects the smallest reduction with a given error.
 
-use super::{Deviation, Free, Reduced, ReductionError, ReductionKind, Reference, Whole};
+use super::{
+    FullStructure, ReducedMatrices, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, RubinBasis,
+};
 use std::ops::RangeInclusive;
 use stickslip_numerics::sparse::{ModesError, NaturalModes};
 
@@ -26,7 +28,7 @@ const MAX_RESIDUAL_NUMBERS: usize = 1 << 27;
 
 /// Returns the largest order of residual vectors, reduced for large structures with many ports
 /// to limit memory.
-fn orders(whole: &Whole) -> usize {
+fn orders(whole: &FullStructure) -> usize {
     (MAX_RESIDUAL_NUMBERS / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, ORDERS)
 }
 
@@ -35,7 +37,7 @@ fn orders(whole: &Whole) -> usize {
 /// # Example
 /// ```
 /// use std::f64::consts::TAU;
-/// use stickslip::structure::reduction::{Damping, Reduce, Whole};
+/// use stickslip::structure::reduction::{AutomaticReduction, FullStructure, StructureDamping};
 /// use stickslip_numerics::sparse::Matrix;
 /// // a rod of 400 masses, held at one end and seen at the other
 /// let n = 400;
@@ -46,13 +48,13 @@ fn orders(whole: &Whole) -> usize {
 /// let stiffness = Matrix::from_triplets(n, stiffness)?;
 /// let mass = Matrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
 /// let up_to = TAU * 100.0;
-/// let whole = Whole::new(mass, Damping::Ratio { ratio: 0.005, up_to }, stiffness, vec![vec![(n - 1, 1.0)]])?;
-/// let chosen = Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole)?;
+/// let whole = FullStructure::new(mass, StructureDamping::Ratio { ratio: 0.005, up_to }, stiffness, vec![vec![(n - 1, 1.0)]])?;
+/// let chosen = AutomaticReduction { up_to, tolerance: 1e-4, kind: None }.apply(&whole)?;
 /// assert!(chosen.reduced.dofs() < 12 && chosen.deviation.error < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reduce {
+pub struct AutomaticReduction {
     /// Highest frequency of interest, rad/s, including all significant harmonics of the
     /// excitation.
     pub up_to: f64,
@@ -73,24 +75,24 @@ struct Attempt {
 
 /// A reduction with its error.
 #[derive(Debug, Clone)]
-pub struct Chosen {
+pub struct SelectedReduction {
     /// The reduced structure.
-    pub reduced: Reduced,
+    pub reduced: ReducedMatrices,
     /// Its error relative to the whole structure.
-    pub deviation: Deviation,
+    pub deviation: ReductionDeviation,
     /// Modes of the whole structure.
     pub modes: NaturalModes,
 }
 
-impl Reduce {
+impl AutomaticReduction {
     /// Returns the smallest of the tried reductions whose error is within the tolerance.
     ///
     /// It tries free modes with residual vectors of one to three orders, then Craig-Bampton.
     ///
     /// # Errors
-    /// [`ReductionError::OutOfReach`] with the smallest error, or the error of the mode
+    /// [`ReductionError::ToleranceNotReached`] with the smallest error, or the error of the mode
     /// computation.
-    pub fn of(self, whole: &Whole) -> Result<Chosen, ReductionError> {
+    pub fn apply(self, whole: &FullStructure) -> Result<SelectedReduction, ReductionError> {
         for (what, value) in [
             ("the largest frequency of a reduction (rad/s)", self.up_to),
             ("the tolerance of a reduction", self.tolerance),
@@ -99,7 +101,7 @@ impl Reduce {
                 return Err(ReductionError::Number { what, value, must: "positive" });
             }
         }
-        let mut best: Option<(Deviation, usize)> = None;
+        let mut best: Option<(ReductionDeviation, usize)> = None;
         let (mut reference, mut last) = (None, None);
         for Attempt { extent, orders, has_alternative } in self.attempts(whole) {
             let modes = match whole.modes(extent * self.up_to) {
@@ -109,9 +111,9 @@ impl Reduce {
             };
             let reference = match &mut reference {
                 Some(reference) => reference,
-                none => none.insert(Reference::new(whole, &modes, self.up_to)?),
+                none => none.insert(ReferenceReceptance::new(whole, &modes, self.up_to)?),
             };
-            let mut good = |reduced: &Reduced| {
+            let mut good = |reduced: &ReducedMatrices| {
                 let deviation = reference.deviation(reduced);
                 if best.is_none_or(|(least, _)| deviation.error < least.error) {
                     best = Some((deviation, reduced.dofs()));
@@ -119,7 +121,7 @@ impl Reduce {
                 (deviation.error <= self.tolerance).then_some(deviation)
             };
             if self.kind != Some(ReductionKind::CraigBampton) && !orders.is_empty() {
-                let free = Free::new(whole, &modes, 0.0, *orders.end())?;
+                let free = RubinBasis::new(whole, &modes, 0.0, *orders.end())?;
                 for (count, order) in self.sizes(&modes, (extent, orders.clone()), whole) {
                     let reduced = match free.reduced(count, order) {
                         Ok(reduced) => reduced,
@@ -129,7 +131,7 @@ impl Reduce {
                         Err(other) => return Err(other),
                     };
                     if let Some(deviation) = good(&reduced) {
-                        return Ok(Chosen { reduced, deviation, modes });
+                        return Ok(SelectedReduction { reduced, deviation, modes });
                     }
                 }
             }
@@ -139,11 +141,11 @@ impl Reduce {
             match whole.craig_bampton(extent * self.up_to) {
                 Ok(reduced) => {
                     if let Some(deviation) = good(&reduced) {
-                        return Ok(Chosen { reduced, deviation, modes });
+                        return Ok(SelectedReduction { reduced, deviation, modes });
                     }
                 }
                 // if the fixed ports leave free motions, only free modes remain
-                Err(ReductionError::NotHeld { .. }) if self.kind.is_none() => {}
+                Err(ReductionError::FreeInterfaceMotion { .. }) if self.kind.is_none() => {}
                 Err(other) => return Err(other),
             }
             last = Some(modes);
@@ -159,7 +161,7 @@ impl Reduce {
                 };
                 let deviation = reference.deviation(&reduced);
                 if deviation.error <= self.tolerance {
-                    return Ok(Chosen { reduced, deviation, modes });
+                    return Ok(SelectedReduction { reduced, deviation, modes });
                 }
                 if best.is_none_or(|(least, _)| deviation.error < least.error) {
                     best = Some((deviation, reduced.dofs()));
@@ -169,12 +171,12 @@ impl Reduce {
                 }
             }
         }
-        let (least, dofs) = best.unwrap_or((Deviation { error: f64::INFINITY, omega: self.up_to }, 0));
-        Err(ReductionError::OutOfReach { best: least.error, at: least.omega, dofs, tolerance: self.tolerance })
+        let (least, dofs) = best.unwrap_or((ReductionDeviation { error: f64::INFINITY, omega: self.up_to }, 0));
+        Err(ReductionError::ToleranceNotReached { best: least.error, at: least.omega, dofs, tolerance: self.tolerance })
     }
 
     /// Returns the attempts, the cheapest first.
-    fn attempts(self, whole: &Whole) -> Vec<Attempt> {
+    fn attempts(self, whole: &FullStructure) -> Vec<Attempt> {
         let all = orders(whole);
         let many = whole.ports().len() > MANY_PORTS && self.kind != Some(ReductionKind::CraigBampton);
         let first = EXTENTS_OF_MANY.into_iter().filter(|_| many).map(|extent| (extent, 1..=1, true));
@@ -191,7 +193,7 @@ impl Reduce {
         self,
         modes: &NaturalModes,
         (extent, orders): (f64, RangeInclusive<usize>),
-        whole: &Whole,
+        whole: &FullStructure,
     ) -> Vec<(usize, usize)> {
         let ports = whole.ports().len();
         let count = |share: f64| {

@@ -10,7 +10,7 @@
 //! applications", Mech. Syst. Signal Process. 10, 381-394.
 
 use super::rubin::independent;
-use super::{Deviation, Reduced, ReductionError, Reference, Whole};
+use super::{FullStructure, ReducedMatrices, ReductionDeviation, ReductionError, ReferenceReceptance};
 use nalgebra::DMatrix;
 use stickslip_numerics::sparse::{Matrix, columns};
 
@@ -21,16 +21,16 @@ const CHECKED_FRACTIONS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 #[derive(Debug, Clone)]
 pub(in crate::structure) struct CommonBasis {
     /// With its own stiffness.
-    pub own: Reduced,
+    pub own: ReducedMatrices,
     /// With the other stiffness.
-    pub other: Reduced,
+    pub other: ReducedMatrices,
     /// Largest error at both ends and between, and its frequency.
-    pub deviation: Deviation,
+    pub deviation: ReductionDeviation,
     /// Upper end of the frequency range in which the error holds, rad/s.
     pub up_to: f64,
 }
 
-impl Whole {
+impl FullStructure {
     /// Reduces the structure with a basis that also serves another stiffness and all between,
     /// with an error of at most `tolerance`.
     ///
@@ -38,7 +38,7 @@ impl Whole {
     pub(in crate::structure) fn between(
         &self,
         there: &Matrix,
-        reduce: impl Fn(&Whole) -> Result<(Reduced, f64), ReductionError>,
+        reduce: impl Fn(&FullStructure) -> Result<(ReducedMatrices, f64), ReductionError>,
         tolerance: f64,
     ) -> Result<CommonBasis, ReductionError> {
         let n = self.dofs();
@@ -46,7 +46,7 @@ impl Whole {
             return Err(ReductionError::Size { matrix: "other stiffness", rows: there.n(), n });
         }
         let wholes = CHECKED_FRACTIONS.map(|share| self.with_share(there, share));
-        let wholes: Vec<Whole> = wholes.into_iter().collect::<Result<_, _>>()?;
+        let wholes: Vec<FullStructure> = wholes.into_iter().collect::<Result<_, _>>()?;
         let last = CHECKED_FRACTIONS.len() - 1;
         let (mut vectors, mut up_to, mut taken) = (Vec::new(), f64::INFINITY, Vec::new());
         let mut take = |at: usize| -> Result<_, ReductionError> {
@@ -60,12 +60,12 @@ impl Whole {
         let (mut basis, up_to, mut taken) = take(last)?;
         let mut references = Vec::new();
         for whole in &wholes {
-            references.push(Reference::new(whole, &whole.modes(up_to)?, up_to)?);
+            references.push(ReferenceReceptance::new(whole, &whole.modes(up_to)?, up_to)?);
         }
         loop {
             let kind = format!("a common basis of {} reductions for both stiffnesses", taken.len());
-            let project = |whole: &Whole| Reduced::project(whole, kind.clone(), basis.clone());
-            let mut worst = (Deviation { error: 0.0, omega: 0.0 }, 0);
+            let project = |whole: &FullStructure| ReducedMatrices::project(whole, kind.clone(), basis.clone());
+            let mut worst = (ReductionDeviation { error: 0.0, omega: 0.0 }, 0);
             for (at, reference) in references.iter().enumerate() {
                 let one = reference.deviation(&project(&wholes[at])?);
                 if one.error > worst.0.error {
@@ -79,19 +79,19 @@ impl Whole {
                 return Ok(CommonBasis { own, other, deviation, up_to });
             }
             if taken.contains(&at) {
-                let (Deviation { error: best, omega: at }, dofs) = (deviation, basis.len() / n.max(1));
-                return Err(ReductionError::OutOfReach { best, at, dofs, tolerance });
+                let (ReductionDeviation { error: best, omega: at }, dofs) = (deviation, basis.len() / n.max(1));
+                return Err(ReductionError::ToleranceNotReached { best, at, dofs, tolerance });
             }
             (basis, _, taken) = take(at)?;
         }
     }
 
     /// Returns the structure with a fraction of the difference to another stiffness.
-    fn with_share(&self, there: &Matrix, share: f64) -> Result<Whole, ReductionError> {
+    fn with_share(&self, there: &Matrix, share: f64) -> Result<FullStructure, ReductionError> {
         let own = self.stiffness.entries().map(|(row, column, value)| (row, column, (1.0 - share) * value));
         let other = there.entries().map(|(row, column, value)| (row, column, share * value));
         let stiffness = Matrix::from_triplets(self.dofs(), own.chain(other)).map_err(|_| ReductionError::OutOfRange)?;
-        Whole::new((*self.mass).clone(), self.damping.clone(), stiffness, self.ports.clone())
+        FullStructure::new((*self.mass).clone(), self.damping.clone(), stiffness, self.ports.clone())
     }
 
     /// Returns independent combinations of columns.

@@ -17,8 +17,8 @@
 //! nominal system modes", J. Eng. Gas Turbines Power 123, 893-900.
 
 use super::{
-    Damping, Deviation, Free, Reduced, Reduction, ReductionError, ReductionKind, Reference, Row, Whole, damping,
-    residual_flexibility,
+    FullStructure, ReducedMatrices, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance,
+    Row, RubinBasis, StructureDamping, damping, residual_flexibility,
 };
 use crate::structure::sector::{is_real, wave_entries};
 use crate::structure::sector_boundary::{Blade, symmetrized};
@@ -64,7 +64,7 @@ pub(crate) struct ReducedSector {
 #[derive(Debug, Clone)]
 pub(in crate::structure) struct SectorReduction {
     pub reduced: ReducedSector,
-    pub deviation: Deviation,
+    pub deviation: ReductionDeviation,
     /// Frequencies of the computed waves, rad/s, ascending. Each pair of travelling waves is
     /// listed once.
     pub frequencies: Vec<f64>,
@@ -79,11 +79,11 @@ pub(in crate::structure) struct SectorReduction {
 /// A computed wave.
 struct ComputedWave {
     diameter: usize,
-    whole: Whole,
+    whole: FullStructure,
     modes: NaturalModes,
     /// Multiple of the frequency of interest up to which modes are computed.
     extent: f64,
-    reference: Reference,
+    reference: ReferenceReceptance,
 }
 
 /// Returns the first Gram tolerance for this number of orders.
@@ -146,7 +146,7 @@ impl WaveCollection<'_> {
                 None => {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
-                    let reference = Reference::with_samples(&whole, &modes, up_to, SAMPLES)?;
+                    let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
                     self.computed.push(ComputedWave { diameter, whole, modes, extent, reference });
                 }
             }
@@ -169,7 +169,7 @@ impl WaveCollection<'_> {
             }
         }
         let kind = kind.unwrap_or(ReductionKind::Rubin);
-        let mut best: Option<(Deviation, usize)> = None;
+        let mut best: Option<(ReductionDeviation, usize)> = None;
         let mut level = 0;
         let tried = EXTENTS.into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)));
         for (extent, size) in tried.skip(from) {
@@ -193,8 +193,8 @@ impl WaveCollection<'_> {
                 level += 1;
             }
         }
-        let (least, dofs) = best.unwrap_or((Deviation { error: f64::INFINITY, omega: up_to }, 0));
-        Err(ReductionError::OutOfReach { best: least.error, at: least.omega, dofs, tolerance })
+        let (least, dofs) = best.unwrap_or((ReductionDeviation { error: f64::INFINITY, omega: up_to }, 0));
+        Err(ReductionError::ToleranceNotReached { best: least.error, at: least.omega, dofs, tolerance })
     }
 
     /// Reduces the sector with a fixed number of modes of every wave.
@@ -219,7 +219,7 @@ impl WaveCollection<'_> {
         serves /= BEYOND;
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
-            let reference = Reference::with_samples(&whole, &modes, up_to, SAMPLES)?;
+            let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
             self.computed.push(ComputedWave { diameter, whole, modes, extent: BEYOND, reference });
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
@@ -227,7 +227,12 @@ impl WaveCollection<'_> {
         Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }
 
-    fn chosen(&self, reduced: ReducedSector, deviation: Deviation, (up_to, serves): (f64, f64)) -> SectorReduction {
+    fn chosen(
+        &self,
+        reduced: ReducedSector,
+        deviation: ReductionDeviation,
+        (up_to, serves): (f64, f64),
+    ) -> SectorReduction {
         let (mut frequencies, mut free) = (Vec::new(), 0);
         for wave in &self.computed {
             let step = if is_real(wave.diameter, self.sector.sectors) { 1 } else { 2 };
@@ -250,7 +255,7 @@ impl WaveCollection<'_> {
         let taken = || self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
         for wave in taken() {
             let basis = match kind {
-                ReductionKind::Rubin => Free::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
+                ReductionKind::Rubin => RubinBasis::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
                 ReductionKind::CraigBampton => {
                     let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
                     let wanted = Wanted::UpTo { value: omega * omega, most: super::MAX_MODES };
@@ -294,7 +299,7 @@ impl WaveCollection<'_> {
         if forces.is_empty() {
             return Ok(Vec::new());
         }
-        let (mut basis, _) = residual_flexibility::basis(&wave.whole.seen_at(forces)?, modes, 0.0, order)?;
+        let (mut basis, _) = residual_flexibility::basis(&wave.whole.with_ports(forces)?, modes, 0.0, order)?;
         Ok(basis.split_off(modes.shapes.len()))
     }
 
@@ -368,8 +373,13 @@ impl WaveCollection<'_> {
     }
 
     /// Returns the error of the waves of these diameters relative to the whole ring.
-    fn deviation(&self, reduced: &ReducedSector, diameters: &[usize], up_to: f64) -> Result<Deviation, ReductionError> {
-        let mut worst = Deviation { error: 0.0, omega: 0.0 };
+    fn deviation(
+        &self,
+        reduced: &ReducedSector,
+        diameters: &[usize],
+        up_to: f64,
+    ) -> Result<ReductionDeviation, ReductionError> {
+        let mut worst = ReductionDeviation { error: 0.0, omega: 0.0 };
         for wave in self.computed.iter().filter(|wave| diameters.contains(&wave.diameter)) {
             let small = reduced.wave(wave.diameter, self.sector.sectors)?;
             let deviation = wave.reference.deviation(&small);
@@ -377,7 +387,7 @@ impl WaveCollection<'_> {
             let found = wave.modes.values.iter().map(|value| value.max(0.0).sqrt()).enumerate().skip(wave.modes.free());
             let shifts = found.take_while(|(_, omega)| *omega <= up_to).map(|(k, omega)| {
                 let error = own.get(k).map_or(f64::INFINITY, |own| (own / omega - 1.0).abs() / HALF_WIDTH);
-                Deviation { error, omega }
+                ReductionDeviation { error, omega }
             });
             worst =
                 shifts.chain([deviation]).fold(worst, |worst, one| if one.error > worst.error { one } else { worst });
@@ -416,10 +426,10 @@ impl ReducedSector {
 
     /// Returns the damping within every sector and between any two sectors, for damping that
     /// depends on modes.
-    pub fn damped(&self, by: &Damping, sectors: usize) -> Result<Vec<RingEntry>, ReductionError> {
+    pub fn damped(&self, by: &StructureDamping, sectors: usize) -> Result<Vec<RingEntry>, ReductionError> {
         by.check()?;
         let r = self.dofs();
-        if let Damping::Rayleigh { mass, stiffness } = *by {
+        if let StructureDamping::Rayleigh { mass, stiffness } = *by {
             let of = |entries: &[RingEntry], factor: f64| -> Vec<RingEntry> {
                 entries.iter().map(|&(row, column, shift, value)| (row, column, shift, factor * value)).collect()
             };
@@ -450,7 +460,7 @@ impl ReducedSector {
     }
 
     /// Returns the reduced structure in a wave.
-    pub(super) fn wave(&self, diameter: usize, sectors: usize) -> Result<Reduced, ReductionError> {
+    pub(super) fn wave(&self, diameter: usize, sectors: usize) -> Result<ReducedMatrices, ReductionError> {
         let r = self.dofs();
         let copies = if is_real(diameter, sectors) { 1 } else { 2 };
         let matrix = |entries: &[RingEntry], rows: usize| {
@@ -461,7 +471,7 @@ impl ReducedSector {
             sum
         };
         let mass = matrix(&self.mass, r);
-        Ok(Reduced {
+        Ok(ReducedMatrices {
             kind: String::new(),
             damping: self.damping.as_ref().map_or_else(|| &mass * 0.0, |own| matrix(own, r)),
             stiffness: matrix(&self.stiffness, r),

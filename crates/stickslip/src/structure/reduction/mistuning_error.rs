@@ -20,7 +20,7 @@
 //! Source: Parlett, "The Symmetric Eigenvalue Problem" (1998), Sec. 10.5 and 11.7.
 
 use super::cyclic_basis::HALF_WIDTH;
-use super::{Deviation, ReducedSector, ReductionError, Row, Whole};
+use super::{FullStructure, ReducedSector, ReductionDeviation, ReductionError, Row};
 use crate::structure::sector::is_real;
 use crate::structure::sector_boundary::{Blade, CyclicSector};
 use crate::structure::unit_root;
@@ -83,11 +83,11 @@ impl MistuningError {
     ///
     /// The modes have unit mass and these eigenvalues, ascending. An error of one is a relative
     /// frequency shift by the half width [`HALF_WIDTH`].
-    pub fn deviation(&self, (values, shapes): (&[f64], &[f64]), deviations: &[f64]) -> Deviation {
+    pub fn deviation(&self, (values, shapes): (&[f64], &[f64]), deviations: &[f64]) -> ReductionDeviation {
         let (r, sectors) = (self.dofs, self.sectors);
         let phases = self.phases(deviations);
         let [lowest, highest] = [FREE * self.up_to, self.up_to].map(|omega| omega * omega);
-        let mut worst = Deviation { error: 0.0, omega: self.up_to };
+        let mut worst = ReductionDeviation { error: 0.0, omega: self.up_to };
         for (&value, shape) in values.iter().zip(shapes.chunks_exact(r * sectors)) {
             if !(lowest..=highest).contains(&value) {
                 continue;
@@ -104,7 +104,7 @@ impl MistuningError {
             // NaN counts as an infinite error
             let error = if error.is_nan() { f64::INFINITY } else { error };
             if error > worst.error {
-                worst = Deviation { error, omega: value.sqrt() };
+                worst = ReductionDeviation { error, omega: value.sqrt() };
             }
         }
         worst
@@ -132,7 +132,7 @@ impl MistuningError {
 
 impl WaveForm {
     fn new(
-        whole: &Whole,
+        whole: &FullStructure,
         blade: &Blade,
         reduced: &ReducedSector,
         (diameter, up_to): (usize, f64),

@@ -17,13 +17,13 @@
 //!
 //! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does
 //!   this for a ring with different blades.
-//! - `automatic`: [`Reduce`] uses as many modes as a given error requires.
+//! - `automatic`: [`AutomaticReduction`] uses as many modes as a given error requires.
 //! - `cyclic_basis` reduces a sector for all waves of its ring at once.
 //! - `common_basis` builds one basis for two stiffnesses and all between them.
 //! - `nominal_modes` transforms a ring with different blades to its own modes.
 //!
-//! Damping is a part of the whole structure and is reduced like the other matrices. [`Damping`]
-//! defines a modal damping ratio beyond the retained modes.
+//! Damping is a part of the whole structure and is reduced like the other matrices.
+//! [`StructureDamping`] defines a modal damping ratio beyond the retained modes.
 
 mod automatic;
 mod common_basis;
@@ -37,16 +37,16 @@ mod residual_flexibility;
 mod residual_series;
 mod rubin;
 
-pub use automatic::{Chosen, Reduce};
+pub use automatic::{AutomaticReduction, SelectedReduction};
 pub(crate) use cyclic_basis::ReducedSector;
 pub(in crate::structure) use cyclic_basis::STEPS;
 pub(in crate::structure) use mistuning_error::MistuningError;
 pub(crate) use nominal_modes::RingModes;
 pub(in crate::structure) use nominal_modes::{EXTENTS, MistunedModes, NominalRing};
-pub use receptance_error::{Deviation, Reference};
+pub use receptance_error::{ReductionDeviation, ReferenceReceptance};
 pub use request::{Reduction, ReductionKind};
-pub use residual_series::Series;
-pub use rubin::Free;
+pub use residual_series::ResidualSeries;
+pub use rubin::RubinBasis;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
@@ -78,7 +78,7 @@ const FREE: f64 = 1e-9;
 
 /// Damping of the whole structure.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Damping {
+pub enum StructureDamping {
     /// Every mode up to a frequency has the same fraction of critical damping.
     ///
     /// Motion above it, and with it the residual and constraint vectors, has damping
@@ -101,7 +101,7 @@ pub enum Damping {
     Matrix(Matrix),
 }
 
-impl Damping {
+impl StructureDamping {
     /// Checks that its parameters are valid.
     fn check(&self) -> Result<(), ReductionError> {
         let number = |what, value: f64, must, holds: bool| match value.is_finite() && holds {
@@ -109,15 +109,15 @@ impl Damping {
             false => Err(ReductionError::Number { what, value, must }),
         };
         match *self {
-            Damping::Ratio { ratio, up_to } => {
+            StructureDamping::Ratio { ratio, up_to } => {
                 number("the damping ratio", ratio, "zero or more", ratio >= 0.0)?;
                 number("the upper end of the frequency range (rad/s)", up_to, "positive", up_to > 0.0)?;
             }
-            Damping::Rayleigh { mass, stiffness } => {
+            StructureDamping::Rayleigh { mass, stiffness } => {
                 number("the mass-proportional damping (1/s)", mass, "zero or more", mass >= 0.0)?;
                 number("the stiffness-proportional damping (s)", stiffness, "zero or more", stiffness >= 0.0)?;
             }
-            Damping::Matrix(_) => {}
+            StructureDamping::Matrix(_) => {}
         }
         Ok(())
     }
@@ -126,16 +126,16 @@ impl Damping {
     /// damping matrix.
     fn proportional(&self) -> Option<(f64, f64)> {
         match *self {
-            Damping::Ratio { ratio, up_to } => Some((0.0, 2.0 * ratio / up_to)),
-            Damping::Rayleigh { mass, stiffness } => Some((mass, stiffness)),
-            Damping::Matrix(_) => None,
+            StructureDamping::Ratio { ratio, up_to } => Some((0.0, 2.0 * ratio / up_to)),
+            StructureDamping::Rayleigh { mass, stiffness } => Some((mass, stiffness)),
+            StructureDamping::Matrix(_) => None,
         }
     }
 
     /// Returns `φᵀ C φ` of a mode of unit mass at ω (rad/s), in 1/s.
     fn of_mode(&self, omega: f64) -> Option<f64> {
         match *self {
-            Damping::Ratio { ratio, up_to } if omega < up_to => Some(2.0 * ratio * omega),
+            StructureDamping::Ratio { ratio, up_to } if omega < up_to => Some(2.0 * ratio * omega),
             _ => self.proportional().map(|(alpha, beta)| alpha + beta * omega * omega),
         }
     }
@@ -143,9 +143,9 @@ impl Damping {
 
 /// A structure before its reduction, with its ports.
 #[derive(Debug, Clone)]
-pub struct Whole {
+pub struct FullStructure {
     pub(super) mass: Arc<Matrix>,
-    pub(super) damping: Damping,
+    pub(super) damping: StructureDamping,
     pub(super) stiffness: Arc<Matrix>,
     ports: Vec<Row>,
     pub(super) analysis: Arc<Analysis>,
@@ -202,7 +202,7 @@ pub enum ReductionError {
         omega / std::f64::consts::TAU,
         highest / std::f64::consts::TAU
     )]
-    AboveAll {
+    FrequencyTooHigh {
         /// Upper end of the requested range, rad/s.
         omega: f64,
         /// The highest `√(k_ii/m_ii)`, rad/s.
@@ -225,7 +225,7 @@ pub enum ReductionError {
          exist; use free modes instead of Craig-Bampton",
         if *count == 1 { "" } else { "s" }
     )]
-    NotHeld {
+    FreeInterfaceMotion {
         /// Number of free motions.
         count: usize,
     },
@@ -241,7 +241,7 @@ pub enum ReductionError {
          vectors, which need fewer coordinates",
         at / std::f64::consts::TAU
     )]
-    OutOfReach {
+    ToleranceNotReached {
         /// Smallest relative error.
         best: f64,
         /// Frequency of that error, rad/s.
@@ -264,22 +264,31 @@ const UNSEEN: f64 = 1e-9;
 /// writes ten digits. It is relative to the largest entry.
 const SYMMETRIC: f64 = 1e-9;
 
-impl Whole {
+impl FullStructure {
     /// Creates a structure from sparse symmetric matrices (kg, N/m), damping, and ports, the
     /// displacements that joints, forces and observers use.
     ///
     /// # Errors
     /// [`ReductionError`]: sizes that differ, an unsymmetric matrix, an invalid port, a
     /// negative damping ratio.
-    pub fn new(mass: Matrix, damping: Damping, stiffness: Matrix, ports: Vec<Row>) -> Result<Self, ReductionError> {
-        Whole::without_ports(mass, damping, stiffness)?.seen_at(ports)
+    pub fn new(
+        mass: Matrix,
+        damping: StructureDamping,
+        stiffness: Matrix,
+        ports: Vec<Row>,
+    ) -> Result<Self, ReductionError> {
+        FullStructure::without_ports(mass, damping, stiffness)?.with_ports(ports)
     }
 
     /// Creates a structure without ports.
-    pub(super) fn without_ports(mass: Matrix, damping: Damping, stiffness: Matrix) -> Result<Self, ReductionError> {
+    pub(super) fn without_ports(
+        mass: Matrix,
+        damping: StructureDamping,
+        stiffness: Matrix,
+    ) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
-            Damping::Matrix(c) => Some(c),
+            StructureDamping::Matrix(c) => Some(c),
             _ => None,
         };
         for (name, matrix) in [("mass", Some(&mass)), ("stiffness", Some(&stiffness)), ("damping", own)] {
@@ -296,14 +305,14 @@ impl Whole {
         damping.check()?;
         let analysed: Vec<&Matrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
         let analysis = Arc::new(Analysis::new(&analysed));
-        Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
+        Ok(FullStructure { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
     }
 
     /// Returns the same structure with other ports; the matrices are shared.
     ///
     /// # Errors
     /// [`ReductionError`]: no port, or an invalid one.
-    pub fn seen_at(&self, ports: Vec<Row>) -> Result<Self, ReductionError> {
+    pub fn with_ports(&self, ports: Vec<Row>) -> Result<Self, ReductionError> {
         if ports.is_empty() {
             return Err(ReductionError::NoPorts);
         }
@@ -315,7 +324,7 @@ impl Whole {
         if let Some(port) = ports.iter().position(wrong) {
             return Err(ReductionError::Port { port, n });
         }
-        Ok(Whole { ports, ..self.clone() })
+        Ok(FullStructure { ports, ..self.clone() })
     }
 
     /// Returns the number of degrees of freedom.
@@ -330,16 +339,15 @@ impl Whole {
 
     /// Computes all natural modes up to `omega`, rad/s.
     ///
-    /// # Errors
-    /// [`ReductionError::Modes`], or [`ReductionError::AboveAll`] if `omega` is far above all
-    /// modes.
+    /// # Errors [`ReductionError::Modes`], or [`ReductionError::FrequencyTooHigh`] if `omega` is
+    /// far above all modes.
     pub fn modes(&self, omega: f64) -> Result<NaturalModes, ReductionError> {
         let own = |i: usize| (self.stiffness.get(i, i), self.mass.get(i, i));
         let ratios =
             (0..self.dofs()).map(own).filter(|(_, mass)| *mass > 0.0).map(|(stiffness, mass)| stiffness / mass);
         let highest = ratios.fold(0.0, f64::max).sqrt();
         if highest > 0.0 && omega > MAX_FREQUENCY_RATIO * highest {
-            return Err(ReductionError::AboveAll { omega, highest });
+            return Err(ReductionError::FrequencyTooHigh { omega, highest });
         }
         let wanted = Wanted::UpTo { value: omega * omega, most: MAX_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
@@ -357,13 +365,13 @@ impl Whole {
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, Wanted::Lowest(count))?)
     }
 
-    /// Computes the damping of [`Damping::Ratio`] over all degrees of freedom: `β K + U Uᵀ`.
-    /// Returns β in s, and the columns of U.
+    /// Computes the damping of [`StructureDamping::Ratio`] over all degrees of freedom: `β K + U
+    /// Uᵀ`. Returns β in s, and the columns of U.
     ///
     /// # Errors
     /// [`ReductionError`]: invalid parameters of damping, or a failure of the mode computation.
     pub(super) fn modal_damping(&self, ratio: f64, up_to: f64) -> Result<(f64, Vec<f64>), ReductionError> {
-        let law = Damping::Ratio { ratio, up_to };
+        let law = StructureDamping::Ratio { ratio, up_to };
         law.check()?;
         let beta = law.proportional().map_or(0.0, |(_, beta)| beta);
         let modes = self.modes(up_to)?;
@@ -397,7 +405,7 @@ impl Whole {
 
 /// A reduced structure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reduced {
+pub struct ReducedMatrices {
     /// Description of the reduction.
     pub kind: String,
     /// `M̂`, r × r.
@@ -414,19 +422,19 @@ pub struct Reduced {
     n: usize,
 }
 
-impl Reduced {
+impl ReducedMatrices {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
-    fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
+    fn project(whole: &FullStructure, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
         let square = |matrix: &Matrix| columns::products(n, &basis, &matrix.times_columns(&basis));
         let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
         let own = match &whole.damping {
-            Damping::Matrix(c) => Some(square(c)),
+            StructureDamping::Matrix(c) => Some(square(c)),
             _ => None,
         };
         let damping = damping(&whole.damping, &mass, &stiffness, own)?;
         let (ports, weights) = (whole.rows_of(&basis), DMatrix::identity(mass.nrows(), mass.nrows()));
-        Ok(Reduced { kind, mass, damping, stiffness, ports, basis: Arc::new(basis), weights, n })
+        Ok(ReducedMatrices { kind, mass, damping, stiffness, ports, basis: Arc::new(basis), weights, n })
     }
 
     /// Returns the number of coordinates, r.
@@ -439,9 +447,9 @@ impl Reduced {
     /// # Errors
     /// [`ReductionError`]: invalid parameters, or a damping matrix, which must be reduced
     /// together with the other matrices.
-    pub fn damped(&self, by: &Damping) -> Result<Self, ReductionError> {
+    pub fn damped(&self, by: &StructureDamping) -> Result<Self, ReductionError> {
         by.check()?;
-        Ok(Reduced { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })
+        Ok(ReducedMatrices { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })
     }
 
     /// Scales the coordinates to displacements in m.
@@ -582,7 +590,7 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
 
 /// Returns the reduced damping, or `own` if the structure has a damping matrix.
 fn damping(
-    by: &Damping,
+    by: &StructureDamping,
     mass: &DMatrix<f64>,
     stiffness: &DMatrix<f64>,
     own: Option<DMatrix<f64>>,
@@ -591,7 +599,7 @@ fn damping(
         return own.ok_or(ReductionError::OutOfRange);
     };
     let mut c = mass * alpha + stiffness * beta;
-    if let Damping::Ratio { up_to, .. } = *by
+    if let StructureDamping::Ratio { up_to, .. } = *by
         && beta > 0.0
     {
         let (values, shapes) = natural(mass, stiffness).ok_or(ReductionError::OutOfRange)?;

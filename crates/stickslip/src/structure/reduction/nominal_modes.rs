@@ -23,7 +23,9 @@ use super::cyclic_basis::HALF_WIDTH;
 use super::mistuning_error::{FREE, shift};
 use super::receptance_error::sign;
 use super::rubin::{DEPENDENCE_TOLERANCE, independent_eigenvectors};
-use super::{Damping, Deviation, ReducedSector, ReductionError, Row, UNSEEN, natural, product, symmetric};
+use super::{
+    ReducedSector, ReductionDeviation, ReductionError, Row, StructureDamping, UNSEEN, natural, product, symmetric,
+};
 use crate::structure::sector::is_real;
 use crate::structure::{RingEntry, unit_root};
 use nalgebra::{DMatrix, DVector};
@@ -172,7 +174,7 @@ impl NominalRing {
     ///
     /// The error is that of the response to loads on all observed displacements. It is
     /// evaluated at the highest frequency of interest, where it is largest.
-    pub fn modes(&self, mixed: &MistunedModes) -> Result<(RingModes, Deviation), ReductionError> {
+    pub fn modes(&self, mixed: &MistunedModes) -> Result<(RingModes, ReductionDeviation), ReductionError> {
         let (n, ports, shift) = (self.mass.n(), self.seen.len(), shift(self.up_to));
         let MistunedModes { values, shapes, factor, at_highest } = mixed;
         let low = values.len();
@@ -252,7 +254,7 @@ impl NominalRing {
             columns::products(n, &whole, &damping.times_columns(&whole))
         });
         let kind = format!("modes of the mistuned ring; {}", self.sector.kind);
-        Ok((RingModes { kind, own, damping, seen }, Deviation { error, omega: self.up_to }))
+        Ok((RingModes { kind, own, damping, seen }, ReductionDeviation { error, omega: self.up_to }))
     }
 
     /// Returns the relative error of a modal response under loads of random signs. Each place
@@ -311,7 +313,7 @@ impl NominalRing {
 
 impl RingModes {
     /// Returns the damping between the modes, as (row, column, value).
-    pub fn damped(&self, by: Option<&Damping>) -> Result<Vec<(usize, usize, f64)>, ReductionError> {
+    pub fn damped(&self, by: Option<&StructureDamping>) -> Result<Vec<(usize, usize, f64)>, ReductionError> {
         let Some(by) = by else {
             let all = self
                 .damping

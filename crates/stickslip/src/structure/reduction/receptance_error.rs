@@ -10,7 +10,7 @@
 //! The error at a frequency is the norm of the difference relative to the norm. Each port is
 //! scaled by its typical receptance, so that units do not matter.
 
-use super::{Damping, Reduced, ReductionError, Series, Whole};
+use super::{FullStructure, ReducedMatrices, ReductionError, ResidualSeries, StructureDamping};
 use nalgebra::{Complex, DMatrix};
 use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes};
 
@@ -38,7 +38,7 @@ type ReceptanceSample = (f64, DMatrix<Complex<f64>>);
 
 /// Receptances of the whole structure.
 #[derive(Debug, Clone)]
-pub struct Reference {
+pub struct ReferenceReceptance {
     samples: Vec<ReceptanceSample>,
     /// Forces on the ports, one column per load.
     loads: DMatrix<f64>,
@@ -50,38 +50,38 @@ pub struct Reference {
 
 /// Error of a reduction relative to the whole structure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Deviation {
+pub struct ReductionDeviation {
     /// Largest relative error of the samples.
     pub error: f64,
     /// Frequency of this error, rad/s.
     pub omega: f64,
 }
 
-impl Reference {
+impl ReferenceReceptance {
     /// Computes samples up to `up_to` (rad/s), at frequencies derived from `modes` of the whole
     /// structure.
     ///
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
-    pub fn new(whole: &Whole, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
+    pub fn new(whole: &FullStructure, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
         Self::with_samples(whole, modes, up_to, SAMPLES)
     }
 
     /// Computes at most `most` samples.
     pub(super) fn with_samples(
-        whole: &Whole,
+        whole: &FullStructure,
         modes: &NaturalModes,
         up_to: f64,
         most: usize,
     ) -> Result<Self, ReductionError> {
-        Self::at(whole, &frequencies(whole, modes, up_to, most))
+        Self::at_frequencies(whole, &frequencies(whole, modes, up_to, most))
     }
 
     /// Computes samples at these frequencies, rad/s.
     ///
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
-    pub fn at(whole: &Whole, frequencies: &[f64]) -> Result<Self, ReductionError> {
+    pub fn at_frequencies(whole: &FullStructure, frequencies: &[f64]) -> Result<Self, ReductionError> {
         let ports = whole.ports.len();
         let alone = ports <= MAX_SEPARATE_PORTS;
         let local = local_sizes(whole);
@@ -101,7 +101,13 @@ impl Reference {
         let size = |port: usize| if alone { usual(port) } else { local[port] };
         let scales: Vec<f64> = (0..ports).map(|port| size(port).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
         let of_loads = if alone { scales.clone() } else { vec![1.0; PROBES] };
-        Ok(Reference { samples, loads, damped: matches!(whole.damping, Damping::Matrix(_)), scales, of_loads })
+        Ok(ReferenceReceptance {
+            samples,
+            loads,
+            damped: matches!(whole.damping, StructureDamping::Matrix(_)),
+            scales,
+            of_loads,
+        })
     }
 
     /// Returns the frequencies of the samples, rad/s.
@@ -110,20 +116,20 @@ impl Reference {
     }
 
     /// Returns the error of a reduced structure; infinite where it is singular.
-    pub fn deviation(&self, reduced: &Reduced) -> Deviation {
-        let bare = Reduced { damping: &reduced.damping * 0.0, ..reduced.clone() };
+    pub fn deviation(&self, reduced: &ReducedMatrices) -> ReductionDeviation {
+        let bare = ReducedMatrices { damping: &reduced.damping * 0.0, ..reduced.clone() };
         let reduced = if self.damped { reduced } else { &bare };
         self.worst(|omega| reduced.answers(omega, &self.loads).ok())
     }
 
     /// Returns the error of a series.
-    pub fn deviation_of_series(&self, series: &Series) -> Deviation {
+    pub fn deviation_of_series(&self, series: &ResidualSeries) -> ReductionDeviation {
         let loads = self.loads.map(|v| Complex::new(v, 0.0));
         self.worst(|omega| Some(series.undamped(omega) * &loads))
     }
 
-    fn worst(&self, receptance: impl Fn(f64) -> Option<DMatrix<Complex<f64>>>) -> Deviation {
-        let mut worst = Deviation { error: 0.0, omega: 0.0 };
+    fn worst(&self, receptance: impl Fn(f64) -> Option<DMatrix<Complex<f64>>>) -> ReductionDeviation {
+        let mut worst = ReductionDeviation { error: 0.0, omega: 0.0 };
         for (omega, whole) in &self.samples {
             let norm = |matrix: &DMatrix<Complex<f64>>| {
                 let scaled = |i: usize, k: usize| (matrix[(i, k)] * self.scales[i] * self.of_loads[k]).norm_sqr();
@@ -134,7 +140,7 @@ impl Reference {
             // NaN counts as an infinite error
             let error = if error.is_nan() { f64::INFINITY } else { error };
             if error > worst.error {
-                worst = Deviation { error, omega: *omega };
+                worst = ReductionDeviation { error, omega: *omega };
             }
         }
         worst
@@ -143,7 +149,7 @@ impl Reference {
 
 /// Successive factors of the whole structure.
 struct Factors<'a> {
-    whole: &'a Whole,
+    whole: &'a FullStructure,
     /// The last factor, whose memory the next one reuses.
     last: Option<Factor>,
 }
@@ -176,7 +182,7 @@ impl Factors<'_> {
                 whole.ports[i].iter().map(|(at, weight)| value(k * whole.dofs() + at) * *weight).sum()
             })
         };
-        if let Damping::Matrix(damping) = &whole.damping {
+        if let StructureDamping::Matrix(damping) = &whole.damping {
             let sum = [(1.0, 0.0), (0.0, omega), (-omega * omega, 0.0)].map(|(re, im)| Complex::new(re, im));
             let sum = [(sum[0], stiffness), (sum[1], damping), (sum[2], mass)];
             let factor = whole.analysis.factor_complex(&sum).map_err(singular)?;
@@ -201,7 +207,7 @@ impl Factors<'_> {
 }
 
 /// Returns forces on all rows under the loads of the ports, or under a unit load on each port.
-fn forces(whole: &Whole, together: Option<&DMatrix<f64>>) -> Vec<f64> {
+fn forces(whole: &FullStructure, together: Option<&DMatrix<f64>>) -> Vec<f64> {
     let Some(loads) = together else { return whole.forces(0..whole.ports.len()) };
     let n = whole.dofs();
     let mut forces = vec![0.0; n * loads.ncols()];
@@ -213,7 +219,7 @@ fn forces(whole: &Whole, together: Option<&DMatrix<f64>>) -> Vec<f64> {
 
 /// Returns the compliances of the ports from the diagonal stiffness alone, m/N. They give the
 /// magnitude and the units of the receptances.
-fn local_sizes(whole: &Whole) -> Vec<f64> {
+fn local_sizes(whole: &FullStructure) -> Vec<f64> {
     let own = |at: usize| whole.stiffness.get(at, at);
     let size = |row: &super::Row| row.iter().filter(|(at, _)| own(*at) > 0.0).map(|(at, w)| w * w / own(*at)).sum();
     whole.ports.iter().map(size).map(|size: f64| if size > 0.0 { size } else { 1.0 }).collect()
@@ -230,9 +236,9 @@ pub(super) fn sign(number: usize) -> f64 {
 
 /// Returns sample frequencies, alternately next to modes and between them, from the first
 /// elastic mode to the end of the range.
-fn frequencies(whole: &Whole, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
+fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
     let beside = match whole.damping {
-        Damping::Ratio { ratio, .. } => ratio.max(MODE_DISTANCE),
+        StructureDamping::Ratio { ratio, .. } => ratio.max(MODE_DISTANCE),
         _ => MODE_DISTANCE,
     };
     let inside: Vec<f64> = modes

@@ -16,7 +16,7 @@
 //! Nakagawa and Wittbrodt (1997), "A critique of mode acceleration and modal truncation
 //! augmentation methods for modal response analysis".
 
-use super::{COLUMN_BLOCK, ReductionError, Whole};
+use super::{COLUMN_BLOCK, FullStructure, ReductionError};
 use stickslip_numerics::sparse::{Factor, Matrix, NaturalModes, columns};
 
 /// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
@@ -27,7 +27,7 @@ const STEP: f64 = 1e-3;
 /// Returns the modes and the blocks `X₀, …` up to `order`, n × (k + p J), and the shift,
 /// rad²/s². The modes are projected out of the blocks.
 pub(super) fn basis(
-    whole: &Whole,
+    whole: &FullStructure,
     modes: &NaturalModes,
     shift: f64,
     order: usize,
@@ -65,7 +65,7 @@ pub(super) fn basis(
 }
 
 /// Factors `K - σM`. At zero shift, it adds springs where the free motions are largest.
-fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
+fn factor(whole: &FullStructure, modes: &NaturalModes, shift: f64) -> Result<(Factor, f64), ReductionError> {
     if shift == 0.0 {
         let supports = supports(whole, modes)?;
         let sum: [(f64, &Matrix); 2] = [(1.0, &whole.stiffness), (1.0, &supports)];
@@ -86,7 +86,7 @@ fn factor(whole: &Whole, modes: &NaturalModes, shift: f64) -> Result<(Factor, f6
 /// Returns springs that fix each free motion once. The first spring is at the degree of freedom
 /// that moves most. The next one is at that with the largest motion when the first is fixed,
 /// and so on.
-fn supports(whole: &Whole, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
+fn supports(whole: &FullStructure, modes: &NaturalModes) -> Result<Matrix, ReductionError> {
     let n = whole.dofs();
     let (stiffness, mass) = (&whole.stiffness, &whole.mass);
     let mut motions: Vec<Vec<f64>> = (0..modes.free()).map(|mode| modes.shape(mode).to_vec()).collect();

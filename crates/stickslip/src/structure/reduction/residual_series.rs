@@ -10,12 +10,12 @@
 //! Sources: Hansteen and Bell (1979); Dickens, Nakagawa and Wittbrodt (1997), as in
 //! `residual_flexibility`.
 
-use super::{Damping, Free, ReductionError};
+use super::{ReductionError, RubinBasis, StructureDamping};
 use nalgebra::{Complex, DMatrix};
 
 /// Modes and residual terms of the ports' receptance.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub struct ResidualSeries {
     /// λ of the modes, rad²/s².
     values: Vec<f64>,
     /// Displacements of the ports in every mode, p × k.
@@ -24,10 +24,10 @@ pub struct Series {
     terms: Vec<DMatrix<f64>>,
     /// σ, rad²/s².
     shift: f64,
-    damping: Damping,
+    damping: StructureDamping,
 }
 
-impl Series {
+impl ResidualSeries {
     /// Creates a series from the first `modes` modes, with two terms per order of residual
     /// vectors.
     ///
@@ -36,10 +36,10 @@ impl Series {
     ///
     /// # Panics
     /// If `free` has fewer modes.
-    pub fn new(free: &Free, modes: usize) -> Result<Self, ReductionError> {
+    pub fn new(free: &RubinBasis, modes: usize) -> Result<Self, ReductionError> {
         assert!(modes <= free.modes(), "{modes} of {} modes", free.modes());
         let damping = free.whole().damping.clone();
-        if matches!(damping, Damping::Matrix(_)) {
+        if matches!(damping, StructureDamping::Matrix(_)) {
             return Err(ReductionError::SeriesDamping);
         }
         let blocks: Vec<DMatrix<f64>> = (0..free.counts.1).map(|order| free.residual_vectors(modes, order)).collect();
@@ -49,7 +49,7 @@ impl Series {
         };
         let terms = (0..2 * blocks.len()).map(|j| super::symmetric(term(j))).collect();
         let shapes = free.ports.columns(0, modes).into_owned();
-        Ok(Series { values: free.values[..modes].to_vec(), shapes, terms, shift: free.shift, damping })
+        Ok(ResidualSeries { values: free.values[..modes].to_vec(), shapes, terms, shift: free.shift, damping })
     }
 
     /// Returns the number of residual terms `Q`.

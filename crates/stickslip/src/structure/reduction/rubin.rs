@@ -15,7 +15,8 @@
 //! in substructure coupling for dynamic analysis".
 
 use super::{
-    COLUMN_BLOCK, Damping, Reduced, ReductionError, Whole, damping, natural, product, residual_flexibility, symmetric,
+    COLUMN_BLOCK, FullStructure, ReducedMatrices, ReductionError, StructureDamping, damping, natural, product,
+    residual_flexibility, symmetric,
 };
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -30,8 +31,8 @@ pub(super) const DEPENDENCE_TOLERANCE: f64 = 1e-11;
 
 /// Modes and residual vectors, the source of reductions.
 #[derive(Debug, Clone)]
-pub struct Free<'a> {
-    whole: &'a Whole,
+pub struct RubinBasis<'a> {
+    whole: &'a FullStructure,
     /// λ of the modes, rad²/s².
     pub(super) values: Vec<f64>,
     /// Expansion point of the residual vectors, rad²/s².
@@ -47,18 +48,23 @@ pub struct Free<'a> {
     pub(super) ports: DMatrix<f64>,
 }
 
-impl<'a> Free<'a> {
+impl<'a> RubinBasis<'a> {
     /// Computes residual vectors of orders below `order`, around `shift` (rad²/s²), for all
     /// lowest modes without gaps. The shift is zero, or any value that is not an eigenvalue.
     ///
     /// # Errors
     /// [`ReductionError::Singular`] if `modes` lacks a free motion, or if the shift remains at
     /// an eigenvalue.
-    pub fn new(whole: &'a Whole, modes: &NaturalModes, shift: f64, order: usize) -> Result<Self, ReductionError> {
+    pub fn new(
+        whole: &'a FullStructure,
+        modes: &NaturalModes,
+        shift: f64,
+        order: usize,
+    ) -> Result<Self, ReductionError> {
         let n = whole.dofs();
         let (basis, shift) = residual_flexibility::basis(whole, modes, shift, order)?;
         let own = match &whole.damping {
-            Damping::Matrix(c) => Some(columns::products(n, &basis, &c.times_columns(&basis))),
+            StructureDamping::Matrix(c) => Some(columns::products(n, &basis, &c.times_columns(&basis))),
             _ => None,
         };
         let mass = square(&whole.mass, &basis);
@@ -69,11 +75,11 @@ impl<'a> Free<'a> {
         // would displace it by kilometres
         let mut values = modes.values.clone();
         values[..modes.free()].fill(0.0);
-        Ok(Free { whole, values, shift, counts, basis: Arc::new(basis), mass, stiffness, damping: own, ports })
+        Ok(RubinBasis { whole, values, shift, counts, basis: Arc::new(basis), mass, stiffness, damping: own, ports })
     }
 
     /// Returns the whole structure.
-    pub(super) fn whole(&self) -> &Whole {
+    pub(super) fn whole(&self) -> &FullStructure {
         self.whole
     }
 
@@ -109,7 +115,7 @@ impl<'a> Free<'a> {
     ///
     /// # Panics
     /// If fewer modes or orders are available.
-    pub fn reduced(&self, modes: usize, order: usize) -> Result<Reduced, ReductionError> {
+    pub fn reduced(&self, modes: usize, order: usize) -> Result<ReducedMatrices, ReductionError> {
         assert!(modes <= self.modes() && order <= self.counts.1, "of {} modes, {} orders", self.modes(), self.counts.1);
         // with all modes, the residual vectors contain only rounding
         let order = if modes < self.whole.dofs() { order } else { 0 };
@@ -134,7 +140,7 @@ impl<'a> Free<'a> {
             ),
         };
         let ports = product(&self.ports, &small);
-        Ok(Reduced { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
+        Ok(ReducedMatrices { kind, mass, damping, stiffness, ports, basis: self.basis.clone(), weights: small, n })
     }
 
     /// Returns the natural modes in the space of the first modes and independent residual

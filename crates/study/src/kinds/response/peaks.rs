@@ -96,7 +96,7 @@ pub(super) struct Found {
 impl Found {
     /// Returns true if no place moves more at the peak; the first of equal places counts.
     pub(super) fn leads(&self, system: &System) -> bool {
-        let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
+        let amplitudes = self.shape.iter().step_by(2).zip(system.place_axes());
         leading(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
             == Some(self.mass)
     }

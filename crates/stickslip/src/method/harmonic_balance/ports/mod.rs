@@ -32,7 +32,7 @@ use sliders::Part;
 
 use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
-use crate::model::{Axis, Cyclic, System, SystemJoint};
+use crate::model::{Axis, CyclicSymmetry, System, SystemJoint};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
@@ -261,7 +261,7 @@ pub(super) struct Ports {
     list: Vec<Port>,
     /// Joint and number within it of every axis: of several joints the first.
     axes: Vec<(usize, usize)>,
-    wave: Option<Cyclic>,
+    wave: Option<CyclicSymmetry>,
     /// Displacements along all axes in static equilibrium, m; empty where none is known.
     equilibrium: Vec<f64>,
 }
@@ -339,7 +339,7 @@ impl Ports {
     }
 
     /// The wave in which the other sectors follow, if these are the ports of the first one alone.
-    pub fn wave(&self) -> Option<Cyclic> {
+    pub fn wave(&self) -> Option<CyclicSymmetry> {
         self.wave
     }
 
