@@ -171,7 +171,7 @@ pub(crate) fn values(prepared: &Prepared, orbit: &Orbit) -> Vec<f64> {
         return Vec::new();
     }
     let mut times: Vec<f64> = (0..INSTANTS).map(|i| orbit.period() * i as f64 / INSTANTS as f64).collect();
-    times.extend(orbit.switch_times());
+    times.extend(orbit.transition_times());
     let samples: Vec<Sample> = times.iter().map(|time| orbit.sample(*time)).collect();
     wanted(&prepared.case).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
 }

@@ -98,7 +98,7 @@ impl Slipping {
     pub(crate) fn of(orbit: &Orbit, up_to: f64) -> Option<Slipping> {
         let highest = orbit.evidence.harmonics.map(|h| h as f64 * orbit.omega / orbit.periods as f64);
         let slips = orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0);
-        let amplitudes = orbit.places.iter().map(|place| place.size()).collect();
+        let amplitudes = orbit.places.iter().map(|place| place.length_amplitude()).collect();
         let all = vec![Point { omega: orbit.omega, amplitudes }];
         let counts = slips && highest.is_none_or(|highest| highest > up_to);
         counts.then_some(Slipping { points: 1, up_to, all, again: None })
@@ -211,9 +211,10 @@ fn farther(model: &Model, system: &System) -> Option<System> {
 fn again(farther: &System, method: &dyn Method, point: &Point) -> Option<Again> {
     let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
     let reduced = farther.reduced()?;
-    let differences = orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.size() - here).abs());
+    let differences =
+        orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.length_amplitude() - here).abs());
     let (worst, difference) = differences.enumerate().fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-    let error = difference / orbit.places.iter().map(|place| place.size()).fold(0.0, f64::max);
+    let error = difference / orbit.places.iter().map(|place| place.length_amplitude()).fold(0.0, f64::max);
     error.is_finite().then(|| Again {
         error,
         place: orbit.places[worst].name.clone(),

@@ -124,14 +124,14 @@ impl Note {
     /// instability if it is known ([`Orbit::is_stable`]). They also state the accuracy of the
     /// series, other possible orbits and the limits of the reduced model.
     pub(crate) fn of_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
-        let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
+        let early = || usize::from(orbit.periods > 1 && orbit.minimal_periods() < orbit.periods);
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
         let accuracy = match orbit.evidence.accuracy {
-            Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.truncation.unwrap_or(0.0))),
+            Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.error_estimate.unwrap_or(0.0))),
             Accuracy::Unchecked => Some(Note::Unchecked(1)),
             Accuracy::Converged => None,
         };
-        let instead = orbit.evidence.instead_of.map(|chosen| Note::Instead {
+        let instead = orbit.evidence.fallback_from.map(|chosen| Note::Instead {
             points: 1,
             chosen: chosen.to_owned(),
             found: orbit.method.to_owned(),
@@ -157,7 +157,7 @@ impl Note {
     /// Returns a note if the orbit is one of several. Their amplitudes differ if the stiffness
     /// of another joint depends on the positions of the bodies.
     fn history(model: &Model, orbit: &Orbit) -> Option<Note> {
-        let stuck = orbit.evidence.history.first()?.clone();
+        let stuck = orbit.evidence.history_dependent.first()?.clone();
         let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
         let is_rigid =
             |piece: &IdealElement| matches!(piece, IdealElement::Slider(slider) if slider.stiffness.is_none());

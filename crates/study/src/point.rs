@@ -56,13 +56,13 @@ impl Summary {
             stable,
             residual: orbit.evidence.residual,
             energy_gap: orbit.evidence.energy_gap,
-            truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
+            truncation: orbit.evidence.error_estimate.unwrap_or(f64::NAN),
             return_defect: orbit.evidence.return_defect.unwrap_or(f64::NAN),
             iterations: orbit.evidence.iterations as u64,
             found_by: orbit.evidence.found_by,
             status: orbit.evidence.accuracy.status().to_owned(),
             failure: None,
-            stuck: orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod,
+            stuck: orbit.is_in_continuum() && orbit.symmetry == Symmetry::HalfPeriod,
             extra: extra::values(prepared, orbit),
         }
     }

@@ -312,7 +312,7 @@ impl Study {
         let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
             Some(Stated::List(list, _)) => list.len(),
             Some(Stated::Range { points, .. }) => *points,
-            Some(Stated::Adaptive { .. }) => stickslip::curve::adaptive::FIRST + 1,
+            Some(Stated::Adaptive { .. }) => stickslip::curve::adaptive::INITIAL_INTERVALS + 1,
             _ => 1,
         };
         self.cases() * frequencies

@@ -5,7 +5,7 @@ use crate::survey::{Surveyed, range};
 use crate::values::{Frequencies, Values};
 use crate::words::{quantity, significant};
 use std::f64::consts::TAU;
-use stickslip::curve::modes::unit;
+use stickslip::curve::modes::unit_amplitude;
 use stickslip::model::{CyclicSymmetry, LinearModes, NaturalMode};
 
 /// Warnings of a kind that needs an excitation.
@@ -253,7 +253,7 @@ fn sticks(cases: &[Surveyed]) -> Option<String> {
         let number = values.count("mode").unwrap_or(1) as usize - 1;
         let to = values.table("amplitude")?.quantity("to")?;
         // the range is that of the place with the largest motion in the mode without joints
-        let slip = one.survey.slip_amplitude(number)? / unit(one.survey.system(), number).ok()??;
+        let slip = one.survey.slip_amplitude(number)? / unit_amplitude(one.survey.system(), number).ok()??;
         if slip * STICKS <= to {
             return None;
         }

@@ -386,7 +386,7 @@ pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) 
 /// Returns harmonic `n` of a quantity of an orbit, `X` in `Re(X e^{jnΩt})`, by the Gauss rule
 /// between the switches.
 pub fn harmonic(orbit: &Orbit, n: u32, quantity: impl Fn(&Sample) -> f64) -> Complex64 {
-    let (period, mut breaks) = (orbit.period(), orbit.switch_times());
+    let (period, mut breaks) = (orbit.period(), orbit.transition_times());
     breaks.push(0.5 * period);
     let rate = f64::from(n) * orbit.omega;
     let part = |turn: fn(f64) -> f64| {

@@ -80,7 +80,7 @@ fn every_method_gives_the_linear_motion() {
                 assert_eq!(joint.dissipation, 0.0, "{}, {name}", law);
                 // methods in steps sum their step lengths
                 assert!((joint.slip_fraction - 1.0).abs() < 1e-12, "{}, {name}: {}", law, joint.slip_fraction);
-                assert!(!orbit.is_one_of_many(), "{}, {name}", law);
+                assert!(!orbit.is_in_continuum(), "{}, {name}", law);
                 let sample = orbit.sample(0.3 * orbit.period());
                 assert_eq!(sample.joints[0].force[0], 0.0, "{}, {name}", law);
                 let forward = sample.joints[0].velocity[0] > 0.0;

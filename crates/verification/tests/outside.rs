@@ -12,9 +12,9 @@ use stickslip::law::{Law, LawInfo, Parameter, Range, RateLaw, RateView, Relative
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
 use stickslip::method::transient::Transient;
-use stickslip::method::{Breakdown, Method, MethodError, OrbitError, Solver};
+use stickslip::method::{IntegrationError, Method, MethodError, OrbitError, Solver};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
-use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
+use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
 use stickslip_numerics::dual::Real;
 use stickslip_verification::reference::Reference;
 
@@ -165,7 +165,7 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
             [&HarmonicBalance::default(), &Shooting::default(), &Transient { tolerance: 1e-6, ..Transient::default() }];
         for method in methods {
             let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
-            let allowed = 2e-4 + 2.0 * orbit.evidence.truncation.unwrap_or(0.0);
+            let allowed = 2e-4 + 2.0 * orbit.evidence.error_estimate.unwrap_or(0.0);
             for (found, expected) in amplitudes(&orbit).iter().zip(&expected) {
                 assert!(
                     (found / expected - 1.0).abs() < allowed,
@@ -294,7 +294,7 @@ fn laws_that_give_no_numbers_are_named() {
         let system = model(Arc::new(Wrong { size: 1e-3, reach: 1e-4, by_rate })).assemble().unwrap();
         for method in [&Shooting::default() as &dyn Method, &Transient::default()] {
             let error = method.solver(&system).unwrap().orbit(TAU * 24.0, None).unwrap_err();
-            let OrbitError::Breakdown { cause: Breakdown::NoNumber { joint, law, .. }, .. } = &error else {
+            let OrbitError::Breakdown { cause: IntegrationError::NotFinite { joint, law, .. }, .. } = &error else {
                 panic!("{by_rate} {}: {error}", method.name())
             };
             assert_eq!((joint.as_str(), *law), ("rub", "wrong"));
@@ -392,9 +392,9 @@ impl Path for Harmonics {
                 .collect()
         };
         let [displacement, velocity, acceleration] = [of(0), of(1), of(2)];
-        Sample { displacement, velocity, acceleration, joints: Vec::new(), moved: Vec::new() }
+        Sample { displacement, velocity, acceleration, joints: Vec::new(), imposed: Vec::new() }
     }
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         Vec::new()
     }
 }
@@ -424,15 +424,15 @@ impl Solver for LinearSolver<'_> {
         });
         let path = Harmonics { omega, x: x.collect() };
         let start = path.sample(0.0);
-        let found = Found {
+        let found = OrbitData {
             method: "linear",
             omega,
             periods: 1,
             symmetry: Symmetry::FullPeriod,
-            start: [start.displacement, start.velocity].concat(),
+            initial_state: [start.displacement, start.velocity].concat(),
             residual: 0.0,
             iterations: 1,
-            truncation: None,
+            error_estimate: None,
             accuracy: Accuracy::Converged,
         };
         Orbit::new(self.0, Arc::new(path), found)

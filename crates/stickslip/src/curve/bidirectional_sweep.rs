@@ -2,8 +2,8 @@
 //! orbits may exist at one frequency.
 
 pub use super::branch_following::is_followed;
-use super::peak::{Point, held};
-use super::sweep::back;
+use super::peak::{CurvePoint, held_amplitude};
+use super::sweep::reverse_sweep;
 use crate::method::{Method, MethodError, OrbitError, advised};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-10;
 /// branch of high amplitudes late.
 /// ```
 /// use std::sync::{Arc, atomic::AtomicBool};
-/// use stickslip::curve::bidirectional_sweep::BothWays;
+/// use stickslip::curve::bidirectional_sweep::BidirectionalSweep;
 /// use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 /// use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
 /// let on_ground = || ["m".to_owned(), GROUND.to_owned()];
@@ -37,43 +37,43 @@ const ROUNDING: f64 = 1e-10;
 /// .assemble()
 /// .unwrap();
 /// let method = HarmonicBalance::default();
-/// let (mut ways, mut solver, mut start) = (BothWays::of(&system).unwrap(), method.solver(&system).unwrap(), None);
+/// let (mut sweep, mut solver, mut start) = (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap(), None);
 /// for i in 0..41 {
 ///     let orbit = solver.orbit(88.0 + 0.4 * f64::from(i), start.as_deref()).unwrap();
-///     ways.add(orbit.omega, Ok(&orbit));
-///     start = Some(orbit.start);
+///     sweep.add(orbit.omega, Ok(&orbit));
+///     start = Some(orbit.initial_state);
 /// }
-/// let others = ways.others(&method, &system, &AtomicBool::new(false)).unwrap();
+/// let others = sweep.reverse_sweep(&method, &system, &AtomicBool::new(false)).unwrap();
 /// assert!(others.len() > 10 && others.iter().all(|other| other.ratio > 1.5));
 /// ```
 #[derive(Debug, Clone, Default)]
-pub struct BothWays {
-    points: Vec<Point>,
+pub struct BidirectionalSweep {
+    points: Vec<CurvePoint>,
 }
 
 /// An orbit of the reverse sweep at a frequency at which the forward sweep found another one.
 #[derive(Debug, Clone)]
-pub struct Other {
+pub struct OtherOrbit {
     /// The orbit of the reverse sweep.
     pub orbit: Orbit,
     /// Ratio of its largest amplitude to that of the orbit of the forward sweep.
     pub ratio: f64,
 }
 
-impl BothWays {
+impl BidirectionalSweep {
     /// Returns `None` if the system has one orbit per frequency, or is large.
-    pub fn of(system: &System) -> Option<Self> {
+    pub fn for_system(system: &System) -> Option<Self> {
         is_followed(system).then(Self::default)
     }
 
     /// Adds the next point.
     pub fn add(&mut self, omega: f64, outcome: Result<&Orbit, &OrbitError>) {
-        self.add_point(outcome.map_or_else(|_| Point::failed(omega), |orbit| Point::new(orbit, &amplitudes)));
+        self.add_point(outcome.map_or_else(|_| CurvePoint::failed(omega), |orbit| CurvePoint::new(orbit, &amplitudes)));
     }
 
     /// Adds the next point. Its values are the amplitudes of all places (m), or none without an
     /// orbit.
-    pub fn add_point(&mut self, point: Point) {
+    pub fn add_point(&mut self, point: CurvePoint) {
         self.points.push(point);
     }
 
@@ -83,24 +83,29 @@ impl BothWays {
     ///
     /// # Errors
     /// The method does not support the system.
-    pub fn others(&self, method: &dyn Method, system: &System, stop: &AtomicBool) -> Result<Vec<Other>, MethodError> {
+    pub fn reverse_sweep(
+        &self,
+        method: &dyn Method,
+        system: &System,
+        stop: &AtomicBool,
+    ) -> Result<Vec<OtherOrbit>, MethodError> {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
         let mut solver = advised(method, system)?;
         // A search without initial guess can find another orbit than the forward sweep.
-        let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.start);
+        let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.initial_state);
         let mut omegas = self.points.iter().rev().map(|point| point.omega);
         let mut others = Vec::new();
-        back(method, system, start, &mut omegas, stop, &mut |orbit| {
+        reverse_sweep(method, system, start, &mut omegas, stop, &mut |orbit| {
             let Some(point) = self.points.iter().find(|point| point.omega == orbit.omega) else { return };
-            let held = held(system, orbit.omega);
+            let held = held_amplitude(system, orbit.omega);
             // The reverse sweep estimates no errors, so an orbit that is reported is solved
             // again with an error estimate.
-            let shown =
-                amplitude_ratio(point, orbit, held).and_then(|_| solver.orbit(orbit.omega, Some(&orbit.start)).ok());
+            let shown = amplitude_ratio(point, orbit, held)
+                .and_then(|_| solver.orbit(orbit.omega, Some(&orbit.initial_state)).ok());
             // unstable orbits are not reported, because no motion stays on them
             let shown = shown.filter(|orbit| orbit.is_stable() != Some(false));
             others.extend(
-                shown.and_then(|orbit| amplitude_ratio(point, &orbit, held).map(|ratio| Other { orbit, ratio })),
+                shown.and_then(|orbit| amplitude_ratio(point, &orbit, held).map(|ratio| OtherOrbit { orbit, ratio })),
             );
         })?;
         others.reverse();
@@ -111,8 +116,8 @@ impl BothWays {
 /// Returns the frequency intervals in which the reverse sweep has other orbits. `there` are the
 /// points of the forward sweep, `others` the other orbits of the reverse sweep. Each interval
 /// includes its two neighbours, which both sweeps share.
-pub fn stretches(there: &[Point], others: &[Point]) -> Vec<Vec<Point>> {
-    let mut stretches: Vec<Vec<Point>> = Vec::new();
+pub fn other_intervals(there: &[CurvePoint], others: &[CurvePoint]) -> Vec<Vec<CurvePoint>> {
+    let mut stretches: Vec<Vec<CurvePoint>> = Vec::new();
     let mut others = others.iter().peekable();
     let mut open = false;
     for (i, point) in there.iter().enumerate() {
@@ -131,13 +136,13 @@ pub fn stretches(there: &[Point], others: &[Point]) -> Vec<Vec<Point>> {
 }
 
 fn amplitudes(orbit: &Orbit) -> Vec<f64> {
-    orbit.places.iter().map(|place| place.size()).collect()
+    orbit.places.iter().map(|place| place.length_amplitude()).collect()
 }
 
 /// Returns the ratio of the largest amplitude of an orbit to that of a point at the same
 /// frequency, if the two orbits differ. Amplitudes below `held` (m), or below the rounding of
 /// the means, count as zero.
-fn amplitude_ratio(point: &Point, orbit: &Orbit, held: f64) -> Option<f64> {
+fn amplitude_ratio(point: &CurvePoint, orbit: &Orbit, held: f64) -> Option<f64> {
     if point.values.is_empty() {
         return None;
     }
@@ -156,12 +161,12 @@ mod tests {
 
     #[test]
     fn a_stretch_has_a_neighbour_where_there_is_one() {
-        let point = |omega: f64| Point { values: vec![omega], ..Point::failed(omega) };
-        let there: Vec<Point> = (0..8).map(|i| point(f64::from(i))).collect();
+        let point = |omega: f64| CurvePoint { values: vec![omega], ..CurvePoint::failed(omega) };
+        let there: Vec<CurvePoint> = (0..8).map(|i| point(f64::from(i))).collect();
         let of = |omegas: &[f64]| -> Vec<Vec<f64>> {
-            let others: Vec<Point> = omegas.iter().map(|omega| point(*omega)).collect();
-            let omegas = |stretch: Vec<Point>| stretch.iter().map(|point| point.omega).collect();
-            stretches(&there, &others).into_iter().map(omegas).collect()
+            let others: Vec<CurvePoint> = omegas.iter().map(|omega| point(*omega)).collect();
+            let omegas = |stretch: Vec<CurvePoint>| stretch.iter().map(|point| point.omega).collect();
+            other_intervals(&there, &others).into_iter().map(omegas).collect()
         };
         assert!(of(&[]).is_empty());
         assert_eq!(of(&[2.0, 3.0]), [[1.0, 2.0, 3.0, 4.0]]);

@@ -85,7 +85,7 @@ struct BranchPoint {
 impl BranchPoint {
     fn new(orbit: &Orbit) -> Self {
         let places = orbit.places.iter().map(|place| (place.amplitude(), place.first_harmonic)).collect();
-        BranchPoint { omega: orbit.omega, start: orbit.start.clone(), places }
+        BranchPoint { omega: orbit.omega, start: orbit.initial_state.clone(), places }
     }
 
     /// Tells whether an orbit can be the next one of the branch.
@@ -133,7 +133,7 @@ impl BranchFollower<'_> {
             let found = self.solve(target, Some(&last.start), between || !arrives);
             effort += self.solver.effort();
             self.work_limit_reached =
-                effort > WORK_LIMIT || matches!(found, Err(OrbitError::NotConverged { spent: true, .. }));
+                effort > WORK_LIMIT || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
             match found.ok().filter(|orbit| last.may_precede(orbit)) {
                 Some(orbit) if arrives => return Some(orbit),
                 _ if self.work_limit_reached => return None,
@@ -195,8 +195,15 @@ mod tests {
             if self.effort < 1.0 {
                 return self.solver.between(omega, start);
             }
-            let (iterations, residual, instead) = (9, 1e-2, String::new());
-            Err(OrbitError::NotConverged { method: "slow", omega, iterations, residual, spent: true, instead })
+            let (iterations, residual, advice) = (9, 1e-2, String::new());
+            Err(OrbitError::NotConverged {
+                method: "slow",
+                omega,
+                iterations,
+                residual,
+                work_limit_reached: true,
+                advice,
+            })
         }
         fn effort(&self) -> f64 {
             self.effort
@@ -221,7 +228,7 @@ mod tests {
         for hertz in [119.5, 120.5, 121.5] {
             let orbit = onward.orbit(TAU * hertz, start.as_deref()).unwrap();
             amplitudes.push(orbit.places[0].amplitude());
-            start = Some(orbit.start);
+            start = Some(orbit.initial_state);
         }
         assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > MAX_CHANGE), "{amplitudes:?}");
         asked.load(std::sync::atomic::Ordering::Relaxed)
@@ -256,7 +263,7 @@ mod tests {
             end: None,
             work_limit_reached: false,
         };
-        let start = onward.orbit(from, None).unwrap().start;
+        let start = onward.orbit(from, None).unwrap().initial_state;
         let count = || asked.load(std::sync::atomic::Ordering::Relaxed);
         let mut searches = |beyond: f64| {
             onward.begin_at(from, &start);

@@ -22,9 +22,9 @@ pub use stickslip_numerics::continuation::End;
 
 /// Specification of a branch.
 #[derive(Clone, Copy)]
-pub struct Trace<'a> {
+pub struct BranchContinuation<'a> {
     /// Returns system and excitation frequency (rad/s) at a value of the parameter.
-    pub at: &'a dyn Fn(f64) -> (System, f64),
+    pub system_at: &'a dyn Fn(f64) -> (System, f64),
     /// Harmonic balance with a fixed number of harmonics (15 by default).
     pub method: HarmonicBalance,
     /// First and last value of the parameter; decreasing if the second is smaller.
@@ -158,7 +158,7 @@ impl CurvePart {
     }
 }
 
-impl Trace<'_> {
+impl BranchContinuation<'_> {
     /// Follows the branch from the start of the range until it leaves the range and does not
     /// return.
     ///
@@ -168,11 +168,11 @@ impl Trace<'_> {
     ///
     /// # Example
     /// ```
-    /// use stickslip::curve::continuation::Trace;
+    /// use stickslip::curve::continuation::BranchContinuation;
     /// use stickslip::method::harmonic_balance::HarmonicBalance;
     /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
-    /// let branch = Trace {
-    ///     at: &|omega| (system.clone(), omega),
+    /// let branch = BranchContinuation {
+    ///     system_at: &|omega| (system.clone(), omega),
     ///     method: HarmonicBalance { harmonics: Some(5), ..HarmonicBalance::default() },
     ///     range: (750.0, 775.0),
     ///     step: 1.0,
@@ -183,10 +183,10 @@ impl Trace<'_> {
     /// assert_eq!(branch.peaks.len(), 1);
     /// ```
     pub fn branch(&self) -> Result<Branch, TraceError> {
-        let mut equations = BranchEquations::new(self.at, self.method, self.range)?;
+        let mut equations = BranchEquations::new(self.system_at, self.method, self.range)?;
         let start = equations.start(self.range.0)?;
         let steps = Steps::between(self.range.0, self.range.1, self.step);
-        let single = (self.at)(self.range.0).0.is_incrementally_stable();
+        let single = (self.system_at)(self.range.0).0.is_incrementally_stable();
         let mut way = CurvePart { single, ..CurvePart::default() };
         let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
         if !single && end == End::Border {

@@ -13,16 +13,15 @@
 //! for small motion.
 //!
 //! Friction can bring two frequencies together, so that two modes nearly coalesce:
-//! [`Mode::merges`]. Below this amplitude there are two modes again, with other shapes. Small
-//! effects, such as the number of harmonics, decide which mode continues which. The curve may
-//! also turn there. Its amplitude then grows again before it falls, and the motion at the next
-//! smaller amplitude is a different one ([`Mode::turns`]). If the curve does not return, the
-//! mode ends ([`Lost`]).
-//! Source: the extended periodic motion concept of Krack (2015).
+//! [`Mode::coalescences`]. Below this amplitude there are two modes again, with other shapes.
+//! Small effects, such as the number of harmonics, decide which mode continues which. The curve
+//! may also turn there. Its amplitude then grows again before it falls, and the motion at the
+//! next smaller amplitude is a different one ([`Mode::turns`]). If the curve does not return, the
+//! mode ends ([`ModeEnd`]). Source: the extended periodic motion concept of Krack (2015).
 
 mod mode_curve;
 
-pub use mode_curve::{Lost, Reason, Turn};
+pub use mode_curve::{ModeEnd, ModeEndCause, TurningPart};
 
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
 use crate::method::{MethodError, ways};
@@ -77,15 +76,15 @@ pub struct Mode {
     pub largest: Option<ModePoint>,
     /// Modal amplitudes within the range at which the mode nearly coalesces with another one, in
     /// decreasing order, m √kg.
-    pub merges: Vec<f64>,
+    pub coalescences: Vec<f64>,
     /// Turning points of the curve within the range, in decreasing order of amplitude.
-    pub turns: Vec<Turn>,
+    pub turns: Vec<TurningPart>,
     /// Requested amplitudes on the curve at which no motion was found.
-    pub missing: Vec<f64>,
+    pub not_found: Vec<f64>,
     /// Amplitude and cause of the end, if the mode ends above the smallest amplitude.
-    pub lost: Option<Lost>,
+    pub ended: Option<ModeEnd>,
     /// True if the mode is one of the two travelling waves of a pair of equal modes.
-    pub travels: bool,
+    pub is_travelling_wave: bool,
 }
 
 /// Specification of a nonlinear mode.
@@ -133,11 +132,11 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 /// // friction affects only the mode in which the blades move in antiphase
 /// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
 /// let mode = mode(&system, request).unwrap();
-/// assert!(mode.lost.is_none());
+/// assert!(mode.ended.is_none());
 /// let stuck = ((105_103.0 + 2.0 * 1e4) / 0.182f64).sqrt();
 /// assert!((mode.points[0].omega / stuck - 1.0).abs() < 1e-6);
 /// ```
-pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
+pub fn nonlinear_mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
     let last = request.points.max(2) - 1;
@@ -146,21 +145,21 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
     let largest =
         followed.curves().filter_map(|curve| curve.largest_damping(&mut equations, (low, high))).max_by(larger);
     let merges = followed.curves().flat_map(|curve| curve.merges(&equations)).filter(|a| (low..high).contains(a));
-    let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.at < high);
+    let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.amplitude < high);
     let mut mode = Mode {
         points: Vec::new(),
         largest: largest.map(|(a, state)| point(&equations, a, &state)),
-        merges: merges.collect(),
+        coalescences: merges.collect(),
         turns: turns.collect(),
-        missing: Vec::new(),
-        lost: followed.lost(high),
-        travels: followed.curves().any(ModeCurve::travels),
+        not_found: Vec::new(),
+        ended: followed.lost(high),
+        is_travelling_wave: followed.curves().any(ModeCurve::travels),
     };
     for i in 0..=last {
         let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
         match followed.curves().find_map(|curve| curve.state_at(&mut equations, amplitude)) {
             Some(state) => mode.points.push(point(&equations, amplitude, &state)),
-            None if followed.passes(amplitude) => mode.missing.push(amplitude),
+            None if followed.passes(amplitude) => mode.not_found.push(amplitude),
             None => {}
         }
     }
@@ -205,13 +204,13 @@ impl ModeBranches {
 
     /// Returns amplitude and cause of the end of the mode, if it ends above the smallest
     /// amplitude. Amplitudes above `high` are not considered.
-    fn lost(&self, high: f64) -> Option<Lost> {
+    fn lost(&self, high: f64) -> Option<ModeEnd> {
         let falling = self.falling.as_ref()?;
         let lost = falling.lost?;
         match &self.rising {
             Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
-            Some(rising) if lost.reason == Reason::NoBeginning => {
-                Some(Lost { at: rising.largest_amplitude(), reason: Reason::FromRest })
+            Some(rising) if lost.reason == ModeEndCause::NoStart => {
+                Some(ModeEnd { at: rising.largest_amplitude(), reason: ModeEndCause::FromSmallAmplitudes })
             }
             _ => Some(lost),
         }
@@ -224,7 +223,7 @@ impl ModeBranches {
 ///
 /// # Errors
 /// See [`mode()`].
-pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
+pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     let equations = equations(system, 1, 8)?;
     let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
     let displacements = |x: Vec<Complex64>| -> Vec<Complex64> {
@@ -308,8 +307,8 @@ mod tests {
         let (blades, k, kt) = (6, 4.0, 0.8);
         let system = ring(blades);
         let request = ModeRequest { mode: 1, range: (1e-6, 1e-2), points: 5, harmonics: 3, samples: 128 };
-        let mode = mode(&system, request).unwrap();
-        assert_eq!((mode.points.len(), mode.lost, &mode.missing[..]), (5, None, &[][..]));
+        let mode = nonlinear_mode(&system, request).unwrap();
+        assert_eq!((mode.points.len(), mode.ended, &mode.not_found[..]), (5, None, &[][..]));
         let stuck = (k + 4.0 * kt * (PI / blades as f64).sin().powi(2)).sqrt();
         for point in &mode.points {
             assert!((point.omega / stuck - 1.0).abs() < 1e-10, "{} instead of {stuck}", point.omega);
@@ -345,7 +344,7 @@ mod tests {
             for diameter in 1..blades / 2 {
                 let sine = (PI * diameter as f64 / blades as f64).sin();
                 for index in [2 * diameter - 1, 2 * diameter] {
-                    let unit = unit(&system, index).unwrap().unwrap();
+                    let unit = unit_amplitude(&system, index).unwrap().unwrap();
                     // Only 1e-9 of the joints' stiffness distinguishes the modes of blades
                     // without coupling springs, and rounding disturbs it.
                     assert!(
@@ -359,8 +358,12 @@ mod tests {
                         harmonics: 1,
                         samples: 1024,
                     };
-                    let mode = mode(&system, request).unwrap();
-                    assert_eq!((mode.lost, mode.points.len(), mode.travels), (None, 11, true), "{blades} {diameter}");
+                    let mode = nonlinear_mode(&system, request).unwrap();
+                    assert_eq!(
+                        (mode.ended, mode.points.len(), mode.is_travelling_wave),
+                        (None, 11, true),
+                        "{blades} {diameter}"
+                    );
                     for point in &mode.points {
                         let (kt, limit) = (0.8, 0.2);
                         let (d, slips) = (2.0 * sine * point.amplitude / unit, limit / kt);
@@ -417,8 +420,8 @@ mod tests {
         let system = model.assemble().unwrap();
         for harmonics in [3, 15, 31] {
             let request = ModeRequest { mode: 0, range: (1e-9, 1.0), points: 15, harmonics, samples: 1024 };
-            let mode = mode(&system, request).unwrap();
-            assert_eq!((mode.lost, &mode.missing[..], mode.points.len()), (None, &[][..], 15), "{harmonics}");
+            let mode = nonlinear_mode(&system, request).unwrap();
+            assert_eq!((mode.ended, &mode.not_found[..], mode.points.len()), (None, &[][..], 15), "{harmonics}");
             for point in mode.points.iter().filter(|point| harmonics > 3 && point.amplitude > 1e-5) {
                 // Find the largest displacement with this first harmonic by bisection; the
                 // harmonic increases with the displacement.
@@ -450,9 +453,9 @@ mod tests {
         model.joints.push(Joint { name: "j".into(), between: between(), law });
         let system = model.assemble().unwrap();
         let request = ModeRequest { mode: 0, range: (1e-9, 1e-2), points: 5, harmonics: 15, samples: 1024 };
-        let mode = mode(&system, request).unwrap();
-        let lost = mode.lost.unwrap();
-        assert_eq!(lost.reason, Reason::Overdamped);
+        let mode = nonlinear_mode(&system, request).unwrap();
+        let lost = mode.ended.unwrap();
+        assert_eq!(lost.reason, ModeEndCause::Overdamped);
         // (4/π · 1 N) / (2 · 1e4 N/m · a) is a damping ratio of one at a = 0.06 mm
         assert!(lost.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{lost:?}");
     }

@@ -58,7 +58,7 @@ pub fn sweep<R: Send>(
         .map(|block| {
             let range = block * BLOCK..((block + 1) * BLOCK).min(count);
             let mut rows = Vec::with_capacity(range.len());
-            stretch(&mut *solver(method, system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
+            solve_sequence(&mut *solver(method, system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
                 let index = range.start + rows.len();
                 rows.push(outcome.map(|outcome| row(index, outcome)));
             });
@@ -73,10 +73,10 @@ pub fn sweep<R: Send>(
 }
 
 /// Receives an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
-pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
+pub type Observer<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 
-/// Returns a solver for [`stretch`]. For systems that use branch following, it continues the
-/// branch of its initial guess in smaller steps before it changes to another branch.
+/// Returns a solver for [`solve_sequence`]. For systems that use branch following, it continues
+/// the branch of its initial guess in smaller steps before it changes to another branch.
 ///
 /// # Errors
 /// The method does not support the system.
@@ -87,7 +87,12 @@ pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Sol
 /// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as initial
 /// guess. Points without an orbit from there are solved in reverse from the next orbit. `see`
 /// receives the outcomes in order.
-pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, watch: Watch<'_>, see: &mut See<'_>) {
+pub fn solve_sequence(
+    solver: &mut dyn Solver,
+    omegas: &mut dyn Iterator<Item = f64>,
+    watch: Watch<'_>,
+    see: &mut Observer<'_>,
+) {
     let mut start: Option<Vec<f64>> = None;
     // points without an orbit, until the next orbit is found
     let mut missing: Vec<PendingPoint> = Vec::new();
@@ -102,8 +107,8 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
         (watch.finished)();
         // After a failure, the next point has no initial guess, because the last orbit may be
         // far away.
-        start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
-        let found = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
+        start = outcome.as_ref().ok().map(|orbit| orbit.initial_state.clone());
+        let found = outcome.as_ref().ok().map(|orbit| orbit.initial_state.clone());
         missing.push(PendingPoint { omega, outcome, had_guess });
         if found.is_none() && omegas.peek().is_some() {
             continue;
@@ -128,7 +133,7 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
 ///
 /// # Errors
 /// The method does not support the system.
-pub fn back(
+pub fn reverse_sweep(
     method: &dyn Method,
     system: &System,
     start: Option<Vec<f64>>,
@@ -144,7 +149,7 @@ pub fn back(
         }
         let found = solver.between(omega, start.as_deref()).ok();
         found.iter().for_each(&mut *see);
-        start = found.map(|orbit| orbit.start);
+        start = found.map(|orbit| orbit.initial_state);
     }
     Ok(())
 }
@@ -182,12 +187,12 @@ fn solve_missing_in_reverse(solver: &mut dyn Solver, behind: &[f64], missing: &m
         }
         match solver.orbit(*omega, Some(&start)) {
             Ok(orbit) => {
-                start.clone_from(&orbit.start);
+                start.clone_from(&orbit.initial_state);
                 *outcome = Ok(orbit);
             }
             Err(error) => {
                 // a search that exhausted the work limit is not repeated
-                *had_guess &= !matches!(error, OrbitError::NotConverged { spent: true, .. });
+                *had_guess &= !matches!(error, OrbitError::NotConverged { work_limit_reached: true, .. });
                 return;
             }
         }
@@ -236,7 +241,7 @@ mod tests {
         let watch = Watch { finished: &|| (), stop: &AtomicBool::new(false) };
         let mut seen = Vec::new();
         let mut solver = Folded { fold }.solver(&system).unwrap();
-        stretch(&mut *solver, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
+        solve_sequence(&mut *solver, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
             let outcome = outcome.expect("not stopped");
             if let Ok(orbit) = outcome {
                 assert_eq!(orbit.omega, omega);

@@ -2,7 +2,7 @@
 //! with the indices of their axes and states.
 
 use super::drive::Drive;
-use super::{Breakdown, MethodError};
+use super::{IntegrationError, MethodError};
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
 use crate::structure::Matrices;
@@ -62,8 +62,8 @@ impl PlacedLaw {
         0.5 * h * slopes[after + e] + slopes[after + self.directions + e]
     }
     /// Returns the error that the law answers with NaN or infinity.
-    pub fn no_number(&self, time: f64) -> Breakdown {
-        Breakdown::NoNumber { time, joint: self.joint.clone(), law: self.law.name() }
+    pub fn no_number(&self, time: f64) -> IntegrationError {
+        IntegrationError::NotFinite { time, joint: self.joint.clone(), law: self.law.name() }
     }
 }
 

@@ -425,7 +425,7 @@ mod tests {
         let orbit = method.solver(&wave).unwrap().orbit(omega, None).unwrap();
         let judged = |system: &System| {
             let path = (orbit.path.as_ref(), Symmetry::FullPeriod);
-            Judge::new(system).judge(system, omega, path, &orbit.start, &[])
+            Judge::new(system).judge(system, omega, path, &orbit.initial_state, &[])
         };
         let (part, all) = (judged(&wave), judged(&whole));
         let largest = |judged: &Judged| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
@@ -454,10 +454,10 @@ mod tests {
         assert!(judge.proves());
         let mut defect =
             |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;
-        assert!(defect(&orbit.start).unwrap() < 1e-11);
-        let wrong: Vec<f64> = orbit.start.iter().map(|z| 1.5 * z).collect();
+        assert!(defect(&orbit.initial_state).unwrap() < 1e-11);
+        let wrong: Vec<f64> = orbit.initial_state.iter().map(|z| 1.5 * z).collect();
         // a transient decays by 1 % per return at a Q of some hundreds; friction adds to that
         assert!(defect(&wrong).unwrap() > 1e-3, "{:?}", defect(&wrong));
-        assert_eq!(defect(&orbit.start[..4]), None);
+        assert_eq!(defect(&orbit.initial_state[..4]), None);
     }
 }

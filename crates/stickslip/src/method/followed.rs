@@ -325,7 +325,7 @@ mod tests {
         assert_eq!(Kind::of(&mixed, None), Kind::Incremental);
         let orbit = shoot(&mixed, omega);
         let x = linear(omega, &parts);
-        let estimate = orbit.evidence.truncation.unwrap();
+        let estimate = orbit.evidence.error_estimate.unwrap();
         assert!(estimate <= 1e-5, "{estimate}");
         for (place, x) in orbit.places.iter().zip(x.iter()) {
             assert!(
@@ -395,7 +395,7 @@ mod tests {
         // a law that carries no force and does not consist of sliders
         let idle: SharedLaw = Arc::new(Gap { gap: 1e3, stiffness: 1.0 });
         let orbit = shoot(&system(&[(jenkins, along(0)), (idle, along(1))]), 1.3);
-        let estimate = orbit.evidence.truncation.unwrap();
+        let estimate = orbit.evidence.error_estimate.unwrap();
         assert!(estimate > 0.0 && estimate <= 1e-5);
         for (a, b) in orbit.places.iter().zip(&exact.places) {
             near(a.amplitude(), b.amplitude(), 3.0 * estimate);
@@ -434,7 +434,7 @@ mod tests {
             let orbit = shoot(&system, omega);
             let expected = 1.0 / (1.5e4 - omega * omega).hypot(2.0 * omega);
             let error = (orbit.places[0].amplitude() / expected - 1.0).abs();
-            let estimate = orbit.evidence.truncation.unwrap();
+            let estimate = orbit.evidence.error_estimate.unwrap();
             assert!(error <= estimate && estimate <= 1e-5, "{frequency}: {error:e} {estimate:e}");
         }
     }
@@ -573,9 +573,9 @@ mod tests {
         for method in [&shooting as &dyn Method, &exact, &series] {
             let mut solver = method.solver(&system).unwrap();
             let first = solver.orbit(3.9, None).unwrap();
-            assert_eq!((first.repeats(), first.is_stable()), (1, Some(true)), "{}", method.name());
-            let orbit = solver.orbit(3.5, Some(&first.start)).unwrap();
-            assert_eq!((orbit.repeats(), orbit.is_stable()), (2, Some(true)), "{}", method.name());
+            assert_eq!((first.minimal_periods(), first.is_stable()), (1, Some(true)), "{}", method.name());
+            let orbit = solver.orbit(3.5, Some(&first.initial_state)).unwrap();
+            assert_eq!((orbit.minimal_periods(), orbit.is_stable()), (2, Some(true)), "{}", method.name());
             amplitudes.push(orbit.places[0].amplitude());
         }
         near(amplitudes[1], amplitudes[0], 1e-6);

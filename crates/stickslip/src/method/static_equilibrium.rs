@@ -62,7 +62,7 @@ impl StaticEquilibrium {
 
     /// Returns the displacements of all degrees of freedom, m.
     pub fn displacement(&self) -> &[f64] {
-        &self.orbit.start[..self.dofs]
+        &self.orbit.initial_state[..self.dofs]
     }
 
     /// Returns the forces of each joint along its directions, N.
@@ -72,7 +72,7 @@ impl StaticEquilibrium {
 
     /// Returns the internal states of all joints, in the order of the joints.
     pub fn joint_states(&self) -> &[f64] {
-        &self.orbit.start[2 * self.dofs..]
+        &self.orbit.initial_state[2 * self.dofs..]
     }
 }
 

@@ -210,11 +210,11 @@ impl Path for SteppedPath {
             velocity: signed(v),
             acceleration: signed(&acceleration),
             joints,
-            moved: moved.into_iter().map(|(motion, force)| (sign * motion, sign * force)).collect(),
+            imposed: moved.into_iter().map(|(motion, force)| (sign * motion, sign * force)).collect(),
         }
     }
 
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         let mut times: Vec<f64> = (1..self.steps.spans.len())
             .filter(|&step| self.steps.contact_at_end(step - 1) != self.steps.contact_at_end(step))
             .map(|step| self.steps.spans[step].0)

@@ -146,7 +146,7 @@ pub(crate) fn results<S: PathSignals>(
             minimum,
             mean: if half { 0.0 } else { signals.fourier(&x, 0.0).re / period },
             first_harmonic: signals.fourier(&x, omega) * (2.0 * times / period),
-            radius: place.is_rotation().then(|| place.length_scale()),
+            rotation_radius: place.is_rotation().then(|| place.length_scale()),
         });
     }
     let forces: Vec<S::Signal> = system.axes().enumerate().map(|(axis, _)| signals.force(axis)).collect();

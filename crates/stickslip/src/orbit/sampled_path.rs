@@ -24,7 +24,7 @@ pub(super) struct Sampled<'a> {
 
 impl<'a> Sampled<'a> {
     pub fn new(system: &'a System, path: &dyn Path, omega: f64, period: f64) -> Self {
-        let mut cuts: Vec<f64> = path.switch_times().into_iter().filter(|t| *t > 0.0 && *t < period).collect();
+        let mut cuts: Vec<f64> = path.transition_times().into_iter().filter(|t| *t > 0.0 && *t < period).collect();
         cuts.push(0.0);
         cuts.push(period);
         cuts.sort_by(f64::total_cmp);

@@ -64,7 +64,7 @@ impl Orbit {
     /// Source: Leine and Nijmeijer (2004), Ch. 7.
     pub fn multipliers(&self) -> Option<Vec<Complex64>> {
         let map = if self.return_map.is_empty() && !self.places.is_empty() {
-            Cow::Owned(self.path.return_map(&self.start, self.symmetry)?)
+            Cow::Owned(self.path.return_map(&self.initial_state, self.symmetry)?)
         } else {
             Cow::<DMatrix<f64>>::Borrowed(&self.return_map)
         };
@@ -80,7 +80,7 @@ impl Orbit {
     /// not known yet, this call integrates the motion over one return. `None` if no integrator
     /// supports the laws of the system.
     pub fn return_defect(&self) -> Option<f64> {
-        self.evidence.return_defect.or_else(|| self.path.return_defect(&self.start, self.symmetry))
+        self.evidence.return_defect.or_else(|| self.path.return_defect(&self.initial_state, self.symmetry))
     }
 
     /// Converts the multiplier of a return into that of the full period.

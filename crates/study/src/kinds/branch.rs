@@ -24,7 +24,7 @@ use crate::values::{Frequencies, Values, hertz};
 use crate::warnings::{resonant, undamped};
 use crate::work::{Computed, Grain, Part, Prepared, Work};
 use std::f64::consts::TAU;
-use stickslip::curve::continuation::{Branch, End, Trace, TraceError};
+use stickslip::curve::continuation::{Branch, BranchContinuation, End, TraceError};
 use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -230,7 +230,7 @@ fn compute(work: &Work<'_>) -> Computed {
 fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
     let heights: Vec<f64> = branch.points.iter().map(|point| worst(&point.orbit, places)).collect();
     let errors: Vec<f64> =
-        branch.points.iter().map(|point| point.orbit.evidence.truncation.unwrap_or(f64::NAN)).collect();
+        branch.points.iter().map(|point| point.orbit.evidence.error_estimate.unwrap_or(f64::NAN)).collect();
     // a peak lies between the rows before and after its nearest row
     let near = |row: usize, (value, height): (f64, f64)| {
         let [a, b, c] = [row - 1, row, row + 1].map(|row| branch.points[row].value);
@@ -298,8 +298,8 @@ fn follow(work: &Work<'_>, along: Option<&VariedValue>, range: (f64, f64)) -> Re
         Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
     };
     let places = peak_places(prepared);
-    let trace = Trace {
-        at: &at,
+    let trace = BranchContinuation {
+        system_at: &at,
         method: method(values),
         range,
         step: (range.1 - range.0).abs() / values.count("steps").unwrap_or(100) as f64,

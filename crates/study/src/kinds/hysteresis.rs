@@ -164,7 +164,7 @@ impl Source {
                 let (first, axis) = joints[0];
                 (sample.joints[first].displacement[axis], force)
             }
-            Of::Moved(m) => sample.moved[*m],
+            Of::Moved(m) => sample.imposed[*m],
         };
         (self.against.as_ref().map_or(displacement, |place| place.component(&sample.displacement)), force)
     }

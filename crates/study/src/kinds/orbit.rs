@@ -88,7 +88,7 @@ fn compute(work: &Work<'_>) -> Computed {
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
         let mut row = Summary::of(prepared, &orbit, stable);
-        if orbit.start.len() <= FOLLOWED {
+        if orbit.initial_state.len() <= FOLLOWED {
             row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
         }
         row.write(prepared, &mut summary);
@@ -130,7 +130,7 @@ fn compute(work: &Work<'_>) -> Computed {
 ///
 /// It covers orbits with half-period symmetry; [`Note::History`] covers the others.
 fn one_of_many(prepared: &Prepared, orbit: &Orbit) -> Option<Note> {
-    (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
+    (orbit.is_in_continuum() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");
         let text =
             format!("permanently stuck: {stuck}; the orbit is one of a continuum, and the symmetric orbit is shown.");

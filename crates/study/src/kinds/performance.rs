@@ -22,8 +22,8 @@ use crate::values::{Values, hertz};
 use crate::warnings::sampled;
 use crate::work::{CONVERGED, Computed, Grain, Part, Prepared, Work};
 use stickslip::curve::bidirectional_sweep;
-use stickslip::curve::peak::held;
-use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
+use stickslip::curve::peak::held_amplitude;
+use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, PerformanceRow};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -101,7 +101,7 @@ fn compute(work: &Work<'_>) -> Computed {
     for (&case, row) in listed {
         let prepared = &work.cases[case];
         let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
-        let reason = || match row.peak.and_then(|peak| peak.unsettled) {
+        let reason = || match row.peak.and_then(|peak| peak.unresolved) {
             Some(why) => why.to_string(),
             None => format!("{} of the orbits on the frequency grid did not converge", row.failed),
         };
@@ -119,7 +119,7 @@ fn compute(work: &Work<'_>) -> Computed {
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
         if bidirectional_sweep::is_followed(&prepared.system) {
-            rows.flag(WAY_BACK, row.peak.map(|_| row.way_back));
+            rows.flag(WAY_BACK, row.peak.map(|_| row.reverse_sweep_only));
         }
         rows.integer(tables::FAILED, row.failed as u64);
         rows.reduced(prepared.system.reduction_evidence());
@@ -171,7 +171,7 @@ fn no_optimum(work: &Work<'_>, curve: &PerformanceCurve, (parameter, order): (&s
 }
 
 /// Returns the status of the orbits that support a peak.
-fn status(row: &Row) -> &'static str {
+fn status(row: &PerformanceRow) -> &'static str {
     match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
         (true, _) => "some-failed",
         (false, 0) => CONVERGED,
@@ -201,7 +201,7 @@ fn curve(work: &Work<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodErro
         range,
         points: frequencies.len(),
         quantities: &|orbit| {
-            let held = held(&first.system, orbit.omega);
+            let held = held_amplitude(&first.system, orbit.omega);
             let amplitudes = places.iter().map(|place| orbit.places[*place].amplitude());
             amplitudes.map(|amplitude| if amplitude > held { amplitude } else { 0.0 }).collect()
         },

@@ -30,9 +30,9 @@ use crate::work::{Computed, Grain, NOT_REACHED, Part, Prepared, Work};
 use drawn::SINGLE;
 use peaks::{Found, Sought};
 use references::{REFERENCE_POINTS, references};
-use stickslip::curve::adaptive::Adaptive;
-use stickslip::curve::bidirectional_sweep::{self, BothWays, Other};
-use stickslip::curve::peak::Point;
+use stickslip::curve::adaptive::AdaptiveCurve;
+use stickslip::curve::bidirectional_sweep::{self, BidirectionalSweep, OtherOrbit};
+use stickslip::curve::peak::CurvePoint;
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, OrbitError, advised};
 use stickslip::orbit::Orbit;
@@ -173,7 +173,7 @@ fn compute(work: &Work<'_>) -> Computed {
     let mut stretch = Computing::new(prepared);
     let found = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
-            let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
+            let adaptive = AdaptiveCurve { range: (*from, *to), tolerance: *tolerance };
             adaptively(work, adaptive, &mut stretch)
         }
         _ => evenly(work, &mut stretch),
@@ -188,7 +188,7 @@ fn compute(work: &Work<'_>) -> Computed {
         let mut peaks = Rows::default();
         let all = peaks::all(work, points, &others).map_err(|error| (case.index, error))?;
         for found in &all {
-            if let Some(why) = found.peak.unsettled {
+            if let Some(why) = found.peak.unresolved {
                 let at = || {
                     format!("peak of {}, {}", prepared.system.places()[found.mass], location_of(case, found.peak.omega))
                 };
@@ -285,15 +285,15 @@ impl<'a> Computing<'a> {
 
     /// Adds the other orbits that the reverse sweep finds, and returns them as points for the
     /// peak search.
-    fn compare(&mut self, work: &Work<'_>, ways: Option<BothWays>) -> Result<Vec<Point>, MethodError> {
+    fn compare(&mut self, work: &Work<'_>, ways: Option<BidirectionalSweep>) -> Result<Vec<CurvePoint>, MethodError> {
         let Some(ways) = ways else { return Ok(Vec::new()) };
         let (prepared, sought) = (self.prepared, Sought::new(self.prepared));
-        let others = ways.others(&*prepared.method, &prepared.system, &work.context.stop)?;
-        let points = others.iter().map(|Other { orbit, ratio }| {
+        let others = ways.reverse_sweep(&*prepared.method, &prepared.system, &work.context.stop)?;
+        let points = others.iter().map(|OtherOrbit { orbit, ratio }| {
             let note = Note::OtherOrbit { points: 1, from: orbit.omega, to: orbit.omega, ratios: [*ratio; 2] };
             note.join(&mut self.part.notes);
             orbit_row(prepared, orbit.omega, &Summary::new(prepared, Ok(orbit)), &mut self.way_back);
-            Point::new(orbit, &|orbit| sought.quantities(orbit))
+            CurvePoint::new(orbit, &|orbit| sought.quantities(orbit))
         });
         Ok(points.collect())
     }
@@ -308,21 +308,21 @@ fn kept(prepared: &Prepared, outcome: Result<&Orbit, &OrbitError>) -> (Summary, 
 }
 
 /// The points for the peak search, if requested, and the other points of the reverse sweep.
-type Followed = (Vec<Point>, Vec<Point>);
+type Followed = (Vec<CurvePoint>, Vec<CurvePoint>);
 
 /// Computes the points at the frequencies of the unit.
 fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
     let sought = Sought::new(prepared);
-    let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
+    let point = |orbit: &Orbit| CurvePoint::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
-    let mut ways = BothWays::of(&prepared.system);
+    let mut ways = BidirectionalSweep::for_system(&prepared.system);
     orbits::sweep(work, &mut |omega, outcome| {
         stretch.add(omega, outcome.map(|outcome| kept(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {
-            points.push(outcome.map_or_else(|_| Point::failed(omega), point));
+            points.push(outcome.map_or_else(|_| CurvePoint::failed(omega), point));
         }
     })?;
     let others = stretch.compare(work, ways)?;
@@ -335,7 +335,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
     let mut solver = advised(&*prepared.method, &prepared.system)?;
     let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
         Ok(orbit) => point(&orbit),
-        Err(_) => Point::failed(work.omega(index)),
+        Err(_) => CurvePoint::failed(work.omega(index)),
     };
     if work.points.start > 0 {
         let before = near(work.points.start - 1, points[0].start.as_deref());
@@ -349,7 +349,7 @@ fn evenly(work: &Work<'_>, stretch: &mut Computing<'_>) -> Result<Followed, Meth
 }
 
 /// Computes the points of a curve with adaptive frequencies.
-fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
+fn adaptively(work: &Work<'_>, adaptive: AdaptiveCurve, stretch: &mut Computing<'_>) -> Result<Followed, MethodError> {
     let prepared = work.case();
     let sought = Sought::new(prepared);
     // the shape does not influence the frequencies
@@ -364,12 +364,12 @@ fn adaptively(work: &Work<'_>, adaptive: Adaptive, stretch: &mut Computing<'_>) 
         stretch.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
-    let mut ways = BothWays::of(&prepared.system);
+    let mut ways = BidirectionalSweep::for_system(&prepared.system);
     for (mut point, (kept, shape)) in curve {
         if let Some(ways) = &mut ways {
             let places = kept.0.places.iter().zip(prepared.system.place_axes());
             let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length_scale());
-            ways.add_point(Point { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
+            ways.add_point(CurvePoint { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
         }
         stretch.add(point.omega, Some(kept));
         point.values.extend(shape);

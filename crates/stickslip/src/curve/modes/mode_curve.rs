@@ -8,29 +8,29 @@ use stickslip_numerics::maximum::maximum;
 /// A part of the curve that turns back. Below `at`, the motion does not continue the motion at
 /// `at`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turn {
+pub struct TurningPart {
     /// Modal amplitude below which the motion is a different one, m √kg.
-    pub at: f64,
+    pub amplitude: f64,
     /// Modal amplitude to which the curve returns before it falls, m √kg. Several motions exist
     /// between both amplitudes.
-    pub up: f64,
+    pub return_amplitude: f64,
 }
 
 /// The end of a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lost {
+pub struct ModeEnd {
     /// Modal amplitude of the last motion, m √kg.
     pub at: f64,
     /// Cause of the end.
-    pub reason: Reason,
+    pub reason: ModeEndCause,
 }
 
 /// Cause of the end of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Reason {
+pub enum ModeEndCause {
     /// The structure without joints has no such mode, or its frequency is zero.
     #[error("no motion was found near the linear mode without joints, or this mode has zero frequency")]
-    NoBeginning,
+    NoStart,
     /// The curve turned and returned to amplitudes at which friction is negligible.
     #[error(
         "its curve turns there and returns to large amplitudes: it coalesces with another mode and does not exist below"
@@ -51,15 +51,15 @@ pub enum Reason {
         "the branch from small amplitudes ends there (overdamped, or no neighbouring motion was found), and at large \
          amplitudes no motion was found either"
     )]
-    FromRest,
+    FromSmallAmplitudes,
     /// Laws with internal states exceeded their work limit.
     #[error(
         "the continuation reached its work limit, because the internal states of a law change very fast there; choose other amplitudes"
     )]
-    Dear,
+    WorkLimit,
     /// The maximum number of steps is reached.
     #[error("the continuation did not reach the end within 4000 steps; try fewer harmonics")]
-    Steps,
+    StepLimit,
 }
 /// Ratio of friction to the forces of the linear mode at which the continuation begins.
 /// Frequency and damping of the linear mode are then accurate to this ratio.
@@ -134,7 +134,7 @@ pub(super) struct ModeCurve {
     /// True if all motions below the last computed one are its multiples, because the joints
     /// stick.
     sticks: bool,
-    pub(super) lost: Option<Lost>,
+    pub(super) lost: Option<ModeEnd>,
 }
 
 impl ModeCurve {
@@ -144,7 +144,7 @@ impl ModeCurve {
         let modes = equations.linear_modes();
         let begun = equations.marched();
         let none = |linear| {
-            let lost = Lost { at: f64::INFINITY, reason: Reason::NoBeginning };
+            let lost = ModeEnd { at: f64::INFINITY, reason: ModeEndCause::NoStart };
             ModeCurve { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
@@ -193,15 +193,15 @@ impl ModeCurve {
             }
             let reason = match step {
                 _ if creeping > OVERDAMPED_WORK => {
-                    path.lost = Some(Lost { at: path.smallest_amplitude(), reason: Reason::Overdamped });
+                    path.lost = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::Overdamped });
                     return path;
                 }
                 _ if equations.marched() - begun > MEMORY_WORK => {
-                    path.lost = Some(Lost { at: path.smallest_amplitude(), reason: Reason::Dear });
+                    path.lost = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::WorkLimit });
                     return path;
                 }
-                _ if at > top => Reason::Merged,
-                _ if since > MAX_STEPS_WITHOUT_PROGRESS => Reason::Turned,
+                _ if at > top => ModeEndCause::Merged,
+                _ if since > MAX_STEPS_WITHOUT_PROGRESS => ModeEndCause::Turned,
                 Some(step) => {
                     if step.iterations <= FEW_ITERATIONS {
                         length = (1.5 * length).min(MAX_STEP);
@@ -216,17 +216,17 @@ impl ModeCurve {
                     length *= 0.5;
                     continue;
                 }
-                None => Reason::Stalled,
+                None => ModeEndCause::Stalled,
             };
             // continue with the same shape at a smaller amplitude
             let Some(next) = leap(equations, &path.arcs[lowest]) else {
-                path.lost = Some(Lost { at: path.arcs[lowest].amplitude, reason });
+                path.lost = Some(ModeEnd { at: path.arcs[lowest].amplitude, reason });
                 return path;
             };
             path.arcs.push(next);
             (length, lowest, since) = (INITIAL_STEP, path.arcs.len() - 1, 0);
         }
-        path.lost = Some(Lost { at: path.smallest_amplitude(), reason: Reason::Steps });
+        path.lost = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::StepLimit });
         path
     }
 
@@ -382,7 +382,7 @@ impl ModeCurve {
 
     /// Returns the parts of the curve that turn back and later continue to new, smaller
     /// amplitudes.
-    pub(super) fn turns(&self) -> Vec<Turn> {
+    pub(super) fn turns(&self) -> Vec<TurningPart> {
         let mut turns = Vec::new();
         let (mut least, mut up): (f64, Option<f64>) = (f64::INFINITY, None);
         for arc in &self.arcs {
@@ -390,8 +390,8 @@ impl ModeCurve {
             if a > least {
                 up = Some(up.map_or(a, |up| up.max(a)));
             } else {
-                let turn = up.take().map(|up| Turn { at: least, up });
-                turns.extend(turn.filter(|turn| turn.up > (1.0 + MIN_TURN) * turn.at));
+                let turn = up.take().map(|up| TurningPart { amplitude: least, return_amplitude: up });
+                turns.extend(turn.filter(|turn| turn.return_amplitude > (1.0 + MIN_TURN) * turn.amplitude));
                 least = a;
             }
         }

@@ -1,7 +1,7 @@
 //! The search for peaks between three points of a curve, with orbits that all quantities share.
 
 use super::bracket_reduction::{BracketReduction, negative_inverse_square, parabola};
-use super::{Peak, PeakOf, Point, Unsettled};
+use super::{CurvePoint, Peak, QuantityPeak, UnresolvedPeak};
 use crate::method::Solver;
 use crate::orbit::Orbit;
 use std::collections::BTreeMap;
@@ -43,7 +43,7 @@ const WORK_LIMIT: f64 = 1.0;
 /// Three points of a curve, with a maximum of some quantities in the middle, and the orbits that
 /// the searches added between them.
 pub(super) struct Bracket {
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<CurvePoint>,
     /// Initial distance of the ends, rad/s.
     width: f64,
     /// For each quantity, the frequency at which its last search ended (rad/s), and whether it
@@ -52,7 +52,7 @@ pub(super) struct Bracket {
 }
 
 impl Bracket {
-    pub(super) fn new(near: &[Point]) -> Self {
+    pub(super) fn new(near: &[CurvePoint]) -> Self {
         Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new() }
     }
 
@@ -87,10 +87,10 @@ impl Bracket {
             };
             effort += solver.effort();
             let point = match found {
-                Ok(orbit) => Point { omega, error, ..Point::new(&orbit, quantities) },
+                Ok(orbit) => CurvePoint { omega, error, ..CurvePoint::new(&orbit, quantities) },
                 Err(_) => {
                     failures += 1;
-                    Point::failed(omega)
+                    CurvePoint::failed(omega)
                 }
             };
             let at = points.partition_point(|point| point.omega < omega);
@@ -130,8 +130,8 @@ impl Bracket {
     fn is_cut_off(&self, top: usize, quantity: usize) -> bool {
         let here = &self.points[top];
         let value = here.value(quantity);
-        let jumps = |point: &Point| value - point.value(quantity) > STEEP_FALL * value;
-        let straight = |side: &mut dyn Iterator<Item = &Point>| {
+        let jumps = |point: &CurvePoint| value - point.value(quantity) > STEEP_FALL * value;
+        let straight = |side: &mut dyn Iterator<Item = &CurvePoint>| {
             let slopes = side.map(|point| {
                 let run = (here.omega - point.omega).abs();
                 (run, (negative_inverse_square(value) - negative_inverse_square(point.value(quantity))) / run)
@@ -142,7 +142,7 @@ impl Bracket {
             slope * UNBOUNDED_WITHIN * self.width > -negative_inverse_square(value)
                 && farther.is_some_and(|(_, other)| slope < MAX_SLOPE_RATIO * other)
         };
-        let at_end = |end: &Point| (here.omega - end.omega).abs() <= CLOSED_WIDTH * self.width && jumps(end);
+        let at_end = |end: &CurvePoint| (here.omega - end.omega).abs() <= CLOSED_WIDTH * self.width && jumps(end);
         let (left, right) = self.points.split_at(top);
         (jumps(&right[1]) && straight(&mut left.iter().rev()))
             || (jumps(&left[top - 1]) && straight(&mut right[1..].iter()))
@@ -157,23 +157,23 @@ impl Bracket {
     }
 
     /// Returns the peak of a quantity in its present state.
-    pub(super) fn peak(&self, quantity: usize) -> PeakOf {
+    pub(super) fn peak(&self, quantity: usize) -> QuantityPeak {
         let top = highest_inner(&self.points, quantity);
         let point = &self.points[top];
         let near = &self.points[top - 1..=top + 1];
-        let unsettled = if lacks_neighbours(near, quantity) {
-            Some(Unsettled::Neighbours)
+        let unresolved = if lacks_neighbours(near, quantity) {
+            Some(UnresolvedPeak::MissingNeighbours)
         } else if self.found(quantity) {
             None
         } else if is_too_narrow(near, quantity) {
-            Some(Unsettled::Needle)
+            Some(UnresolvedPeak::TooNarrow)
         } else if self.is_cut_off(top, quantity) {
-            Some(Unsettled::CutOff)
+            Some(UnresolvedPeak::CutOff)
         } else {
-            self.is_unfinished(top, quantity).then_some(Unsettled::Open)
+            self.is_unfinished(top, quantity).then_some(UnresolvedPeak::OrbitLimit)
         };
-        let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
-        PeakOf { quantity, peak, values: point.values.clone() }
+        let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unresolved };
+        QuantityPeak { quantity, peak, values: point.values.clone() }
     }
 }
 
@@ -181,10 +181,10 @@ impl Bracket {
 /// of three points.
 pub(super) fn refine(
     solver: &mut dyn Solver,
-    near: &[Point],
+    near: &[CurvePoint],
     wanted: &[usize],
     quantities: &dyn Fn(&Orbit) -> Vec<f64>,
-) -> Vec<PeakOf> {
+) -> Vec<QuantityPeak> {
     let mut bracket = Bracket::new(near);
     wanted.iter().for_each(|&quantity| bracket.refine(solver, quantity, quantities));
     bracket.repeat_overtaken(solver, quantities);
@@ -194,7 +194,7 @@ pub(super) fn refine(
 /// Returns the vertex value of the parabola through three points with the highest in the middle.
 /// It is an upper bound if the points are further apart than the width of the peak. It is
 /// infinite if they do not determine the height.
-pub(super) fn vertex_value(near: &[Point], quantity: usize) -> f64 {
+pub(super) fn vertex_value(near: &[CurvePoint], quantity: usize) -> f64 {
     let value = near[1].value(quantity);
     let (rise, _) = parabola(near, 1, quantity);
     // For small rises, the relative change of 1/a² is twice that of a; the square root is exact
@@ -205,7 +205,7 @@ pub(super) fn vertex_value(near: &[Point], quantity: usize) -> f64 {
 
 /// Tells whether an orbit next to the highest of three points is missing, and the line from the
 /// other side rises towards it.
-fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
+fn lacks_neighbours(near: &[CurvePoint], quantity: usize) -> bool {
     let rises = |other: usize, failed: usize| {
         let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
         let here = negative_inverse_square(near[1].value(quantity));
@@ -219,14 +219,14 @@ fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
 /// Tells whether a quantity falls steeply on both sides of the middle one of three points. Such
 /// a fall is larger than that of a kink or a fold in a closed bracket. Near a fold the fall is
 /// steep on one side only.
-fn is_too_narrow(near: &[Point], quantity: usize) -> bool {
+fn is_too_narrow(near: &[CurvePoint], quantity: usize) -> bool {
     let value = near[1].value(quantity);
-    let falls = |point: &Point| value - point.value(quantity) > STEEP_FALL * value;
+    let falls = |point: &CurvePoint| value - point.value(quantity) > STEEP_FALL * value;
     falls(&near[0]) && falls(&near[2])
 }
 
 /// Returns the index of the highest inner point; the first and the last point are not higher.
-pub(super) fn highest_inner(points: &[Point], quantity: usize) -> usize {
+pub(super) fn highest_inner(points: &[CurvePoint], quantity: usize) -> usize {
     (1..points.len() - 1)
         .max_by(|&a, &b| points[a].value(quantity).total_cmp(&points[b].value(quantity)))
         .unwrap_or(points.len() / 2)
@@ -249,8 +249,12 @@ mod tests {
     #[test]
     fn orbits_that_fail_leave_the_point_of_the_grid() {
         let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
-        let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 });
+        let near =
+            [0.9, 1.01, 1.1].map(|omega| CurvePoint { omega, values: vec![curve(omega)], start: None, error: 0.0 });
         let peak = refine(&mut Nothing, &near, &[0], &|_| Vec::new())[0].peak;
-        assert_eq!((peak.omega, peak.value, peak.unsettled), (1.01, curve(1.01), Some(Unsettled::Neighbours)));
+        assert_eq!(
+            (peak.omega, peak.value, peak.unresolved),
+            (1.01, curve(1.01), Some(UnresolvedPeak::MissingNeighbours))
+        );
     }
 }

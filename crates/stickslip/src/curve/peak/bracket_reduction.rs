@@ -5,7 +5,7 @@
 //! a few orbits. If the peak is a kink (the onset of slip), the intersection of two straight
 //! lines finds it.
 
-use super::Point;
+use super::CurvePoint;
 
 /// Predicted relative rise below which a peak counts as found: a hundred times the rounding of a
 /// closed orbit. The frequency is then accurate to 1e-5 of the peak's width.
@@ -43,7 +43,7 @@ pub(super) struct BracketReduction {
 
 impl BracketReduction {
     /// Returns the frequency of the next orbit; `None` if the peak is found.
-    pub(super) fn next(&mut self, points: &[Point], best: usize, quantity: usize, closest: f64) -> Option<f64> {
+    pub(super) fn next(&mut self, points: &[CurvePoint], best: usize, quantity: usize, closest: f64) -> Option<f64> {
         let [left, middle, right] = [best - 1, best, best + 1].map(|i| points[i].omega);
         let value = points[best].value(quantity);
         let (rise, vertex) = parabola(points, best, quantity);
@@ -95,7 +95,7 @@ pub(super) fn negative_inverse_square(value: f64) -> f64 {
 /// Returns the vertex of the parabola through a point and its neighbours: its rise above the
 /// point, relative to the quantity, and its frequency. The rise is infinite without a parabola
 /// (a failed neighbour, a straight line).
-pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, Option<f64>) {
+pub(super) fn parabola(points: &[CurvePoint], best: usize, quantity: usize) -> (f64, Option<f64>) {
     let [a, x, b] = [best - 1, best, best + 1].map(|i| points[i].omega);
     let [fa, fx, fb] = [best - 1, best, best + 1].map(|i| negative_inverse_square(points[i].value(quantity)));
     let (left, right) = ((fx - fa) / (x - a), (fx - fb) / (b - x));
@@ -112,7 +112,7 @@ pub(super) fn parabola(points: &[Point], best: usize, quantity: usize) -> (f64, 
 
 /// Returns the intersection of the two straight lines through the points left and right of the
 /// best one, and the interpolated function there.
-fn line_intersection(points: &[Point], best: usize, quantity: usize) -> Option<(f64, f64)> {
+fn line_intersection(points: &[CurvePoint], best: usize, quantity: usize) -> Option<(f64, f64)> {
     let at = |i: usize| Some((points.get(i)?.omega, negative_inverse_square(points.get(i)?.value(quantity))));
     let (before, after) = (at(best.checked_sub(2)?)?, at(best + 2)?);
     let (left, here, right) = (at(best - 1)?, at(best)?, at(best + 1)?);
@@ -136,7 +136,7 @@ mod tests {
     /// Refines the middle one of three points of a given curve. Returns frequency, value and
     /// number of evaluations.
     fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
-        let point = |omega: f64| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 };
+        let point = |omega: f64| CurvePoint { omega, values: vec![curve(omega)], start: None, error: 0.0 };
         let mut points = vec![point(a), point(x), point(b)];
         let mut shrink = BracketReduction::default();
         let mut count = 0;

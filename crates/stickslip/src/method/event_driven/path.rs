@@ -4,7 +4,7 @@ use super::flow::{Segment, SegmentedMotion};
 use super::mechanics::{Part, Share};
 use super::tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
 use crate::law::Contact;
-use crate::method::Breakdown;
+use crate::method::IntegrationError;
 use crate::method::periodic::{Closed, norm};
 use crate::method::vibration;
 use crate::model::{Axis, System};
@@ -53,7 +53,7 @@ pub(super) fn orbit(
     (omega, periods): (f64, usize),
     symmetry: Symmetry,
     (closed, weights): (Closed, &[f64]),
-) -> Result<Orbit, Breakdown> {
+) -> Result<Orbit, IntegrationError> {
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
     let measured = results(system, &Measuring::new(&path), omega, (symmetry, period))?;
@@ -65,21 +65,21 @@ pub(super) fn orbit(
         omega,
         periods,
         symmetry,
-        start: closed.state,
+        initial_state: closed.state,
         evidence: Evidence {
             residual: closed.residual,
             energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, STORED * stored)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             harmonics: None,
-            truncation: closed.missing,
+            error_estimate: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
-            history: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
+            history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
             found_by: NAME,
-            instead_of: None,
+            fallback_from: None,
         },
         places: measured.places,
         joints: measured.joints,
@@ -276,7 +276,7 @@ impl<'a> Measuring<'a> {
     }
 
     /// Returns the least and the largest value of a signal.
-    fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), Breakdown> {
+    fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), IntegrationError> {
         let mut memory = self.memory.borrow_mut();
         let mut range = Range::new(self.path.symmetry == Symmetry::HalfPeriod);
         // values known from all pieces reduce the search in each of them
@@ -288,7 +288,7 @@ impl<'a> Measuring<'a> {
             piece
                 .basis()
                 .extend(&mut range, (&signal[coefficients], at_end), *length, &mut memory)
-                .map_err(|_| Breakdown::TooFast { time: *start })?;
+                .map_err(|_| IntegrationError::TooFast { time: *start })?;
         }
         Ok((range.low, range.high))
     }
@@ -308,7 +308,7 @@ impl<'a> Measuring<'a> {
 /// that axes and joints have the same indices.
 impl PathSignals for Measuring<'_> {
     type Signal = Vec<Complex64>;
-    type Error = Breakdown;
+    type Error = IntegrationError;
 
     fn displacement(&self, row: usize) -> Vec<Complex64> {
         self.kept(row, |piece| &piece.segment.displacement)
@@ -353,10 +353,10 @@ impl PathSignals for Measuring<'_> {
         }
         sum
     }
-    fn range(&self, place: &Axis) -> Result<(f64, f64), Breakdown> {
+    fn range(&self, place: &Axis) -> Result<(f64, f64), IntegrationError> {
         self.range_of(&self.place_displacement(place))
     }
-    fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
+    fn relative_range(&self, axis: usize) -> Result<(f64, f64), IntegrationError> {
         self.range_of(&self.relative(axis))
     }
     /// Returns the dissipation of the sliders alone, because springs and stops return all their
@@ -449,7 +449,7 @@ impl Path for ExactPath {
                 let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
                 let of_share = |s: &Share| s.of(piece.segment.contacts[s.part]) * row(&piece.segment.force, s.part);
                 let force = self.of_joint(j).map(of_share).sum();
-                JointSample::along(joint_displacement, joint_velocity, force, contact)
+                JointSample::one_dimensional(joint_displacement, joint_velocity, force, contact)
             })
             .collect();
         let moved = (0..self.system.moved_places().len())
@@ -459,10 +459,10 @@ impl Path for ExactPath {
                 (sign * real_dot(&motion, &values), sign * real_dot(&reaction, &values))
             })
             .collect();
-        Sample { acceleration, displacement, velocity, joints, moved }
+        Sample { acceleration, displacement, velocity, joints, imposed: moved }
     }
 
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         let inner = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
         // a switch can also coincide with the start of the return
         let at_cut = self.pieces.first().zip(self.pieces.last()).is_some_and(|(first, last)| {

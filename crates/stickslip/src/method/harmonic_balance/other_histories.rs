@@ -23,10 +23,10 @@ impl Balance {
     /// was found. With all joints stuck the equations are linear, and nothing changes.
     pub(super) fn history_spread(&mut self, orbit: &Orbit, omega: f64) -> Option<f64> {
         let sticks = orbit.joints.iter().all(|joint| joint.slip_fraction == 0.0 && joint.open_fraction == 0.0);
-        if orbit.evidence.history.is_empty() || sticks {
+        if orbit.evidence.history_dependent.is_empty() || sticks {
             return None;
         }
-        let found = self.recent.front().filter(|recent| recent.start == orbit.start)?;
+        let found = self.recent.front().filter(|recent| recent.start == orbit.initial_state)?;
         let (top, motion) = (found.top, found.motion.clone());
         let own = self.places(top, omega, &motion).ok()?;
         let states = self.ports.static_states();

@@ -179,25 +179,25 @@ pub(super) fn orbit(
         omega,
         periods: 1,
         symmetry,
-        start,
+        initial_state: start,
         evidence: Evidence {
             residual: motion.residual,
             energy_gap: measured.energy_gap(still(system, omega)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: motion.iterations,
             harmonics: top,
-            truncation,
+            error_estimate: truncation,
             return_defect: defect,
             accuracy: match truncation {
                 Some(error) if error <= tolerance => Accuracy::Converged,
                 Some(_) => Accuracy::Truncated,
                 None => Accuracy::Unchecked,
             },
-            history: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
+            history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
             found_by: motion.found_by.name(),
-            instead_of: None,
+            fallback_from: None,
         },
         places: measured.places,
         joints: measured.joints,
@@ -491,7 +491,8 @@ impl Path for Series {
                 let at = time / period * samples as f64;
                 let (low, part) = (at.floor() as usize, at.fract());
                 let (before, after) = (self.force[j][low % samples], self.force[j][(low + 1) % samples]);
-                let mut sample = JointSample::along(0.0, 0.0, 0.0, self.contact[j][(at.round() as usize) % samples]);
+                let mut sample =
+                    JointSample::one_dimensional(0.0, 0.0, 0.0, self.contact[j][(at.round() as usize) % samples]);
                 for (a, axis) in joint.axes().iter().enumerate() {
                     sample.displacement[a] = axis.component(&x);
                     sample.velocity[a] = axis.component(&v);
@@ -515,10 +516,10 @@ impl Path for Series {
             now.1 +=
                 forces.iter().zip(&self.system.moved_places()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
         }
-        Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
+        Sample { displacement: x, velocity: v, acceleration: a, joints, imposed: moved_now }
     }
 
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         let period = TAU / self.omega;
         let mut times: Vec<f64> = self
             .contact

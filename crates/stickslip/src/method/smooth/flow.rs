@@ -6,7 +6,7 @@
 
 use super::step::{Eliminated, StageLoads, Step, points};
 use crate::law::{RatePoint, RelativeMotion};
-use crate::method::Breakdown;
+use crate::method::IntegrationError;
 use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -318,15 +318,15 @@ impl SmoothFlow {
     /// The motion diverges (in finite time if a force grows faster than the displacement), a
     /// law returns NaN, or the equations are too stiff. `speed` is the velocity scale at the
     /// start, m/s.
-    fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> Breakdown {
+    fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> IntegrationError {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
         if fastest > ESCAPED * speed {
-            return Breakdown::Unbounded { time, place: self.assembly.farthest(state) };
+            return IntegrationError::Unbounded { time, place: self.assembly.farthest(state) };
         }
         match self.step.without_number(&self.assembly) {
             Some(joint) => joint.no_number(time),
-            None => Breakdown::Stalled { time, step },
+            None => IntegrationError::Stalled { time, step },
         }
     }
 
@@ -431,7 +431,7 @@ impl Flow for SmoothFlow {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         if self.stretch != duration {
             self.stretch = duration;
             self.eliminated.fill(None);
@@ -473,7 +473,7 @@ impl Flow for SmoothFlow {
             self.set_loads(time, h);
             self.predict(state, h, last, time);
             let Some(eliminated) = &self.eliminated[self.level] else {
-                return Err(Breakdown::Stalled { time, step: h });
+                return Err(IntegrationError::Stalled { time, step: h });
             };
             let how = (scale.1, sensitivity.is_some());
             let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, how);
@@ -490,11 +490,11 @@ impl Flow for SmoothFlow {
                 continue;
             }
             let Some(eliminated) = &self.eliminated[self.level] else {
-                return Err(Breakdown::Stalled { time, step: h });
+                return Err(IntegrationError::Stalled { time, step: h });
             };
             self.step.end(&self.assembly, eliminated, &self.loads, &mut self.next);
             if self.next.iter().any(|z| !z.is_finite()) {
-                return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(&self.next) });
+                return Err(IntegrationError::Unbounded { time, place: self.assembly.farthest(&self.next) });
             }
             if let Some(sensitivity) = sensitivity.as_deref() {
                 self.step.carry(&self.assembly, eliminated, &mut self.derivative, sensitivity.ncols());

@@ -20,7 +20,7 @@ use crate::method::smooth::flow::{onward, slope};
 use crate::method::smooth::step::{Eliminated, StageLoads, Step, points};
 use crate::method::stepped::SteppedPath;
 use crate::method::steps::Steps;
-use crate::method::{Breakdown, MethodError};
+use crate::method::{IntegrationError, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -245,7 +245,7 @@ impl SwitchedFlow {
 
     /// Determines the modes at the start of a run: moving joints slip, and joints at rest are
     /// decided.
-    fn begin(&mut self, state: &mut [f64], scale: f64) -> Result<(), Breakdown> {
+    fn begin(&mut self, state: &mut [f64], scale: f64) -> Result<(), IntegrationError> {
         let mut resting = Vec::new();
         for k in 0..self.frictions.len() {
             let friction = &self.frictions[k];
@@ -262,7 +262,7 @@ impl SwitchedFlow {
     }
 
     /// Decides on joints at rest. Sets the velocity of stuck ones exactly to zero.
-    fn rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), Breakdown> {
+    fn rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), IntegrationError> {
         if !resting.is_empty() {
             let axes: Vec<usize> = resting.iter().map(|&k| self.frictions[k].axis).collect();
             let limits: Vec<f64> = resting.iter().map(|&k| self.frictions[k].limit).collect();
@@ -271,7 +271,7 @@ impl SwitchedFlow {
             self.answer(state, time);
             let free: Vec<f64> = axes.iter().map(|&axis| self.acceleration(axis, time)).collect();
             let modes = decide(&mobility(&self.assembly, &axes), &free, &limits);
-            let modes = modes.ok_or(Breakdown::Undecidable { time })?;
+            let modes = modes.ok_or(IntegrationError::NoContactState { time })?;
             resting.iter().zip(modes).for_each(|(&k, mode)| self.frictions[k].mode = mode);
         }
         self.enter_modes();
@@ -282,9 +282,9 @@ impl SwitchedFlow {
         if stopped && self.set_slope(state, time) { Ok(()) } else { Err(self.redundant(time)) }
     }
 
-    fn redundant(&self, time: f64) -> Breakdown {
+    fn redundant(&self, time: f64) -> IntegrationError {
         let joint = self.held().next().map_or(0, |friction| friction.joint);
-        Breakdown::Redundant { time, joint: self.assembly.joints[joint].joint.clone() }
+        IntegrationError::Redundant { time, joint: self.assembly.joints[joint].joint.clone() }
     }
 
     /// Projects the sensitivity at a stop of velocities.
@@ -504,7 +504,7 @@ impl SwitchedFlow {
         state: &mut [f64],
         (time, scale): (f64, f64),
         columns: usize,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         let friction = &mut self.frictions[switch.friction];
         if friction.mode == Mode::Held {
             // the force and all other quantities are continuous
@@ -580,10 +580,10 @@ impl SwitchedFlow {
         (end as f64 * tick - begin.time, end)
     }
 
-    fn stalled(&self, (time, step): (f64, f64)) -> Breakdown {
+    fn stalled(&self, (time, step): (f64, f64)) -> IntegrationError {
         match self.step.without_number(&self.assembly) {
             Some(joint) => joint.no_number(time),
-            None => Breakdown::Stalled { time, step },
+            None => IntegrationError::Stalled { time, step },
         }
     }
 
@@ -610,7 +610,7 @@ impl SwitchedFlow {
         (begin, last): (Begin, Option<f64>),
         scale: (f64, f64),
         columns: usize,
-    ) -> Result<(Begin, Option<f64>, bool), Breakdown> {
+    ) -> Result<(Begin, Option<f64>, bool), IntegrationError> {
         loop {
             let (h, end) = self.length(begin);
             if self.tried >= STEP_LIMIT || self.level > LEVELS {
@@ -661,7 +661,7 @@ impl SwitchedFlow {
         state: &mut [f64],
         (before, time): (f64, f64),
         columns: usize,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         if columns > 0 {
             let mut derivative = std::mem::take(&mut self.derivative);
             self.step.carry(&self.assembly, eliminated, &mut derivative, columns);
@@ -713,7 +713,7 @@ impl Flow for SwitchedFlow {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         if self.stretch != duration {
             self.stretch = duration;
             self.eliminated.fill(None);
@@ -740,7 +740,7 @@ impl Flow for SwitchedFlow {
             if switches > SWITCH_LIMIT {
                 let joint = self.frictions.first().map_or(0, |friction| friction.joint);
                 let joint = self.assembly.joints[joint].joint.clone();
-                return Err(Breakdown::Chatter { time: next.time, switches, joint });
+                return Err(IntegrationError::Chatter { time: next.time, switches, joint });
             }
             (begin, last) = (next, length);
         }

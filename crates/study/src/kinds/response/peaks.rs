@@ -2,8 +2,8 @@
 
 use super::super::peak_of::{named_places, worst};
 use crate::work::{Prepared, Work};
-use stickslip::curve::bidirectional_sweep::stretches;
-use stickslip::curve::peak::{self, Peak, Point, held};
+use stickslip::curve::bidirectional_sweep::other_intervals;
+use stickslip::curve::peak::{self, CurvePoint, Peak, held_amplitude};
 use stickslip::method::MethodError;
 use stickslip::model::System;
 use stickslip::orbit::{Orbit, PlaceMotion};
@@ -46,7 +46,7 @@ impl Sought {
         let Self { named, .. } = self;
         if named.is_empty() {
             // rotations have no peaks, because they are not lengths
-            let height = |place: &PlaceMotion| if place.radius.is_some() { 0.0 } else { place.amplitude() };
+            let height = |place: &PlaceMotion| if place.rotation_radius.is_some() { 0.0 } else { place.amplitude() };
             return orbit.places.iter().map(height).collect();
         }
         std::iter::once(worst(orbit, named)).chain(named.iter().map(|place| orbit.places[*place].amplitude())).collect()
@@ -104,9 +104,9 @@ impl Found {
 
 /// Returns the peaks of both sweeps by frequency; `others` are the other orbits of the reverse
 /// sweep.
-pub(super) fn all(work: &Work<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<Found>, MethodError> {
+pub(super) fn all(work: &Work<'_>, points: Vec<CurvePoint>, others: &[CurvePoint]) -> Result<Vec<Found>, MethodError> {
     let mut of_others = Vec::new();
-    for stretch in stretches(&points, others) {
+    for stretch in other_intervals(&points, others) {
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
         let neighbours: Vec<f64> = stretch.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
         let found = peaks_of(work, stretch)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
@@ -140,18 +140,18 @@ fn is_same(there: &Found, back: &Found, omegas: &[f64]) -> bool {
 ///
 /// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
 /// than to that of the reverse sweep, and not higher.
-fn is_of_the_way_there(found: &Found, points: &[Point], others: &[Point], sought: &Sought) -> bool {
-    let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
+fn is_of_the_way_there(found: &Found, points: &[CurvePoint], others: &[CurvePoint], sought: &Sought) -> bool {
+    let distance = |point: &&CurvePoint| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
     let there = points.iter().find(|point| point.omega == own.omega);
-    let value = |point: &Point| point.values.get(sought.quantity(found)).copied();
+    let value = |point: &CurvePoint| point.values.get(sought.quantity(found)).copied();
     let (Some(there), Some(own)) = (there.and_then(value), value(own)) else { return false };
     there >= found.peak.value && there - found.peak.value < (own - found.peak.value).abs()
 }
 
 /// Returns true if a peak is only the jump of the forward sweep to a branch on which the
 /// reverse sweep reaches a higher amplitude.
-fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> bool {
+fn is_edge(found: &Found, omegas: &[f64], others: &[CurvePoint], sought: &Sought) -> bool {
     let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
     let next = omegas.iter().find(|omega| **omega > other.omega);
@@ -162,7 +162,7 @@ fn is_edge(found: &Found, omegas: &[f64], others: &[Point], sought: &Sought) -> 
 /// Returns the peaks of a range of a curve by frequency.
 ///
 /// An end of the whole curve is a peak at the range end if the curve falls from it.
-fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodError> {
+fn peaks_of(work: &Work<'_>, points: Vec<CurvePoint>) -> Result<Vec<Found>, MethodError> {
     let prepared = work.case();
     let sought = Sought::new(prepared);
     let count = sought.amplitudes_count();
@@ -172,12 +172,12 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
         .as_ref()
         .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
     let wanted = if sought.named.is_empty() { count } else { 1 };
-    let at_end = |end: &Point, neighbour: &Point| -> Vec<Found> {
+    let at_end = |end: &CurvePoint, neighbour: &CurvePoint| -> Vec<Found> {
         let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
         (0..wanted.min(end.values.len()))
             .filter(falls)
             .map(|q| {
-                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
+                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unresolved: None };
                 Found { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), way_back: false }
             })
             .collect()
@@ -195,9 +195,9 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
     }
     // the amplitude of a place held by friction is rounding only
     let largest = points.iter().flat_map(|point| point.values.iter().take(count)).fold(0.0f64, |a, b| a.max(*b));
-    let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held(&prepared.system, peak.omega));
+    let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held_amplitude(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
-    let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
+    let mut inner = peak::local_peaks(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
     inner.retain(|found| !ends_a_level(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
@@ -209,9 +209,9 @@ fn peaks_of(work: &Work<'_>, points: Vec<Point>) -> Result<Vec<Found>, MethodErr
 /// Returns true if a peak is only the end of a level range.
 ///
 /// An example is a mass that moves with its support until a joint slips.
-fn ends_a_level(points: &[Point], quantity: usize, peak: &Peak) -> bool {
+fn ends_a_level(points: &[CurvePoint], quantity: usize, peak: &Peak) -> bool {
     let at = points.partition_point(|point| point.omega < peak.omega);
-    let as_high = |point: &Point| {
+    let as_high = |point: &CurvePoint| {
         point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL * peak.value)
     };
     at >= 2 && points[at - 2..at].iter().all(as_high)

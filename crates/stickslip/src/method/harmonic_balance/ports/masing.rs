@@ -511,7 +511,11 @@ mod tests {
                 let lost = (found.energy.friction / loss - 1.0).abs();
                 let said = format!("{} {chi} {beta} {frequency}: {off:.1e} {lost:.1e}", method.name());
                 assert!(off < allowed && lost < 4.0 * allowed, "{said}");
-                assert!(found.evidence.truncation.is_none_or(|error| error < allowed), "{said} {:?}", found.evidence);
+                assert!(
+                    found.evidence.error_estimate.is_none_or(|error| error < allowed),
+                    "{said} {:?}",
+                    found.evidence
+                );
                 assert!(found.evidence.return_defect.is_none_or(|defect| defect < 1e-3), "{said} {:?}", found.evidence);
             }
         }
