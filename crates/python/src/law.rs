@@ -8,7 +8,7 @@ use pyo3::types::{PyDict, PyString};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::law::{self, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw};
+use stickslip::law::{self, LawInfo, MAX_DIRECTIONS, Parameter, SharedLaw};
 
 /// The friction or contact law of a joint, made by `stickslip.law` or `stickslip.rate_law`.
 ///
@@ -145,10 +145,10 @@ impl PyLaw {
 
 /// Returns a law with another value (SI) of one parameter, or the reason why it is invalid.
 pub fn with(law: &SharedLaw, key: &str, value: f64) -> Result<SharedLaw, String> {
-    let changed = law.with(key, value).ok_or_else(|| format!("law `{}` has no parameter `{key}`", law.name()))?;
+    let changed = law.with_value(key, value).ok_or_else(|| format!("law `{}` has no parameter `{key}`", law.name()))?;
     // The symmetry of a law written in Python was tested when it was made.
     let checked = if python_law::is_written(law) {
-        changed.consistent()
+        changed.check_consistency()
     } else {
         changed.check().map_err(|cause| cause.to_string())
     };
@@ -213,7 +213,7 @@ pub fn named(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyDict>>)
             let default = || row.parameters.iter().find(|other| other.key == key).and_then(|other| other.default);
             values.get(key).copied().or_else(default)
         };
-        let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
+        let dimension = parameter.dimension_for(of).unwrap_or(Dimension::NONE);
         let what = format!("`{}` of law `{name}`", parameter.key);
         values.insert(parameter.key, quantity::si(value, dimension, &what)?);
     }
@@ -232,7 +232,7 @@ pub fn laws(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     for row in law::TABLE {
         let (entry, parameters) = (PyDict::new(py), PyDict::new(py));
         for parameter in row.parameters {
-            parameters.set_item(parameter.key, format!("{}: {}", parameter.takes(), parameter.doc))?;
+            parameters.set_item(parameter.key, format!("{}: {}", parameter.describe_values(), parameter.doc))?;
         }
         entry.set_item("summary", row.summary)?;
         entry.set_item("parameters", parameters)?;
@@ -278,8 +278,8 @@ pub fn _rate_law(
     odd: bool,
     passive: bool,
 ) -> PyResult<PyLaw> {
-    if !(1..=MOST_DIRECTIONS).contains(&directions) {
-        return Err(error::model(py, format!("a law has 1 to {MOST_DIRECTIONS} directions, found {directions}")));
+    if !(1..=MAX_DIRECTIONS).contains(&directions) {
+        return Err(error::model(py, format!("a law has 1 to {MAX_DIRECTIONS} directions, found {directions}")));
     }
     let (mut keys, mut values) = (Vec::new(), Vec::new());
     for (key, value) in parameters {
@@ -300,6 +300,6 @@ pub fn _rate_law(
     law.scale = size(scale, "scale", name, &keys)?;
     let written = law.shared();
     let law = written.law(values);
-    law.consistent().map_err(|message| error::model(py, format!("law `{name}`: {message}")))?;
+    law.check_consistency().map_err(|message| error::model(py, format!("law `{name}`: {message}")))?;
     Ok(PyLaw { law, written: Some(written) })
 }

@@ -18,11 +18,12 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use stickslip::curve::modes::{ModeRequest, mode};
+use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 use stickslip::dimension::Dimension;
 use stickslip::method::{self, Method, Options, Solver, advised};
 use stickslip::model::{
-    Around, Disk, Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
+    Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure, SubstructureDamping,
+    System,
 };
 use stickslip::structure::Reduction;
 use stickslip_study::dataset::{Column, Dataset, Failure, Figure, Record, Table};
@@ -50,7 +51,7 @@ use stickslip_study::run::{CONVERGED, NOT_REACHED};
 pub struct PyModel {
     model: Model,
     /// Distribution of each force and each imposed motion around a disk, if given.
-    around: [Vec<Option<Around>>; 2],
+    around: [Vec<Option<SectorDistribution>>; 2],
     /// Study and index of the case that the model comes from. Its structure by matrices then
     /// belongs to the study.
     study: Option<(PyStudy, usize)>,
@@ -159,11 +160,11 @@ impl PyModel {
             }
         };
         let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
-        if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.start.len()) {
+        if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.initial_state.len()) {
             let message = format!(
                 "`start` has {} numbers, and by this method an orbit of this model begins with {}: give the `start` of such an orbit",
                 start.len(),
-                orbit.start.len()
+                orbit.initial_state.len()
             );
             return Err(error::model(py, message));
         }
@@ -312,7 +313,7 @@ impl PyModel {
             None => Reduction::None { up_to: 0.0 },
             Some(reduce) => Reduction::up_to(quantity::si(&reduce, Dimension::FREQUENCY, "reduce")?),
         };
-        let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: None });
+        let substructure = Some(Substructure { component, damping, reduction, earlier_reduction: None, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
         let model = made.model.clone();
         apart(py, move || model.assemble().map(drop))?.map_err(|cause| refused(py, &cause, &made.model))?;
@@ -437,9 +438,9 @@ impl PyModel {
     #[pyo3(signature = (sectors, *, mistuning=None))]
     fn disk(&self, py: Python<'_>, sectors: usize, mistuning: Option<&Bound<'_, PyAny>>) -> PyResult<PyModel> {
         let mistuning = mistuning.map(|given| quantity::dictionary(given, "`mistuning`")).transpose()?;
-        let all = |which: usize, count: usize| -> Vec<Around> {
+        let all = |which: usize, count: usize| -> Vec<SectorDistribution> {
             let said = |i: usize| self.around[which].get(i).copied().flatten();
-            (0..count).map(|i| said(i).unwrap_or(Around::EngineOrder(0))).collect()
+            (0..count).map(|i| said(i).unwrap_or(SectorDistribution::EngineOrder(0))).collect()
         };
         let forces = all(0, self.model.forces.len());
         let disk = Disk { sectors, forces, motions: all(1, self.model.motions.len()) };
@@ -487,7 +488,7 @@ impl PyModel {
     fn matrices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let system = self.system(py)?;
         let structure = system.structure();
-        if structure.dofs() > stickslip::structure::MOST_IN_FULL {
+        if structure.dofs() > stickslip::structure::MAX_FULL_DOFS {
             return Err(error::model(py, format!("matrices of {} places are too large in full", structure.dofs())));
         }
         let out = PyDict::new(py);
@@ -524,8 +525,9 @@ impl PyModel {
         out.set_item("method", choice.to_string())?;
         if asked.system.dofs() <= MOST_SURVEYED {
             let survey = alone(py, || self.model.survey())?.map_err(|cause| refused(py, &cause, &self.model))?;
-            let hertz =
-                |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
+            let hertz = |modes: &stickslip::model::LinearModes| {
+                modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>()
+            };
             out.set_item("free_Hz", hertz(survey.free()))?;
             out.set_item("stuck_Hz", hertz(survey.stuck()))?;
         }
@@ -677,12 +679,12 @@ impl PyModel {
         let request = ModeRequest { mode: mode - 1, range: (low, high), points, harmonics, samples };
         let system = Arc::new(system);
         let moved = system.clone();
-        let outcome = apart(py, move || self::mode(&moved, request))?;
+        let outcome = apart(py, move || self::nonlinear_mode(&moved, request))?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
         let (table, figure) = drawn::mode(&found, &system);
         let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);
         told.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
-        told.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
+        told.notes.extend(found.ended.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
         Ok(self.result("modes", "Nonlinear mode", vec![table], figure, told))
     }
 

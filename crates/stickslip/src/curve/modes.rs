@@ -17,7 +17,8 @@
 //! Small effects, such as the number of harmonics, decide which mode continues which. The curve
 //! may also turn there. Its amplitude then grows again before it falls, and the motion at the
 //! next smaller amplitude is a different one ([`Mode::turns`]). If the curve does not return, the
-//! mode ends ([`ModeEnd`]). Source: the extended periodic motion concept of Krack (2015).
+//! mode ends ([`ModeEnd`]).
+//! Source: the extended periodic motion concept of Krack (2015).
 
 mod mode_curve;
 

@@ -60,8 +60,8 @@ pub(crate) fn laws(system: &System) -> impl Iterator<Item = &SharedLaw> {
     system.joints().iter().map(|joint| joint.law())
 }
 
-/// Returns the names of joints whose history affects the orbit: see [`Evidence::history_dependent`]. The
-/// laws are those that the method used.
+/// Returns the names of joints whose history affects the orbit: see
+/// [`Evidence::history_dependent`]. The laws are those that the method used.
 pub(crate) fn history_dependent_joints<'a>(
     laws: impl Iterator<Item = &'a SharedLaw>,
     joints: &[JointMotion],
