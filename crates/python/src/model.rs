@@ -679,7 +679,7 @@ impl PyModel {
         let request = ModeRequest { mode: mode - 1, range: (low, high), points, harmonics, samples };
         let system = Arc::new(system);
         let moved = system.clone();
-        let outcome = apart(py, move || self::nonlinear_mode(&moved, request))?;
+        let outcome = apart(py, move || nonlinear_mode(&moved, request))?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
         let (table, figure) = drawn::mode(&found, &system);
         let mut told = Told::of(&[], &|_| String::new(), Vec::new(), 1, start);

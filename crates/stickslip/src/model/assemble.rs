@@ -126,7 +126,7 @@ impl AssembledMatrices {
 }
 
 /// Amplitudes of an imposed motion by harmonic.
-type Harmonics = BTreeMap<u32, Complex64>;
+type HarmonicAmplitudes = BTreeMap<u32, Complex64>;
 
 impl Assembler<'_> {
     /// Returns the sum of places with the given signs, as weights of the free and then the
@@ -242,8 +242,8 @@ impl Assembler<'_> {
     }
 
     /// Returns the motion of every moved place.
-    fn motions(&self) -> Result<Vec<Harmonics>, ModelError> {
-        let mut motions = vec![Harmonics::new(); self.coordinates.moved];
+    fn motions(&self) -> Result<Vec<HarmonicAmplitudes>, ModelError> {
+        let mut motions = vec![HarmonicAmplitudes::new(); self.coordinates.moved];
         for (i, motion) in self.model.motions.iter().enumerate() {
             let element = Element::Motion(i);
             let value = harmonic_amplitude(motion.amplitude, motion.phase, element)?;
@@ -257,8 +257,8 @@ impl Assembler<'_> {
     }
 
     /// Adds the forces on free coordinates and returns those on moved coordinates.
-    fn forces(&self, mut builder: SystemBuilder) -> Result<(SystemBuilder, Vec<Harmonics>), ModelError> {
-        let mut on_moved = vec![Harmonics::new(); self.coordinates.moved];
+    fn forces(&self, mut builder: SystemBuilder) -> Result<(SystemBuilder, Vec<HarmonicAmplitudes>), ModelError> {
+        let mut on_moved = vec![HarmonicAmplitudes::new(); self.coordinates.moved];
         for (i, force) in self.model.forces.iter().enumerate() {
             let element = Element::Force(i);
             let value = harmonic_amplitude(force.amplitude, force.phase, element)?;
@@ -293,7 +293,7 @@ impl Assembler<'_> {
         &self,
         mut builder: SystemBuilder,
         matrices: &AssembledMatrices,
-        motions: &[Harmonics],
+        motions: &[HarmonicAmplitudes],
     ) -> SystemBuilder {
         let (n, zero) = (self.coordinates.free, Complex64::new(0.0, 0.0));
         for (k, motion) in motions.iter().enumerate() {
@@ -317,7 +317,7 @@ impl Assembler<'_> {
     fn joints(
         &self,
         mut builder: SystemBuilder,
-        motions: &[Harmonics],
+        motions: &[HarmonicAmplitudes],
     ) -> Result<(SystemBuilder, Vec<Vec<f64>>), ModelError> {
         let mut signs = vec![Vec::new(); self.coordinates.moved];
         for (j, joint) in self.model.joints.iter().enumerate() {
@@ -325,8 +325,8 @@ impl Assembler<'_> {
             joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
             check_distinct(&joint.between, element)?;
             let mut axes = Vec::new();
-            let faces = (joint.law.directions(), joint.law.normal());
-            for (along, [a, b]) in self.places.axes(&joint.between, faces, element)? {
+            let (directions, normal) = (joint.law.directions(), joint.law.normal());
+            for (along, [a, b]) in self.places.axes(&joint.between, directions, normal, element)? {
                 signs.iter_mut().for_each(|signs| signs.push(0.0));
                 let (axis, moved) = self.axis(&self.row_of(&[(a, 1.0), (b, -1.0)]));
                 let mut imposed = Vec::new();
@@ -349,7 +349,7 @@ impl Assembler<'_> {
         &self,
         mut builder: SystemBuilder,
         matrices: &AssembledMatrices,
-        (motions, forces): (&[Harmonics], &[Harmonics]),
+        (motions, forces): (&[HarmonicAmplitudes], &[HarmonicAmplitudes]),
         signs: &[Vec<f64>],
     ) -> SystemBuilder {
         let Coordinates { free: n, moved, .. } = self.coordinates;
@@ -358,7 +358,7 @@ impl Assembler<'_> {
             let row = |entry: &dyn Fn(usize, usize) -> f64| {
                 (DVector::from_fn(n, |i, _| entry(n + k, i)), (0..moved).map(|i| entry(n + k, n + i)).collect())
             };
-            let list = |harmonics: &Harmonics| harmonics.iter().map(|(h, a)| (*h, *a)).collect();
+            let list = |harmonics: &HarmonicAmplitudes| harmonics.iter().map(|(h, a)| (*h, *a)).collect();
             builder = builder.moved(MovedPlace {
                 name: name.clone(),
                 motion: list(&motions[k]),

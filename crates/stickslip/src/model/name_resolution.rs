@@ -132,18 +132,18 @@ impl Places {
                 return Err(ModelError::new(element, "normal", message));
             }
             if place.view_of.is_none() {
-                collected.node(element, (&place.name, &place.directions), |along| PlaceSource::Component(i, along))?;
+                collected.node(element, &place.name, &place.directions, |along| PlaceSource::Component(i, along))?;
             }
         }
         for (i, mass) in model.masses.iter().enumerate() {
-            collected.node(Element::Mass(i), (&mass.name, &mass.directions), |_| PlaceSource::Own(mass.mass))?;
+            collected.node(Element::Mass(i), &mass.name, &mass.directions, |_| PlaceSource::Own(mass.mass))?;
         }
         for (i, body) in model.bodies.iter().enumerate() {
             collected.body(i, body)?;
         }
         for (i, place) in model.places.iter().enumerate().filter(|(_, place)| place.view_of.is_some()) {
             check_view(model, place, Element::Place(i))?;
-            collected.node(Element::Place(i), (&place.name, &place.directions), |along| PlaceSource::View(i, along))?;
+            collected.node(Element::Place(i), &place.name, &place.directions, |along| PlaceSource::View(i, along))?;
         }
         collected.moved(model)?;
         let PlaceCollector { places, columns, .. } = collected;
@@ -189,7 +189,8 @@ impl Places {
     pub fn axes(
         &self,
         between: &[String; 2],
-        (count, normal): (usize, Option<usize>),
+        count: usize,
+        normal: Option<usize>,
         element: Element,
     ) -> Result<Vec<JointDirection<'_>>, ModelError> {
         let key = "between";
@@ -296,7 +297,8 @@ impl PlaceCollector<'_> {
     fn node(
         &mut self,
         element: Element,
-        (name, directions): (&String, &Vec<String>),
+        name: &String,
+        directions: &Vec<String>,
         of: impl Fn(usize) -> PlaceSource,
     ) -> Result<(), ModelError> {
         check_identifier(name, element, "name", is_identifier)?;

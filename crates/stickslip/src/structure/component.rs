@@ -75,12 +75,12 @@ pub(crate) struct BladeCache {
     /// Stored reductions, by request and number of steps of blade vectors.
     reductions: Cache<(ReductionRequest, usize), ReducedRingResult>,
     /// Stored results, by request and deviations of all blades.
-    mistuned: Cache<Pattern, Arc<ReducedComponent>>,
+    mistuned: Cache<MistuningPattern, Arc<ReducedComponent>>,
 }
 
 type KeptBlade = Result<Arc<BladeCache>, BladeError>;
 /// A request, and the deviations of all blades.
-type Pattern = (ReductionRequest, Vec<f64>);
+type MistuningPattern = (ReductionRequest, Vec<f64>);
 type ReducedRingResult = Result<Arc<ReducedRing>, ReductionError>;
 
 /// A reduced sector, the ring in its coordinates, and the estimate of its error.
@@ -528,7 +528,7 @@ impl SectorCache {
             };
             let mixed = few.ring.mistuned_modes(deviations, EXTENTS[0])?;
             let (own, found) =
-                (few.component.deviation, few.lacking.deviation((&mixed.values, &mixed.shapes), deviations));
+                (few.component.deviation, few.lacking.deviation(&mixed.values, &mixed.shapes, deviations));
             let deviation = if found.error > own.error { found } else { own };
             if best.as_ref().is_none_or(|(.., best)| deviation.error < best.error) {
                 best = Some((few, mixed, deviation));

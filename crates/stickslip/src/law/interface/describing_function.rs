@@ -19,15 +19,21 @@ const ITERATIONS: usize = 8;
 /// differs by `λ / STEEP` of the velocity amplitude.
 const SCALED_PENALTY: f64 = 1e6;
 
+/// The views of a law from which its describing function follows.
+#[derive(Default)]
+pub(in crate::law) struct Views<'a> {
+    pub(in crate::law) pieces: Option<Vec<IdealElement>>,
+    pub(in crate::law) rate: Option<&'a dyn RateView>,
+    pub(in crate::law) step: Option<&'a dyn StepView>,
+    pub(in crate::law) prox: Option<&'a dyn ProxView>,
+    /// Number of directions of the law.
+    pub(in crate::law) directions: usize,
+}
+
 /// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
-/// first available view, in the order of the arguments.
-pub(in crate::law) fn complex_stiffness(
-    pieces: Option<Vec<IdealElement>>,
-    rate: Option<&dyn RateView>,
-    step: Option<&dyn StepView>,
-    (prox, directions): (Option<&dyn ProxView>, usize),
-    (amplitude, omega): (f64, f64),
-) -> Complex64 {
+/// first available view, in the order of the fields.
+pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega: f64) -> Complex64 {
+    let Views { pieces, rate, step, prox, directions } = views;
     // At zero amplitude, use a tiny amplitude. The limit of small motion would need a length
     // scale of the law.
     let a = if amplitude > 0.0 { amplitude } else { f64::MIN_POSITIVE.sqrt() };

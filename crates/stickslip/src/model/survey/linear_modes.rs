@@ -227,8 +227,8 @@ fn rigid_motions(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]
     let mut groups = DisjointSets::new(n + 1); // place n is the ground
     for at in &held {
         match at {
-            [(a, _)] => groups.union((*a, n)),
-            [(a, p), (b, q)] if a != b && p + q == 0.0 => groups.union((*a, *b)),
+            [(a, _)] => groups.union(*a, n),
+            [(a, p), (b, q)] if a != b && p + q == 0.0 => groups.union(*a, *b),
             // along an oblique direction or in a wave, the rank of all directions decides
             _ => return unrestrained_dimension(mass, &held),
         }

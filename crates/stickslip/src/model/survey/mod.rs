@@ -103,7 +103,7 @@ impl Model {
         };
         let of_joint = |(index, joint): (usize, &SystemJoint)| {
             let found = pressed(index, joint);
-            StuckAxis::of_joint((index, joint), found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
+            StuckAxis::of_joint(index, joint, found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
         };
         let joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
         let loose = self.loose(&system, &joints);

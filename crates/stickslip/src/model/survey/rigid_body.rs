@@ -30,7 +30,7 @@ impl Model {
         }
         let mut bodies = DisjointSets::new(component + 1);
         for body in self.bodies.iter().map(Body::places) {
-            body.windows(2).for_each(|pair| bodies.union((index[&pair[0]], index[&pair[1]])));
+            body.windows(2).for_each(|pair| bodies.union(index[&pair[0]], index[&pair[1]]));
         }
         for place in &self.places {
             // a second view of a node belongs to the body of the node
@@ -38,7 +38,7 @@ impl Model {
             let body = || self.bodies.iter().find(|body| place.view_of.as_ref() == Some(&body.name)).map(Body::places);
             let node = mass.or_else(body);
             let node: Vec<usize> = node.unwrap_or_default().iter().map(|name| index[name]).collect();
-            node.windows(2).for_each(|pair| bodies.union((pair[0], pair[1])));
+            node.windows(2).for_each(|pair| bodies.union(pair[0], pair[1]));
             if let Some(first) = node.first() {
                 index.extend(place.places().into_iter().map(|name| (name, *first)));
             }
@@ -48,7 +48,7 @@ impl Model {
             .iter()
             .filter(|s| s.stiffness > 0.0)
             .filter_map(|s| ends(&s.between))
-            .for_each(|e| bodies.union(e));
+            .for_each(|(a, b)| bodies.union(a, b));
         let (mut gripped, mut held) = (bodies.clone(), bodies.clone());
         let carry: BTreeSet<usize> =
             joints.iter().filter(|j| j.state != StuckState::Nothing).map(|j| j.joint).collect();
@@ -63,17 +63,17 @@ impl Model {
             };
             for label in labels {
                 let between = [along(&joint.between[0], &label), along(&joint.between[1], &label)];
-                let Some(e) = ends(&between) else { continue };
+                let Some((a, b)) = ends(&between) else { continue };
                 let carries = carry.contains(&number);
                 if carries {
-                    gripped.union(e);
+                    gripped.union(a, b);
                 }
                 if carries || joint.law.force_scale().is_infinite() && joint.law.closed_stiffness().is_none() {
-                    held.union(e);
+                    held.union(a, b);
                 }
                 if faces.contains(&number) {
                     let found = if carries { &mut touched } else { &mut beside };
-                    found.extend([(e.0, joint.name.as_str()), (e.1, joint.name.as_str())]);
+                    found.extend([(a, joint.name.as_str()), (b, joint.name.as_str())]);
                 }
             }
         }
@@ -134,7 +134,7 @@ impl DisjointSets {
         i
     }
 
-    pub(super) fn union(&mut self, (a, b): (usize, usize)) {
+    pub(super) fn union(&mut self, a: usize, b: usize) {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b)] = a.min(b);
     }

@@ -27,7 +27,7 @@ pub(super) struct StuckAxis {
 
 impl StuckAxis {
     /// Returns one entry per axis of a joint. `law` describes the joint in small motion.
-    pub(super) fn of_joint((index, joint): (usize, &SystemJoint), law: &dyn Law) -> Vec<Self> {
+    pub(super) fn of_joint(index: usize, joint: &SystemJoint, law: &dyn Law) -> Vec<Self> {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
             let pressed = (law.normal() == Some(axis)).then(|| force_at_rest(law, axis));

@@ -10,6 +10,7 @@ use super::linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
 use super::stuck_joint::{StuckAxis, StuckState};
 use super::{LinearModes, Model, ModelError, NaturalMode, System};
 use crate::model::{Body, Mass, Place};
+use crate::structure::reduction::Row;
 use crate::structure::{RingSector, Structure, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -38,8 +39,6 @@ pub struct WaveModes {
     /// Shapes of the modes of `stuck`, in the same form.
     pub stuck_shapes: Vec<Vec<Complex64>>,
 }
-
-type Row = Vec<(usize, f64)>;
 
 /// Converts a direction over the ring into its form in a wave: the real part and, for a complex
 /// wave, the imaginary part.
@@ -237,7 +236,7 @@ impl Model {
         let springs = &self.springs[..self.springs.len() / sectors];
         let joints = &system.joints()[..system.joints().len() / sectors];
         let stuck: Vec<StuckAxis> =
-            joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint((i, joint), &**joint.law())).collect();
+            joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint(i, joint, &**joint.law())).collect();
         let own: Vec<f64> = (0..n).map(|i| system.structure().diagonal_mass(i)).collect();
         let places = self.sector_axes(&system);
         let wave = |diameter: usize| {
@@ -296,7 +295,7 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
     let sector = RingSector::from_ring(system.structure(), sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
     let stuck: Vec<StuckAxis> =
-        joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint((i, joint), &**joint.law())).collect();
+        joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint(i, joint, &**joint.law())).collect();
     let wave = |diameter: usize| {
         let wave = sector.wave(diameter).ok()?;
         let (structure, double) = (wave.structure(), wave.is_double());

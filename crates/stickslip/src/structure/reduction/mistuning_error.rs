@@ -83,7 +83,7 @@ impl MistuningError {
     ///
     /// The modes have unit mass and these eigenvalues, ascending. An error of one is a relative
     /// frequency shift by the half width [`HALF_WIDTH`].
-    pub fn deviation(&self, (values, shapes): (&[f64], &[f64]), deviations: &[f64]) -> ReductionDeviation {
+    pub fn deviation(&self, values: &[f64], shapes: &[f64], deviations: &[f64]) -> ReductionDeviation {
         let (r, sectors) = (self.dofs, self.sectors);
         let phases = self.phases(deviations);
         let [lowest, highest] = [FREE * self.up_to, self.up_to].map(|omega| omega * omega);

@@ -60,15 +60,16 @@ impl ResidualSeries {
     /// Returns the receptance of the ports at ω (rad/s), p × p, m/N.
     pub fn receptance(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let modal = |value: f64| self.damping.of_mode(value.max(0.0).sqrt()).unwrap_or(0.0);
-        self.sum(omega, modal, self.damping.proportional().unwrap_or((0.0, 0.0)))
+        let (alpha, beta) = self.damping.proportional().unwrap_or((0.0, 0.0));
+        self.sum(omega, modal, alpha, beta)
     }
 
     /// Returns the receptance without damping.
     pub(super) fn undamped(&self, omega: f64) -> DMatrix<Complex<f64>> {
-        self.sum(omega, |_| 0.0, (0.0, 0.0))
+        self.sum(omega, |_| 0.0, 0.0, 0.0)
     }
 
-    fn sum(&self, omega: f64, modal: impl Fn(f64) -> f64, (alpha, beta): (f64, f64)) -> DMatrix<Complex<f64>> {
+    fn sum(&self, omega: f64, modal: impl Fn(f64) -> f64, alpha: f64, beta: f64) -> DMatrix<Complex<f64>> {
         let complex = |matrix: &DMatrix<f64>| matrix.map(|v| Complex::new(v, 0.0));
         let shapes = complex(&self.shapes);
         let mut weighted = shapes.clone();
