@@ -130,7 +130,7 @@ fn theory_11_3_a_normal_load_in_phase_makes_a_polygon() {
 #[test]
 fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
-    let far = law(1).slips_at();
+    let far = law(1).slip_displacement();
     close("phi_max", far, 1.3 / (10.0 * (0.3 + 0.5 / 1.5)), 1e-14);
     let u = 0.4 * far;
     for elements in [32, 62, 250, 1000] {
@@ -157,7 +157,7 @@ fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
 fn theory_11_4_iwan_is_exact() {
     for (chi, beta) in [(-0.5, 0.3), (-0.5, 0.0), (-0.95, 0.0), (-0.99, 0.2), (-0.1, 3.0), (0.0, 0.0)] {
         let law = Iwan { stiffness: 10.0, limit: 1.0, chi, beta, elements: 0 };
-        let far = law.slips_at();
+        let far = law.slip_displacement();
         let d = beta + (chi + 1.0) / (chi + 2.0);
         let (r, s) = ((chi + 1.0) / (far.powf(chi + 2.0) * d), beta / (far * d));
         close("phi_max", far, (1.0 + beta) / (10.0 * d), 1e-14);
@@ -181,7 +181,7 @@ fn theory_11_4_iwan_is_exact() {
         close("beyond full slip", loop_loss(&law, View::Step, &cycles(beyond), FINE), loss, 1e-6);
     }
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 0 };
-    let loss = loop_loss(&law, View::Step, &cycles(0.4 * law.slips_at()), FINE);
+    let loss = loop_loss(&law, View::Step, &cycles(0.4 * law.slip_displacement()), FINE);
     close("loss", loss, 0.017_491_512_553_529_69, 1e-7);
 }
 
@@ -216,7 +216,7 @@ fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
 #[test]
 fn theory_11_4_iwan_tends_to_segalmans_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
-    let far = law(1).slips_at();
+    let far = law(1).slip_displacement();
     let d = 0.3 + 0.5 / 1.5;
     let (r, s) = (0.5 / (far.powf(1.5) * d), 1.0 / far * 0.3 / d);
     // value at zero of the polynomial in `1 / elements` through the losses
@@ -543,7 +543,7 @@ fn theory_11_11_both_readings_of_separation_are_one_law() {
 #[test]
 fn theory_11_14_iwan_remembers_in_its_mean_alone() {
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 64 };
-    let (a, far) = (0.4 * law.slips_at(), law.slips_at());
+    let (a, far) = (0.4 * law.slip_displacement(), law.slip_displacement());
     let measured = [vec![0.0], vec![0.0, 0.9 * far], vec![0.0, -0.7 * far, 0.5 * far]].map(|mut places| {
         places.extend([a, -a, a, -a, a, -a, a]);
         let force = first(&law, View::Pieces, &places, 64);

@@ -508,8 +508,8 @@ fn describing_functions_are_first_harmonics() {
     for row in TABLE {
         let law = row.sample();
         for amplitude in [1e-4, 1e-3] {
-            // fast compared with the width of the smooth laws; `linearised` uses their exact
-            // laws
+            // fast compared with the width of the smooth laws; `describing_function` uses their
+            // exact laws
             let omega = 300.0;
             let motion = |time: f64| {
                 let (sin, cos) = (omega * time).sin_cos();

@@ -223,7 +223,7 @@ impl ModeBranches {
 /// such mode, or if it moves no place.
 ///
 /// # Errors
-/// See [`mode()`].
+/// See [`nonlinear_mode`].
 pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     let equations = equations(system, 1, 8)?;
     let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
@@ -241,7 +241,7 @@ pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, Meth
 /// An orbit is stable if the damping rises with amplitude there.
 ///
 /// # Errors
-/// See [`mode()`].
+/// See [`nonlinear_mode`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let path = ModeCurve::follow(&mut equations, request.mode, request.range);

@@ -44,7 +44,7 @@ pub struct PerformanceRow {
     /// True if only the reverse sweep has this peak, in a system that allows several orbits at a
     /// frequency ([`super::bidirectional_sweep`]).
     pub reverse_sweep_only: bool,
-    /// Number of grid orbits that were not found, plus one if the peak is unsettled.
+    /// Number of grid orbits that were not found, plus one if the peak is unresolved.
     pub failed: usize,
     /// Number of grid orbits whose series is too short for the tolerance, or whose error was not
     /// estimated.
@@ -152,7 +152,7 @@ impl<E: Send> Performance<'_, E> {
                 }
             }
         }
-        // an unsettled peak counts as not found
+        // an unresolved peak counts as not found
         failed += usize::from(peak.is_some_and(|peak| peak.unresolved.is_some()));
         Ok(PerformanceRow { value, peak, reverse_sweep_only, failed, inaccurate })
     }

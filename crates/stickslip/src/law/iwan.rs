@@ -110,7 +110,7 @@ impl Iwan {
     }
 
     /// Returns the displacement `φmax` of macro-slip, m.
-    pub fn slips_at(&self) -> f64 {
+    pub fn slip_displacement(&self) -> f64 {
         self.limit * (1.0 + self.beta) / (self.stiffness * self.denominator())
     }
 
@@ -118,7 +118,7 @@ impl Iwan {
     /// `UNREACHABLE_LIMIT` or more, the law is the linear spring `KT`. Without this special case,
     /// a distribution with χ near -1 would slip in part at any displacement.
     fn first_loading<S: Real>(&self, u: S) -> S {
-        let far = self.slips_at();
+        let far = self.slip_displacement();
         if self.limit >= UNREACHABLE_LIMIT {
             return u * self.stiffness;
         }
@@ -148,7 +148,7 @@ impl Law for Iwan {
         self.limit
     }
     fn macro_slip_displacement(&self) -> Option<f64> {
-        (self.limit > 0.0).then(|| self.slips_at())
+        (self.limit > 0.0).then(|| self.slip_displacement())
     }
     /// Available with a positive number of elements. A slip limit of zero gives no parts.
     fn pieces(&self) -> Option<Vec<IdealElement>> {
@@ -158,7 +158,7 @@ impl Law for Iwan {
         if self.elements == 0 {
             return None;
         }
-        let (far, chi, count) = (self.slips_at(), self.chi, self.elements);
+        let (far, chi, count) = (self.slip_displacement(), self.chi, self.elements);
         // In units of φmax and FS, the stiffness of all sliders up to x is proportional to
         // x^(χ+1), their limit to x^(χ+2).
         let stiffness = 1.0 / self.denominator();
@@ -210,7 +210,7 @@ impl Law for Iwan {
 
 impl MasingView for Iwan {
     fn backbone(&self, displacement: f64) -> (f64, f64) {
-        let far = self.slips_at();
+        let far = self.slip_displacement();
         let slope = match displacement / far {
             _ if self.limit >= UNREACHABLE_LIMIT => self.stiffness,
             x if x >= 1.0 => 0.0,
@@ -220,7 +220,7 @@ impl MasingView for Iwan {
         (self.first_loading(displacement), slope)
     }
     fn slip_displacement(&self) -> f64 {
-        Iwan::slips_at(self)
+        Iwan::slip_displacement(self)
     }
 }
 
@@ -230,7 +230,7 @@ impl StepLaw for Iwan {
         MAX_LEGS
     }
     fn state_scale(&self) -> f64 {
-        self.slips_at()
+        self.slip_displacement()
     }
     fn advance<S: Real>(
         &self,
@@ -238,7 +238,9 @@ impl StepLaw for Iwan {
         to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
     ) -> [S; MAX_DIRECTIONS] {
-        advance_legs(z, to[0] - from[0], self.slips_at(), |k, leg| leg_force(k, leg, |u| self.first_loading(u)));
+        advance_legs(z, to[0] - from[0], self.slip_displacement(), |k, leg| {
+            leg_force(k, leg, |u| self.first_loading(u))
+        });
         let legs = z.iter().take_while(|leg| leg.re() != 0.0).enumerate();
         let force: S = legs.map(|(k, leg)| leg_force(k, *leg, |u| self.first_loading(u))).sum();
         // a leg of zero length still has a slope
@@ -263,7 +265,7 @@ impl StepLaw for Iwan {
         let (last, width) = (leg_count(z).max(1) - 1, 2 + z.len());
         slopes.state.fill(0.0);
         slopes.force.fill(0.0);
-        let slipping = z[0].abs() >= self.slips_at();
+        let slipping = z[0].abs() >= self.slip_displacement();
         for (k, row) in slopes.state.chunks_exact_mut(width).enumerate().take(last + 1) {
             if k < last {
                 row[2 + k] = 1.0;
@@ -294,7 +296,7 @@ mod tests {
 
     /// Returns the exact values, by the formulas in the module documentation.
     fn exact(law: &Iwan, u: f64) -> (f64, f64) {
-        let (chi, far, d) = (law.chi, law.slips_at(), law.denominator());
+        let (chi, far, d) = (law.chi, law.slip_displacement(), law.denominator());
         let r = law.limit * (chi + 1.0) / (far.powf(chi + 2.0) * d);
         let s = law.limit / far * law.beta / d;
         let force =
@@ -311,7 +313,7 @@ mod tests {
         let (mut z, mut u, mut deepest) = ([0.0; MAX_LEGS], 0.0, 0);
         for k in 0..3000 {
             let noise = ((k * 7919 + 13) as f64).sin();
-            let to = u + noise * law.slips_at() * if k % 50 == 0 { 4.0 } else { 0.6 };
+            let to = u + noise * law.slip_displacement() * if k % 50 == 0 { 4.0 } else { 0.6 };
             let mut dual: [Dual<18>; MAX_LEGS] = std::array::from_fn(|i| variable(z[i], 2 + i));
             let (a, b): (Dual<18>, Dual<18>) = (variable(u, 0), variable(to, 1));
             let zero = Dual::<18>::from(0.0);
@@ -354,7 +356,7 @@ mod tests {
                 assert!((sum(|slider| slider.stiffness.unwrap()) - 10.0).abs() < 1e-12, "all springs are KT");
                 let (mut force, mut loss) = (0.0f64, 0.0f64);
                 for k in 0..=2000 {
-                    let u = law.slips_at() * 500f64.powf(-f64::from(k) / 2000.0);
+                    let u = law.slip_displacement() * 500f64.powf(-f64::from(k) / 2000.0);
                     let (found, expected) = (of_pieces(&pieces, u), exact(&law, u));
                     assert!(found.0 >= expected.0 * (1.0 - 1e-12), "it is never below the exact force");
                     force = force.max(found.0 / expected.0 - 1.0);

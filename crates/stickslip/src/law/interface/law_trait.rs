@@ -62,7 +62,7 @@ pub trait Law: Debug + Send + Sync {
     /// distinguishes two instances.
     fn values(&self) -> Vec<f64>;
     /// Returns the number of directions of relative motion, 1 to
-    /// [`MOST_DIRECTIONS`](crate::law::MOST_DIRECTIONS).
+    /// [`MAX_DIRECTIONS`](crate::law::MAX_DIRECTIONS).
     fn directions(&self) -> usize {
         1
     }

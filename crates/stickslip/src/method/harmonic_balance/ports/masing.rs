@@ -374,7 +374,7 @@ mod tests {
     fn the_loss_is_the_closed_form() {
         for pair in LAWS {
             let law = law(pair);
-            let (chi, far) = (law.chi, law.slips_at());
+            let (chi, far) = (law.chi, law.slip_displacement());
             let d = law.beta + (chi + 1.0) / (chi + 2.0);
             let r = law.limit * (chi + 1.0) / (far.powf(chi + 2.0) * d);
             for share in [1e-3f64, 0.03, 0.4, 0.99, 1.0, 1.7] {
@@ -401,7 +401,7 @@ mod tests {
                 let c: Vec<Complex64> = (0..harmonics.len())
                     .map(|i| {
                         let z = Complex64::new(noise(2 * i), if i == 0 { 0.0 } else { noise(2 * i + 1) });
-                        z * (size * law.slips_at() / (1.0 + i as f64))
+                        z * (size * law.slip_displacement() / (1.0 + i as f64))
                     })
                     .collect();
                 let found = respond(&law, &harmonics, &c, None);
@@ -430,7 +430,7 @@ mod tests {
                 let mut slopes = vec![0.0; unknowns * unknowns];
                 respond(&law, &harmonics, &c, Some(&mut slopes));
                 for b in (0..unknowns).filter(|b| *b != 1) {
-                    let step = 1e-6 * size * law.slips_at();
+                    let step = 1e-6 * size * law.slip_displacement();
                     let moved = |by: f64| {
                         let mut c = c.clone();
                         if b % 2 == 0 {
@@ -457,7 +457,7 @@ mod tests {
     fn the_state_is_that_of_the_force() {
         let harmonics = vec![0, 1, 2, 3];
         let law = law(LAWS[0]);
-        let far = law.slips_at();
+        let far = law.slip_displacement();
         let c = [0.1 * far, 0.5 * far, 0.3 * far, 0.4 * far].map(|x| Complex64::new(x, 0.3 * x));
         let c = [c[0].re.into(), c[1], c[2], c[3]];
         let mut alternation = Alternation::new(harmonics, 256);
