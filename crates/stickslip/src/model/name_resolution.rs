@@ -297,8 +297,8 @@ impl PlaceCollector<'_> {
     fn node(
         &mut self,
         element: Element,
-        name: &String,
-        directions: &Vec<String>,
+        name: &str,
+        directions: &[String],
         of: impl Fn(usize) -> PlaceSource,
     ) -> Result<(), ModelError> {
         check_identifier(name, element, "name", is_identifier)?;
@@ -320,7 +320,7 @@ impl PlaceCollector<'_> {
             self.place(DeclaredPlace { name: place, of: of(along), moved, radius: None }, element, "name")?;
         }
         if !directions.is_empty() {
-            self.places.directions.insert(name.clone(), directions.clone());
+            self.places.directions.insert(name.to_owned(), directions.to_owned());
         }
         Ok(())
     }

@@ -206,7 +206,7 @@ impl Orbit {
         let stated: Vec<f64> =
             (0..2 * n).map(|i| if i < n { initial_state[i] } else { initial_state[i] / omega }).collect();
         if apart(&begin, 1.0, &stated) {
-            return Err(wrong("does not begin at `start`"));
+            return Err(wrong("does not begin at `initial_state`"));
         }
         if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - END_OFFSET)))) {
             return Err(wrong("does not return to its initial state after one period"));
@@ -223,14 +223,14 @@ impl Orbit {
             omega,
             periods,
             symmetry,
-            initial_state: initial_state,
+            initial_state,
             evidence: Evidence {
                 residual,
                 energy_gap,
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations,
                 harmonics: None,
-                error_estimate: error_estimate,
+                error_estimate,
                 accuracy,
                 return_defect: None,
                 history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
