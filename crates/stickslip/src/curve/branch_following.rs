@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn no_interval_is_repeated_after_the_work_limit() {
-        assert!(searches(0.0) > 6, "a way without searches tests nothing");
+        assert!(searches(0.0) > 6, "the intervals must need searches");
         assert_eq!((searches(1.0), searches(0.2)), (1, 2));
     }
 }

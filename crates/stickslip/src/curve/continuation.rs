@@ -187,31 +187,31 @@ impl BranchContinuation<'_> {
         let start = equations.start(self.range.0)?;
         let steps = Steps::between(self.range.0, self.range.1, self.step);
         let single = (self.system_at)(self.range.0).0.is_incrementally_stable();
-        let mut way = CurvePart { single, ..CurvePart::default() };
-        let end = way.follow(&mut equations, (start.clone(), self.range.0), steps);
+        let mut part = CurvePart { single, ..CurvePart::default() };
+        let end = part.follow(&mut equations, (start.clone(), self.range.0), steps);
         if !single && end == End::Border {
             // In the opposite direction, the same curve may return into the range.
             let mut before = CurvePart::default();
             let out = Steps { direction: -steps.direction, ..steps };
             before.outside(&mut equations, (start, self.range.0), out);
             before.points.reverse();
-            way.points.splice(..0, before.points);
+            part.points.splice(..0, before.points);
         }
-        let mut branch = self.with_peaks_and_turns(&mut equations, way, end);
+        let mut branch = self.with_peaks_and_turns(&mut equations, part, end);
         if end == End::Border && !branch.reaches(self.range.1) {
-            let mut way = CurvePart { single, ..CurvePart::default() };
+            let mut part = CurvePart { single, ..CurvePart::default() };
             if let Ok(start) = equations.start(self.range.1) {
-                way.follow(&mut equations, (start, self.range.1), Steps { direction: -steps.direction, ..steps });
+                part.follow(&mut equations, (start, self.range.1), Steps { direction: -steps.direction, ..steps });
             }
-            way.points.reverse();
-            branch.append(self.with_peaks_and_turns(&mut equations, way, end));
+            part.points.reverse();
+            branch.append(self.with_peaks_and_turns(&mut equations, part, end));
         }
         Ok(branch)
     }
 
     /// Computes peaks and turning points of the curve.
-    fn with_peaks_and_turns(&self, equations: &mut BranchEquations<'_>, way: CurvePart, end: End) -> Branch {
-        let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = way.points.into_iter().unzip();
+    fn with_peaks_and_turns(&self, equations: &mut BranchEquations<'_>, part: CurvePart, end: End) -> Branch {
+        let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = part.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
         let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
         let mut peaks = Vec::new();

@@ -153,7 +153,7 @@ pub fn nonlinear_mode(system: &System, request: ModeRequest) -> Result<Mode, Met
         coalescences: merges.collect(),
         turns: turns.collect(),
         not_found: Vec::new(),
-        ended: followed.lost(high),
+        ended: followed.ended(high),
         is_travelling_wave: followed.curves().any(ModeCurve::travels),
     };
     for i in 0..=last {
@@ -188,7 +188,7 @@ impl ModeBranches {
         }
         let falling = ModeCurve::follow(equations, request.mode, request.range);
         let end = falling.smallest_amplitude().min(high);
-        let is_sought = rising.is_none() && falling.lost.is_some() && end > low;
+        let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
         let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, (low, end)) } else { None };
         ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
@@ -205,15 +205,15 @@ impl ModeBranches {
 
     /// Returns amplitude and cause of the end of the mode, if it ends above the smallest
     /// amplitude. Amplitudes above `high` are not considered.
-    fn lost(&self, high: f64) -> Option<ModeEnd> {
+    fn ended(&self, high: f64) -> Option<ModeEnd> {
         let falling = self.falling.as_ref()?;
-        let lost = falling.lost?;
+        let ended = falling.ended?;
         match &self.rising {
             Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
-            Some(rising) if lost.reason == ModeEndCause::NoStart => {
+            Some(rising) if ended.reason == ModeEndCause::NoStart => {
                 Some(ModeEnd { at: rising.largest_amplitude(), reason: ModeEndCause::FromSmallAmplitudes })
             }
-            _ => Some(lost),
+            _ => Some(ended),
         }
     }
 }
@@ -455,10 +455,10 @@ mod tests {
         let system = model.assemble().unwrap();
         let request = ModeRequest { mode: 0, range: (1e-9, 1e-2), points: 5, harmonics: 15, samples: 1024 };
         let mode = nonlinear_mode(&system, request).unwrap();
-        let lost = mode.ended.unwrap();
-        assert_eq!(lost.reason, ModeEndCause::Overdamped);
+        let ended = mode.ended.unwrap();
+        assert_eq!(ended.reason, ModeEndCause::Overdamped);
         // (4/π · 1 N) / (2 · 1e4 N/m · a) is a damping ratio of one at a = 0.06 mm
-        assert!(lost.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{lost:?}");
+        assert!(ended.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{ended:?}");
     }
 
     /// A mode equals the forced vibration under the forces `2 ζ ω M x'` with all their

@@ -121,12 +121,12 @@ impl<E: Send> Performance<'_, E> {
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
         let (mut failed, mut inaccurate) = (0, 0);
         let mut points: Vec<CurvePoint> = Vec::with_capacity(omegas.len());
-        let mut ways = BidirectionalSweep::for_system(&system);
+        let mut bidirectional = BidirectionalSweep::for_system(&system);
         let (stop, finished) = (AtomicBool::new(false), || ());
         let watch = Watch { finished: &finished, stop: &stop };
         solve_sequence(&mut *solver, &mut omegas.into_iter(), watch, &mut |omega, outcome| {
             let Some(outcome) = outcome else { return };
-            ways.iter_mut().for_each(|ways| ways.add(omega, outcome));
+            bidirectional.iter_mut().for_each(|sweep| sweep.add(omega, outcome));
             points.push(match outcome {
                 Ok(orbit) => {
                     inaccurate += usize::from(orbit.evidence.accuracy != Accuracy::Converged);
@@ -141,8 +141,8 @@ impl<E: Send> Performance<'_, E> {
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
         let mut peak = highest_peak(&mut *solver, &points, wanted, self.quantities);
         let mut reverse_sweep_only = false;
-        if let Some(ways) = ways {
-            let others = ways.reverse_sweep(self.method, &system, &stop).map_err(PerformanceError::Method)?;
+        if let Some(bidirectional) = bidirectional {
+            let others = bidirectional.reverse_sweep(self.method, &system, &stop).map_err(PerformanceError::Method)?;
             let others: Vec<CurvePoint> =
                 others.iter().map(|other| CurvePoint::new(&other.orbit, self.quantities)).collect();
             for points in other_intervals(&points, &others) {

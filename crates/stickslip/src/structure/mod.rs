@@ -665,9 +665,9 @@ mod tests {
     #[test]
     fn large_structures() {
         let n = 100_000;
-        let triple = |own: f64, beside: f64| {
+        let triple = |own: f64, off_diagonal: f64| {
             let all = (0..n).flat_map(|i: usize| {
-                let below = (i > 0).then(|| [(i, i - 1, beside), (i - 1, i, beside)]);
+                let below = (i > 0).then(|| [(i, i - 1, off_diagonal), (i - 1, i, off_diagonal)]);
                 below.into_iter().flatten().chain([(i, i, own)])
             });
             Matrix::from_triplets(n, all).unwrap()

@@ -124,8 +124,8 @@ mod tests {
     #[test]
     fn sparse_and_full_modal_damping_agree() {
         let n = MIN_SPARSE_DOFS + 5;
-        let beside = |own: f64, next: f64| DMatrix::from_fn(n, n, |i, k| [own, next, 0.0][i.abs_diff(k).min(2)]);
-        let (m, c, k) = (beside(1.0, 0.2), beside(0.01, 0.0), beside(2.0, -1.0));
+        let tridiagonal = |own: f64, next: f64| DMatrix::from_fn(n, n, |i, k| [own, next, 0.0][i.abs_diff(k).min(2)]);
+        let (m, c, k) = (tridiagonal(1.0, 0.2), tridiagonal(0.01, 0.0), tridiagonal(2.0, -1.0));
         let u = DMatrix::from_fn(n, 3, |i, mode| 0.3 * (0.7 * (i * (mode + 1)) as f64).sin());
         let modes = ModalDamping::new(n, Arc::new(u.as_slice().to_vec()));
         let all = &c + &u * u.transpose();
@@ -135,7 +135,10 @@ mod tests {
         assert!(sparse.is_sparse() && !full.is_sparse() && sparse.is_dissipative());
         assert!((sparse.damping() - &all).amax() < 1e-15);
         assert!((sparse.largest()[1] - all.amax()).abs() < 1e-15);
-        assert_ne!(sparse, Structure::new(sparse.places().to_vec(), m.clone(), beside(0.01, 0.0), k.clone()).unwrap());
+        assert_ne!(
+            sparse,
+            Structure::new(sparse.places().to_vec(), m.clone(), tridiagonal(0.01, 0.0), k.clone()).unwrap()
+        );
         // full matrices absorb the modal damping
         let twice = full.with_damped_modes(&modes);
         assert!(twice.damped_modes().is_none() && (twice.damping() - (&all + &u * u.transpose())).amax() < 1e-15);

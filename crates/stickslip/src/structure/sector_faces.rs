@@ -133,8 +133,8 @@ impl<'a> SectorFaces<'a> {
     /// Returns the node at a point.
     fn nearest(&self, point: [f64; 3]) -> Option<usize> {
         let cell = self.cell(point);
-        let beside = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
-        let cells = beside.filter_map(|step| self.cells.get(&[0, 1, 2].map(|i| cell[i].saturating_add(step[i]))));
+        let adjacent = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
+        let cells = adjacent.filter_map(|step| self.cells.get(&[0, 1, 2].map(|i| cell[i].saturating_add(step[i]))));
         let near = cells.flatten().map(|&index| (distance(self.nodes[index].1, point), index));
         near.filter(|(apart, _)| *apart <= self.tolerance()).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, index)| index)
     }

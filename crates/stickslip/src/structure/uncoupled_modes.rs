@@ -78,8 +78,8 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     let size = modal.diagonal().amax();
     for (i, k) in (0..n).flat_map(|k| (0..k).map(move |i| (i, k))) {
         let both = (modal[(i, i)] * modal[(k, k)]).abs().sqrt();
-        let beside = modal[(i, k)].abs().max(modal[(k, i)].abs());
-        if beside > UNCOUPLED[0] * both + UNCOUPLED[1] * size {
+        let off_diagonal = modal[(i, k)].abs().max(modal[(k, i)].abs());
+        if off_diagonal > UNCOUPLED[0] * both + UNCOUPLED[1] * size {
             return None;
         }
     }

@@ -134,7 +134,7 @@ pub(super) struct ModeCurve {
     /// True if all motions below the last computed one are its multiples, because the joints
     /// stick.
     sticks: bool,
-    pub(super) lost: Option<ModeEnd>,
+    pub(super) ended: Option<ModeEnd>,
 }
 
 impl ModeCurve {
@@ -144,8 +144,8 @@ impl ModeCurve {
         let modes = equations.linear_modes();
         let begun = equations.marched();
         let none = |linear| {
-            let lost = ModeEnd { at: f64::INFINITY, reason: ModeEndCause::NoStart };
-            ModeCurve { linear, arcs: Vec::new(), sticks: false, lost: Some(lost) }
+            let ended = ModeEnd { at: f64::INFINITY, reason: ModeEndCause::NoStart };
+            ModeCurve { linear, arcs: Vec::new(), sticks: false, ended: Some(ended) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
         let faint = equations.faint(&modes, index, FRICTION_RATIO, SEPARATION_RATIO);
@@ -172,7 +172,7 @@ impl ModeCurve {
         let mut arcs = if equations.is_unbounded() { follow_upwards(equations, &start, high) } else { Vec::new() };
         arcs.push(start);
         let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
-        let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, lost: None };
+        let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, ended: None };
         let mut length = INITIAL_STEP;
         for _ in 0..MAX_STEPS {
             let now = &path.arcs[path.arcs.len() - 1];
@@ -193,11 +193,11 @@ impl ModeCurve {
             }
             let reason = match step {
                 _ if creeping > OVERDAMPED_WORK => {
-                    path.lost = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::Overdamped });
+                    path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::Overdamped });
                     return path;
                 }
                 _ if equations.marched() - begun > MEMORY_WORK => {
-                    path.lost = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::WorkLimit });
+                    path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::WorkLimit });
                     return path;
                 }
                 _ if at > top => ModeEndCause::Merged,
@@ -220,13 +220,13 @@ impl ModeCurve {
             };
             // continue with the same shape at a smaller amplitude
             let Some(next) = leap(equations, &path.arcs[lowest]) else {
-                path.lost = Some(ModeEnd { at: path.arcs[lowest].amplitude, reason });
+                path.ended = Some(ModeEnd { at: path.arcs[lowest].amplitude, reason });
                 return path;
             };
             path.arcs.push(next);
             (length, lowest, since) = (INITIAL_STEP, path.arcs.len() - 1, 0);
         }
-        path.lost = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::StepLimit });
+        path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::StepLimit });
         path
     }
 
@@ -244,7 +244,7 @@ impl ModeCurve {
         let start = equations.begin(&state, low)?;
         let mut arcs = follow_upwards(equations, &start, high);
         arcs.push(start);
-        Some(ModeCurve { linear: None, arcs, sticks: false, lost: None })
+        Some(ModeCurve { linear: None, arcs, sticks: false, ended: None })
     }
 
     /// Returns the largest amplitude on the curve.

@@ -138,9 +138,9 @@ impl Bracket {
             });
             let slopes: Vec<(f64, f64)> = slopes.collect();
             let Some(&(nearest, slope)) = slopes.first() else { return false };
-            let farther = slopes.iter().find(|(run, _)| *run >= DISTANCE_RATIO * nearest);
+            let distant = slopes.iter().find(|(run, _)| *run >= DISTANCE_RATIO * nearest);
             slope * UNBOUNDED_WITHIN * self.width > -negative_inverse_square(value)
-                && farther.is_some_and(|(_, other)| slope < MAX_SLOPE_RATIO * other)
+                && distant.is_some_and(|(_, other)| slope < MAX_SLOPE_RATIO * other)
         };
         let at_end = |end: &CurvePoint| (here.omega - end.omega).abs() <= CLOSED_WIDTH * self.width && jumps(end);
         let (left, right) = self.points.split_at(top);

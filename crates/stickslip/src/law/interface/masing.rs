@@ -244,20 +244,20 @@ mod tests {
         fn smooth<S: Real>(u: S) -> S {
             u - u * u * 0.2
         }
-        const WAYS: [f64; 6] = [0.8, -0.9, 0.4, -0.2, 0.5, -0.3];
-        fn end<S: Real>(ways: [S; 6]) -> S {
+        const INCREMENTS: [f64; 6] = [0.8, -0.9, 0.4, -0.2, 0.5, -0.3];
+        fn end<S: Real>(increments: [S; 6]) -> S {
             let mut legs = [S::from(0.0); MAX_LEGS];
-            for increment in ways {
+            for increment in increments {
                 advance_legs(&mut legs, increment, 2.0, |_, _| 0.0);
             }
             legs.iter().enumerate().map(|(k, leg)| leg_force(k, *leg, smooth)).sum()
         }
-        let found = partials(&end(std::array::from_fn(|k| -> Dual<6> { variable(WAYS[k], k) })));
+        let found = partials(&end(std::array::from_fn(|k| -> Dual<6> { variable(INCREMENTS[k], k) })));
         for k in 0..6 {
             let moved = |by: f64| {
-                let mut ways = WAYS;
-                ways[k] += by;
-                end(ways)
+                let mut increments = INCREMENTS;
+                increments[k] += by;
+                end(increments)
             };
             let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             assert!((found[k] - difference).abs() < 1e-8, "{k}: {} {difference}", found[k]);

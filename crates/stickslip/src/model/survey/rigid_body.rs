@@ -54,7 +54,7 @@ impl Model {
             joints.iter().filter(|j| j.state != StuckState::Nothing).map(|j| j.joint).collect();
         let faces: BTreeSet<usize> = joints.iter().filter(|j| j.pressed.is_some()).map(|j| j.joint).collect();
         // joints with faces at each body: with contact force (touched) and without
-        let (mut touched, mut beside) = (Vec::<(usize, &str)>::new(), Vec::<(usize, &str)>::new());
+        let (mut pressing, mut touching) = (Vec::<(usize, &str)>::new(), Vec::<(usize, &str)>::new());
         for (number, (joint, labels)) in self.joints.iter().zip(self.joint_labels()).enumerate() {
             // joints between nodes act along each direction
             let along = |name: &String, label: &String| match label.strip_prefix(joint.name.as_str()) {
@@ -72,7 +72,7 @@ impl Model {
                     held.union(a, b);
                 }
                 if faces.contains(&number) {
-                    let found = if carries { &mut touched } else { &mut beside };
+                    let found = if carries { &mut pressing } else { &mut touching };
                     found.extend([(a, joint.name.as_str()), (b, joint.name.as_str())]);
                 }
             }
@@ -100,7 +100,7 @@ impl Model {
                         }
                         names
                     };
-                    let (contacts, faces) = (of_body(&touched), of_body(&beside));
+                    let (contacts, faces) = (of_body(&pressing), of_body(&touching));
                     loose.push(LooseBody {
                         masses: vec![place.clone()],
                         held_by_friction,

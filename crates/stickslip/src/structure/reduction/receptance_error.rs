@@ -237,7 +237,7 @@ pub(super) fn sign(number: usize) -> f64 {
 /// Returns sample frequencies, alternately next to modes and between them, from the first
 /// elastic mode to the end of the range.
 fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
-    let beside = match whole.damping {
+    let offset = match whole.damping {
         StructureDamping::Ratio { ratio, .. } => ratio.max(MODE_DISTANCE),
         _ => MODE_DISTANCE,
     };
@@ -250,7 +250,7 @@ fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: us
     let mut all = Vec::new();
     for (k, omega) in inside.iter().enumerate() {
         let next = inside.get(k + 1).copied().unwrap_or(up_to);
-        all.extend([omega * (1.0 + beside), 0.5 * (omega + next)]);
+        all.extend([omega * (1.0 + offset), 0.5 * (omega + next)]);
     }
     all.push(0.5 * inside.first().copied().unwrap_or(up_to));
     // equal modes, as in a square section, have no middle; at a mode, rounding would dominate
