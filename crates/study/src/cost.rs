@@ -198,7 +198,7 @@ impl<'a> Costing<'a> {
             joints: system.joints().len() as f64,
             sliders: laws.iter().map(|law| law.sliders().map_or(1, |all| all.len().max(1)) as f64).sum(),
             surveyed,
-            smooth: laws.iter().any(|law| law.pieces().is_none()),
+            smooth: laws.iter().any(|law| law.ideal_elements().is_none()),
             stepped: laws.iter().any(|law| law.rate().is_none() && !law.carries_no_force()),
             falls: laws.iter().any(|law| law.prox().is_some() && !law.is_incrementally_passive()),
             unbounded: laws.iter().any(|law| law.force_scale().is_infinite()),

@@ -161,7 +161,7 @@ impl Note {
         let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
         let is_rigid =
             |piece: &IdealElement| matches!(piece, IdealElement::Slider(slider) if slider.stiffness.is_none());
-        let holds = |joint: &Joint| joint.law.pieces().unwrap_or_default().iter().any(is_rigid);
+        let holds = |joint: &Joint| joint.law.ideal_elements().unwrap_or_default().iter().any(is_rigid);
         let rigid = orbit.evidence.stuck.iter().any(|name| joint_of(name).is_some_and(holds));
         // An elastic stuck joint relaxes near the mean of the motion. A contact that stays
         // closed has a constant stiffness there.

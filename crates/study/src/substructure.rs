@@ -159,7 +159,8 @@ pub(crate) fn settle(model: &mut Model, values: &Values, method: &Values) {
     let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
     let excited = most * ends.chain(drive).fold(0.0, f64::max);
     let joints = !model.joints.is_empty() && excited > 0.0;
-    let exact = method.quantity(WIDTH).is_none() && model.joints.iter().all(|joint| joint.law.pieces().is_some());
+    let exact =
+        method.quantity(WIDTH).is_none() && model.joints.iter().all(|joint| joint.law.ideal_elements().is_some());
     let Some(Substructure { component, reduction, disk, .. }) = model.substructure.as_mut() else { return };
     if joints && exact && disk.is_none() && *reduction == Reduction::up_to(0.0) && keeps_all(component) {
         *reduction = WHOLE;

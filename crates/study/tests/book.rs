@@ -145,7 +145,7 @@ fn laws() -> String {
             .map(|count| law.with_value(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
             .collect();
         let directions: Vec<_> = directions.iter().map(usize::to_string).collect();
-        let pieces = law.pieces().unwrap_or_default();
+        let pieces = law.ideal_elements().unwrap_or_default();
         let says = [
             ("sliders", pieces.iter().any(|piece| matches!(piece, law::IdealElement::Slider(_)))),
             ("stops", pieces.iter().any(|piece| matches!(piece, law::IdealElement::Stop { .. }))),

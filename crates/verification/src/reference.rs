@@ -71,12 +71,12 @@ impl<'a> Reference<'a> {
     pub fn new(system: &'a System, omega: f64, steps: usize, displacement: &[f64], velocity: &[f64]) -> Self {
         let contacts = system.joints().iter().map(|joint| {
             let mut law = joint.law().clone();
-            if law.step().is_none() && law.rate().is_none() && law.pieces().is_none() {
+            if law.step().is_none() && law.rate().is_none() && law.ideal_elements().is_none() {
                 // a set-valued law that is not a sum of sliders: smooth it over a velocity far
                 // below that of the motion
                 law = law.regularised(NARROW / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
-            let pieces = if law.step().is_none() && law.rate().is_none() { law.pieces() } else { None };
+            let pieces = if law.step().is_none() && law.rate().is_none() { law.ideal_elements() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));
             let states = states.unwrap_or(pieces.as_ref().map_or(0, Vec::len));
             let rest = [0.0; MAX_DIRECTIONS];

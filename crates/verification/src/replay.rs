@@ -26,7 +26,7 @@ pub enum View {
 /// Returns the views that a law offers.
 pub fn views(law: &dyn Law) -> Vec<View> {
     let offered = [
-        (View::Pieces, law.pieces().is_some()),
+        (View::Pieces, law.ideal_elements().is_some()),
         (View::Step, law.step().is_some()),
         (View::Rate, law.rate().is_some()),
         (View::Prox, law.prox().is_some()),
@@ -45,7 +45,7 @@ pub fn views(law: &dyn Law) -> Vec<View> {
 /// If the law does not offer the view.
 pub fn forces(law: &dyn Law, view: View, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     match view {
-        View::Pieces => pieces(&law.pieces().expect("pieces"), motion, times),
+        View::Pieces => pieces(&law.ideal_elements().expect("pieces"), motion, times),
         View::Step => step(law.step().expect("a step"), motion, times),
         View::Rate => rate(law.directions(), law.rate().expect("a rate"), motion, times),
         View::Prox => prox(law.directions(), law.prox().expect("a resolvent"), motion, times),

@@ -108,8 +108,10 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
             // method `transient` is slow; this tolerance is enough here
             let options = row.options.iter().filter(|o| row.name == "transient" && o.key == "tolerance");
             let method = (row.build)(&options.map(|o| (o.key.to_owned(), WAITED)).collect()).unwrap();
-            let quick =
-                system.joints().iter().all(|joint| joint.law().pieces().is_some() || joint.law().rate().is_some());
+            let quick = system
+                .joints()
+                .iter()
+                .all(|joint| joint.law().ideal_elements().is_some() || joint.law().rate().is_some());
             if row.name == "transient" && !quick && (!long || seed % RARELY != 0) {
                 continue;
             }

@@ -189,7 +189,7 @@ fn theory_11_4_iwan_is_exact() {
 /// to slip are corners.
 fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
     let mut slips: Vec<f64> = law
-        .pieces()
+        .ideal_elements()
         .unwrap()
         .iter()
         .filter_map(|piece| match piece {
@@ -325,7 +325,7 @@ impl Law for Graded {
     fn is_odd(&self) -> bool {
         true
     }
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         Some(self.0.clone())
     }
 }

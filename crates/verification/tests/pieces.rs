@@ -309,7 +309,7 @@ impl Law for Mixed {
     fn is_odd(&self) -> bool {
         false
     }
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         let stop = IdealElement::Stop { gap: 0.4, stiffness: 3.0 };
         Some(vec![IdealElement::slider(Some(2.0), 0.3), stop, IdealElement::slider(None, 0.1)])
     }
@@ -622,7 +622,7 @@ fn a_drop_behind_a_spring_is_refused() {
         fn is_odd(&self) -> bool {
             true
         }
-        fn pieces(&self) -> Option<Vec<IdealElement>> {
+        fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
             let slider = stickslip::law::Slider { stiffness: Some(2.0), limit: 0.3, static_limit: 0.4 };
             Some(vec![IdealElement::Slider(slider)])
         }

@@ -25,7 +25,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{Coulomb, Law, IdealElement};
 /// let law = Coulomb { limit: 2.0 };
-/// assert_eq!(law.pieces().unwrap(), [IdealElement::slider(None, 2.0)]);
+/// assert_eq!(law.ideal_elements().unwrap(), [IdealElement::slider(None, 2.0)]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coulomb {
@@ -46,7 +46,7 @@ impl Law for Coulomb {
     fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         Some(vec![IdealElement::slider(None, self.limit)])
     }
     fn prox(&self) -> Option<&dyn ProxView> {

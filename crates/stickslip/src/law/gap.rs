@@ -62,7 +62,7 @@ impl Law for Gap {
     fn closed_stiffness(&self) -> Option<Vec<f64>> {
         Some(vec![self.stiffness])
     }
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         Some(vec![IdealElement::Stop { gap: self.gap, stiffness: self.stiffness }])
     }
     fn rate(&self) -> Option<&dyn RateView> {

@@ -87,7 +87,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// let far = law.slip_displacement();
 /// assert!((law.masing().unwrap().backbone(far).0 - 2.0).abs() < 1e-14);
 /// // 32 sliders and the spring that slips last
-/// assert_eq!(Iwan { elements: 32, ..law }.pieces().unwrap().len(), 33);
+/// assert_eq!(Iwan { elements: 32, ..law }.ideal_elements().unwrap().len(), 33);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Iwan {
@@ -151,7 +151,7 @@ impl Law for Iwan {
         (self.limit > 0.0).then(|| self.slip_displacement())
     }
     /// Available with a positive number of elements. A slip limit of zero gives no parts.
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         if self.limit == 0.0 {
             return Some(Vec::new());
         }
@@ -192,7 +192,7 @@ impl Law for Iwan {
             (Some(law), true) => complex_stiffness(law, amplitude),
             (Some(_), false) => self.stiffness.into(),
             (None, _) => {
-                let views = Views { pieces: self.pieces(), directions: 1, ..Views::default() };
+                let views = Views { ideal_elements: self.ideal_elements(), directions: 1, ..Views::default() };
                 describing_function::complex_stiffness(views, amplitude, omega)
             }
         }
@@ -345,7 +345,7 @@ mod tests {
         for chi in [-0.9, -0.5, -0.2, 0.0] {
             for beta in [0.0, 0.3, 5.0] {
                 let law = Iwan { stiffness: 10.0, limit: 1.0, chi, beta, elements: 32 };
-                let pieces = law.pieces().unwrap();
+                let pieces = law.ideal_elements().unwrap();
                 let sum = |of: fn(&super::super::Slider) -> f64| {
                     let each = pieces
                         .iter()

@@ -28,7 +28,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{Jenkins, Law, IdealElement};
 /// let law = Jenkins { stiffness: 1e4, limit: 2.0 };
-/// assert_eq!(law.pieces().unwrap(), [IdealElement::slider(Some(1e4), 2.0)]);
+/// assert_eq!(law.ideal_elements().unwrap(), [IdealElement::slider(Some(1e4), 2.0)]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jenkins {
@@ -52,7 +52,7 @@ impl Law for Jenkins {
         self.limit
     }
     #[doc(alias = "eq1")]
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         Some(vec![IdealElement::slider(Some(self.stiffness), self.limit)]) // Eq. (1)
     }
     fn regularised(&self, width: f64) -> Option<SharedLaw> {

@@ -3,7 +3,7 @@
 //! A law is an object behind [`Law`]; each law has its own file. A law offers one or more
 //! *views*. A method uses the view that it can work with:
 //!
-//! - [`Law::pieces`]: ideal sliders, springs and stops in parallel. Used by event-driven
+//! - [`Law::ideal_elements`]: ideal sliders, springs and stops in parallel. Used by event-driven
 //!   integration, harmonic balance and average acceleration.
 //! - [`Law::rate`]: `f = h(u, u', z)`, `z' = g(u, u', z)`, smooth. Used by transient, shooting
 //!   and harmonic balance.

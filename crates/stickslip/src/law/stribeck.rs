@@ -93,7 +93,7 @@ impl Law for Stribeck {
         self.static_limit
     }
     /// A slider with two limits. Available if `velocity` is zero or the limits are equal.
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         let slider = Slider { stiffness: None, limit: self.limit, static_limit: self.static_limit };
         (self.velocity == 0.0 || self.is_constant()).then(|| vec![IdealElement::Slider(slider)])
     }
@@ -224,7 +224,7 @@ mod tests {
     fn without_a_velocity_it_is_a_slider_with_two_limits() {
         let law = Stribeck { velocity: 0.0, ..LAW };
         let slider = Slider { stiffness: None, limit: 2.0, static_limit: 2.5 };
-        assert_eq!(law.pieces(), Some(vec![IdealElement::Slider(slider)]));
+        assert_eq!(law.ideal_elements(), Some(vec![IdealElement::Slider(slider)]));
         assert!(law.prox().is_none() && law.regularised(1e-5).is_none());
         let coulomb = Stribeck { static_limit: 2.0, ..law };
         assert!(coulomb.prox().is_some() && coulomb.regularised(1e-5).is_some() && coulomb.is_incrementally_passive());

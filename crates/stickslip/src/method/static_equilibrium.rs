@@ -89,7 +89,7 @@ fn is_preloaded(law: &dyn Law) -> bool {
     };
     let pressed =
         |piece: &IdealElement| matches!(piece, IdealElement::Stop { gap, stiffness } if *gap < 0.0 && *stiffness > 0.0);
-    force != rest || law.pieces().is_some_and(|pieces| pieces.iter().any(pressed))
+    force != rest || law.ideal_elements().is_some_and(|pieces| pieces.iter().any(pressed))
 }
 
 /// Returns the internal states of all joints at other displacements (m), after a straight and

@@ -73,7 +73,7 @@ pub(crate) fn history_dependent_joints<'a>(
     }
     let holds = |law: &SharedLaw, motion: &JointMotion| {
         let travel = motion.displacement.first().map_or(0.0, |(low, high)| high - low);
-        let sliders = law.pieces().into_iter().flatten().filter_map(|piece| match piece {
+        let sliders = law.ideal_elements().into_iter().flatten().filter_map(|piece| match piece {
             IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => Some((stiffness, limit)),
             _ => None,
         });

@@ -22,7 +22,7 @@ const SCALED_PENALTY: f64 = 1e6;
 /// The views of a law from which its describing function follows.
 #[derive(Default)]
 pub(in crate::law) struct Views<'a> {
-    pub(in crate::law) pieces: Option<Vec<IdealElement>>,
+    pub(in crate::law) ideal_elements: Option<Vec<IdealElement>>,
     pub(in crate::law) rate: Option<&'a dyn RateView>,
     pub(in crate::law) step: Option<&'a dyn StepView>,
     pub(in crate::law) prox: Option<&'a dyn ProxView>,
@@ -33,12 +33,12 @@ pub(in crate::law) struct Views<'a> {
 /// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
 /// first available view, in the order of the fields.
 pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega: f64) -> Complex64 {
-    let Views { pieces, rate, step, prox, directions } = views;
+    let Views { ideal_elements, rate, step, prox, directions } = views;
     // At zero amplitude, use a tiny amplitude. The limit of small motion would need a length
     // scale of the law.
     let a = if amplitude > 0.0 { amplitude } else { f64::MIN_POSITIVE.sqrt() };
-    if let Some(pieces) = pieces {
-        return pieces.iter().map(|piece| slider_or_stop(piece, amplitude)).sum();
+    if let Some(ideal_elements) = ideal_elements {
+        return ideal_elements.iter().map(|element| slider_or_stop(element, amplitude)).sum();
     }
     if let Some(rate) = rate {
         return rate_law(rate, a, omega);
@@ -66,8 +66,8 @@ pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega:
 }
 
 /// Returns the complex stiffness of one ideal part in closed form.
-pub(in crate::law) fn slider_or_stop(piece: &IdealElement, amplitude: f64) -> Complex64 {
-    match *piece {
+pub(in crate::law) fn slider_or_stop(element: &IdealElement, amplitude: f64) -> Complex64 {
+    match *element {
         IdealElement::Slider(Slider { limit: 0.0, .. }) => ZERO,
         IdealElement::Slider(Slider { stiffness: None, limit, .. }) => {
             Complex64::new(0.0, 4.0 * limit / (PI * amplitude))

@@ -99,7 +99,7 @@ pub trait Law: Debug + Send + Sync {
         f64::INFINITY
     }
     /// Returns ideal sliders, springs and stops in parallel, if they represent the law exactly.
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         None
     }
     /// Returns the rate view: a smooth force and the rates of the internal states.
@@ -149,7 +149,7 @@ pub trait Law: Debug + Send + Sync {
     /// the first direction. Methods build initial guesses from it.
     fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
         let views = Views {
-            pieces: self.pieces(),
+            ideal_elements: self.ideal_elements(),
             rate: self.rate(),
             step: self.step(),
             prox: self.prox(),
@@ -203,11 +203,11 @@ impl dyn Law + '_ {
     /// Returns the sliders if the law consists of sliders alone. Parts that carry no force are
     /// left out.
     pub fn sliders(&self) -> Option<Vec<Slider>> {
-        let slider = |piece: &IdealElement| match piece {
+        let slider = |element: &IdealElement| match element {
             IdealElement::Slider(slider) => Some(*slider),
             IdealElement::Stop { .. } => None,
         };
-        self.pieces()?.iter().filter(|piece| !piece.carries_no_force()).map(slider).collect()
+        self.ideal_elements()?.iter().filter(|element| !element.carries_no_force()).map(slider).collect()
     }
 
     /// Returns the value of a parameter, SI.

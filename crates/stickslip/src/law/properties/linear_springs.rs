@@ -63,7 +63,7 @@ impl Law for LinearSprings {
     }
     /// In one direction, exact methods take the spring as a slider that never slips, or as
     /// nothing.
-    fn pieces(&self) -> Option<Vec<IdealElement>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         match (self.directions, self.stiffness[0]) {
             (1, 0.0) => Some(Vec::new()),
             (1, stiffness) => Some(vec![IdealElement::slider(Some(stiffness), UNREACHABLE_LIMIT)]),

@@ -24,10 +24,11 @@ type ForceVector = [f64; MAX_DIRECTIONS];
 /// Tells whether any view of the law violates the symmetry.
 pub(in crate::law) fn violates_odd_symmetry(law: &dyn Law) -> bool {
     // Contacts and one-sided stops are not odd by construction.
-    let one_sided = |pieces: Vec<IdealElement>| pieces.iter().any(|piece| matches!(piece, IdealElement::Stop { .. }));
+    let one_sided =
+        |elements: Vec<IdealElement>| elements.iter().any(|element| matches!(element, IdealElement::Stop { .. }));
     let directions = law.directions();
     law.normal().is_some()
-        || law.pieces().is_some_and(one_sided)
+        || law.ideal_elements().is_some_and(one_sided)
         || law
             .rate()
             .is_some_and(|rate| DECADES.into_iter().any(|k| forces_differ(|sign| by_rate(rate, sign * size(k)))))

@@ -223,7 +223,9 @@ impl Gathered {
 
 /// Returns the reason why the method does not support a law.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
-    let Some(pieces) = law.pieces() else { return Some("it does not consist of ideal sliders, springs and stops") };
+    let Some(pieces) = law.ideal_elements() else {
+        return Some("it does not consist of ideal sliders, springs and stops");
+    };
     let drops = |piece: &IdealElement| matches!(piece, IdealElement::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
     if law.directions() != 1 {
         Some("it acts along several directions")
@@ -321,7 +323,7 @@ impl Mechanics {
                 return Err(MethodError::law(method, joint, misses));
             }
             let axis = &joint.axes()[0];
-            for piece in joint.law().pieces().unwrap_or_default() {
+            for piece in joint.law().ideal_elements().unwrap_or_default() {
                 let direction = axis.dense(n);
                 let kind = match piece {
                     IdealElement::Slider(slider) if slider.static_limit == 0.0 => continue,

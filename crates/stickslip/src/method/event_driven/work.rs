@@ -40,7 +40,7 @@ pub fn orbit_work(system: &System) -> Option<f64> {
         if !takes(law) {
             return None;
         }
-        for piece in law.pieces().unwrap_or_default().iter().filter(|piece| !piece.carries_no_force()) {
+        for piece in law.ideal_elements().unwrap_or_default().iter().filter(|piece| !piece.carries_no_force()) {
             match piece {
                 IdealElement::Slider(slider) if slider.stiffness.is_some() => springs += 1.0,
                 _ => others += 1.0,

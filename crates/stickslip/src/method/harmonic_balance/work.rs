@@ -87,7 +87,7 @@ const PER_PIECE: f64 = 7e5;
 /// assert!(harmonic_balance::orbit_work(&system) > event_driven::orbit_work(&system).unwrap());
 /// ```
 pub fn orbit_work(system: &System) -> f64 {
-    let pieces = system.joints().iter().flat_map(|joint| joint.law().pieces().unwrap_or_default());
+    let pieces = system.joints().iter().flat_map(|joint| joint.law().ideal_elements().unwrap_or_default());
     let (mut count, mut rigid) = (0.0, false);
     for piece in pieces.filter(|piece| !piece.carries_no_force()) {
         count += 1.0;

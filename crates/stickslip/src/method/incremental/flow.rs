@@ -71,10 +71,13 @@ impl IncrementalFlow {
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
-                None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(IdealElement::has_force_drop)) => {
+                None if chosen
+                    .ideal_elements()
+                    .is_some_and(|pieces| pieces.iter().any(IdealElement::has_force_drop)) =>
+                {
                     Err(DROPS)
                 }
-                None if chosen.pieces().is_some() => Err("its slider is rigid; it needs a spring in series"),
+                None if chosen.ideal_elements().is_some() => Err("its slider is rigid; it needs a spring in series"),
                 None => Err("it defines neither a step view nor a rate view"),
             }
         })?;

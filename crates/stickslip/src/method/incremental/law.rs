@@ -26,7 +26,7 @@ fn view(law: &SharedLaw) -> Option<View> {
         }
         IdealElement::Stop { .. } => true,
     };
-    if law.pieces().is_some_and(|pieces| pieces.iter().all(steps)) {
+    if law.ideal_elements().is_some_and(|pieces| pieces.iter().all(steps)) {
         return Some(View::Pieces);
     }
     match (law.step(), law.rate()) {
@@ -39,7 +39,7 @@ fn view(law: &SharedLaw) -> Option<View> {
 /// Returns the pieces with a nonzero force.
 fn pieces(law: &SharedLaw) -> Vec<IdealElement> {
     let carries = |piece: &IdealElement| !matches!(piece, IdealElement::Slider(slider) if slider.static_limit == 0.0);
-    law.pieces().unwrap_or_default().into_iter().filter(carries).collect()
+    law.ideal_elements().unwrap_or_default().into_iter().filter(carries).collect()
 }
 
 /// Returns stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law

@@ -130,7 +130,7 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
     if let Some(prox) = law.prox() {
         return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
     }
-    if law.pieces().is_some() {
+    if law.ideal_elements().is_some() {
         return law.describing_function(LINEAR_AMPLITUDE, 1.0).re;
     }
     let (count, rest) = (law.directions(), [0.0; MAX_DIRECTIONS]);

@@ -29,7 +29,7 @@ impl Gathered {
             return Ok(());
         }
         if joint.axes().len() == 1
-            && let Some(pieces) = law.pieces()
+            && let Some(pieces) = law.ideal_elements()
         {
             if pieces.iter().any(IdealElement::has_force_drop) {
                 return Err(unsupported("its slip limit drops abruptly at the onset of slip"));

@@ -195,7 +195,7 @@ fn derivatives_agree_with_differences() {
             force_at(&c, Some(&mut tangent));
             let largest = tangent.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
             // a difference leaves out the kinks of sampled maps that lie within its step: one slope in 512 samples now and then
-            let (step, kinks) = (1e-6 * size, if law.pieces().is_some() { 1e-7 } else { 2e-3 });
+            let (step, kinks) = (1e-6 * size, if law.ideal_elements().is_some() { 1e-7 } else { 2e-3 });
             for k in (0..2 * count).filter(|k| !(is_real(k / 2) && k % 2 == 1)) {
                 let moved = |by: f64| {
                     let mut c = c.clone();
