@@ -128,11 +128,11 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 ///
 /// # Example
 /// ```
-/// use stickslip::curve::modes::{ModeRequest, mode};
+/// use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// // friction affects only the mode in which the blades move in antiphase
 /// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
-/// let mode = mode(&system, request).unwrap();
+/// let mode = nonlinear_mode(&system, request).unwrap();
 /// assert!(mode.ended.is_none());
 /// let stuck = ((105_103.0 + 2.0 * 1e4) / 0.182f64).sqrt();
 /// assert!((mode.points[0].omega / stuck - 1.0).abs() < 1e-6);

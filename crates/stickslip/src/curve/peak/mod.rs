@@ -124,7 +124,7 @@ pub fn held_amplitude(system: &System, omega: f64) -> f64 {
 ///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i)), None).unwrap())
 ///     .map(|orbit| CurvePoint::new(&orbit, &amplitudes))
 ///     .collect();
-/// let peaks = all(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
+/// let peaks = local_peaks(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
 /// assert_eq!(peaks.iter().filter(|peak| peak.quantity == 0).count(), 1);
 /// ```
 pub fn local_peaks(
