@@ -25,8 +25,11 @@ fn one(what: ListTopic) -> String {
     match what {
         ListTopic::Laws => {
             for row in law::TABLE {
-                let keys: Vec<_> =
-                    row.parameters.iter().map(|p| (p.key.to_owned(), format!("{}: {}", p.doc, p.takes()))).collect();
+                let keys: Vec<_> = row
+                    .parameters
+                    .iter()
+                    .map(|p| (p.key.to_owned(), format!("{}: {}", p.doc, p.describe_values())))
+                    .collect();
                 entry(row.name, row.summary, &keys);
             }
         }

@@ -5,7 +5,7 @@ use crate::{messages, run};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use stickslip::model::{Axis, DiskPart, Model, Place, ReductionEvidence, Substructure, SubstructureDamping, System};
+use stickslip::model::{Axis, DiskPart, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping, System};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry, names};
@@ -120,16 +120,16 @@ fn over_speeds(
     exports: &StiffnessExports,
 ) -> Result<ReducedStructure, String> {
     let seen: Vec<Row> =
-        places.iter().filter(|place| place.of.is_none()).flat_map(|place| place.rows.clone()).collect();
-    let reduced = exports.at_rest.reduced_between(&exports.at_speed, &seen, &substructure.reduction);
+        places.iter().filter(|place| place.view_of.is_none()).flat_map(|place| place.rows.clone()).collect();
+    let reduced = exports.at_rest.reduced_for_two_stiffnesses(&exports.at_speed, &seen, &substructure.reduction);
     let reduced = reduced.map_err(|error| error.to_string())?;
     let mut seen = reduced.seen.into_iter();
     let mut places: Vec<Place> = places.to_vec();
-    let rows = places.iter_mut().filter(|place| place.of.is_none()).flat_map(|place| &mut place.rows);
+    let rows = places.iter_mut().filter(|place| place.view_of.is_none()).flat_map(|place| &mut place.rows);
     rows.zip(&mut seen).for_each(|(row, seen)| *row = seen);
     let n = reduced.component.dofs();
-    let earlier = ReductionEvidence { error: reduced.error, up_to: reduced.up_to };
-    let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
+    let earlier = ReductionAccuracy { error: reduced.error, up_to: reduced.up_to };
+    let earlier = substructure.earlier_reduction.map_or(earlier, |first| first.combine(earlier));
     let system = assembled(reduced.component, earlier, places)?;
     let what = format!(
         "{n} coordinates ({}), error {:.1e} up to {:.6} Hz, at all speeds up to {:.6} rpm",
@@ -143,7 +143,13 @@ fn over_speeds(
         exports.export_speed, exports.speed
     );
     let keys = [vec![speed], damping_keys(substructure)].concat();
-    Ok(ReducedStructure { system, description: what, keys, second_stiffness: Some(reduced.there), sector: None })
+    Ok(ReducedStructure {
+        system,
+        description: what,
+        keys,
+        second_stiffness: Some(reduced.other_stiffness),
+        sector: None,
+    })
 }
 
 /// Reduces the sector of a disk with one basis for all its travelling waves.
@@ -165,8 +171,8 @@ fn sector(
         place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen);
     }
     let n = reduced.pairs.len();
-    let earlier = ReductionEvidence { error: reduced.error, up_to: reduced.up_to };
-    let earlier = substructure.earlier.map_or(earlier, |first| first.then(earlier));
+    let earlier = ReductionAccuracy { error: reduced.error, up_to: reduced.up_to };
+    let earlier = substructure.earlier_reduction.map_or(earlier, |first| first.combine(earlier));
     let sector = Sector { sectors, rows: reduced.component.rows().to_vec(), pairs: reduced.pairs };
     let system = assembled(reduced.component, earlier, places)?;
     let what =
@@ -181,9 +187,9 @@ fn sector(
 }
 
 /// Assembles reduced matrices as a structure.
-fn assembled(component: Component, earlier: ReductionEvidence, places: Vec<Place>) -> Result<System, String> {
+fn assembled(component: Component, earlier: ReductionAccuracy, places: Vec<Place>) -> Result<System, String> {
     let (damping, reduction) = (SubstructureDamping::Own, Reduction::None { up_to: 0.0 });
-    let whole = Substructure { component, damping, reduction, earlier: Some(earlier), disk: None };
+    let whole = Substructure { component, damping, reduction, earlier_reduction: Some(earlier), disk: None };
     let model = Model { substructure: Some(whole), places, ..Model::default() };
     model.assemble().map_err(|error| error.to_string())
 }
@@ -235,7 +241,7 @@ fn save(reduced: &ReducedStructure, out: &Path) -> Result<(), String> {
     }
     files.extend(reduced.second_stiffness.iter().map(|there| ("stiffened", there.entries().collect())));
     let mut text = format!("# {}\n[structure]\nunits = \"m-kg-s\"\n{}\n", reduced.description, reduced.keys.join("\n"));
-    if let Some(ReductionEvidence { error, up_to }) = reduced.system.reduction_evidence() {
+    if let Some(ReductionAccuracy { error, up_to }) = reduced.system.reduction_evidence() {
         let _ = writeln!(text, "reduced = {{ error = {error:e}, up_to = \"{up_to:e} rad/s\" }}");
     }
     for (key, entries) in files {
@@ -260,7 +266,7 @@ fn save(reduced: &ReducedStructure, out: &Path) -> Result<(), String> {
         let _ = writeln!(text, "\n[disk]\nsectors = {sectors}\nboundary = \"{BOUNDARY}\"");
     }
     let mut nodes: Vec<(&str, Vec<(&str, &Axis)>)> = Vec::new();
-    for (place, axis) in system.places().iter().zip(system.seen()) {
+    for (place, axis) in system.places().iter().zip(system.place_axes()) {
         let (name, along) = place.split_once('.').unwrap_or((place, ""));
         match nodes.last_mut().filter(|(last, _)| *last == name) {
             Some((_, axes)) => axes.push((along, axis)),

@@ -20,7 +20,7 @@ use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::{JointMotion, Orbit};
 use stickslip::structure::Structure;
-use stickslip::structure::reduction::{Damping, Free, Whole};
+use stickslip::structure::reduction::{FullStructure, RubinBasis, StructureDamping};
 
 /// Number of retained modes, in addition to the residual vectors of the contacts.
 const MODES: usize = 20;
@@ -67,13 +67,13 @@ fn system(brick: &Brick, nodes: usize) -> (System, f64) {
     let begin = seconds();
     let ports = brick.face(nodes);
     let axes = ports.len();
-    let damping = Damping::Ratio { ratio: 0.005, up_to: 4e4 };
-    let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
+    let damping = StructureDamping::Ratio { ratio: 0.005, up_to: 4e4 };
+    let whole = FullStructure::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
     let modes = whole.modes(8e4).unwrap();
     println!("{nodes} nodes: modes in {:.1} s, {}", seconds() - begin, memory());
     let first = modes.values[0].sqrt();
     let begin = seconds();
-    let free = Free::new(&whole, &modes, 0.0, 1).unwrap();
+    let free = RubinBasis::new(&whole, &modes, 0.0, 1).unwrap();
     let reduced = free.reduced(MODES.min(free.modes()), 1).unwrap();
     println!("  first mode {first:.0} rad/s, {}, in {:.1} s, {}", reduced.kind, seconds() - begin, memory());
     let names = (0..reduced.dofs()).map(|i| format!("q{i}")).collect();
@@ -138,7 +138,7 @@ fn curve(brick: &Brick, nodes: usize) -> f64 {
                 share(|joint| joint.open_fraction),
             );
         }
-        start = Some(orbit.start);
+        start = Some(orbit.initial_state);
     }
     let point = (seconds() - whole_curve) / POINTS as f64;
     println!("  {point:.3} s a point, {}; {}", found.text(), memory());
@@ -160,7 +160,8 @@ impl Tally {
         *self.status.entry(orbit.evidence.accuracy.status()).or_default() += 1;
         self.iterations.push(orbit.evidence.iterations);
         self.longest = self.longest.max(seconds);
-        self.error = orbit.evidence.truncation.map_or(self.error, |error| Some(self.error.unwrap_or(0.0).max(error)));
+        self.error =
+            orbit.evidence.error_estimate.map_or(self.error, |error| Some(self.error.unwrap_or(0.0).max(error)));
     }
 
     fn text(&self) -> String {

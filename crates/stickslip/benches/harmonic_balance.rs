@@ -62,14 +62,14 @@ struct Neighbours<'a> {
 impl<'a> Neighbours<'a> {
     fn new(system: &'a System, harmonics: usize) -> Self {
         let mut solver = balance(harmonics).solver(system).unwrap();
-        let start = solver.orbit(TAU * 121.0, None).unwrap().start;
+        let start = solver.orbit(TAU * 121.0, None).unwrap().initial_state;
         Neighbours { solver, start, count: 0 }
     }
 
     fn next(&mut self) {
         self.count += 1;
         let omega = TAU * (121.0 + 0.02 * f64::from(self.count));
-        self.start = self.solver.orbit(omega, Some(&self.start)).unwrap().start;
+        self.start = self.solver.orbit(omega, Some(&self.start)).unwrap().initial_state;
     }
 }
 
@@ -83,7 +83,7 @@ fn curve(method: HarmonicBalance, system: &System, points: u32) {
     let mut start: Option<Vec<f64>> = None;
     for i in 0..points {
         let orbit = solver.orbit(TAU * (119.5 + 3.0 * f64::from(i) / f64::from(points - 1)), start.as_deref()).unwrap();
-        start = Some(orbit.start);
+        start = Some(orbit.initial_state);
     }
 }
 

@@ -28,7 +28,7 @@ fn event_driven_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let system = couple(f64::from(ft), None);
     let hertz = f64::from(centihertz) / 100.0;
     let mut solver = EventDriven.solver(&system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().start;
+    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().initial_state;
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
 }
 
@@ -42,7 +42,7 @@ fn figure_6_exact() {
         for i in 0..241 {
             let orbit = solver.orbit(TAU * (119.5 + f64::from(i) / 80.0), start.as_deref()).unwrap();
             divan::black_box(orbit.is_stable());
-            start = Some(orbit.start);
+            start = Some(orbit.initial_state);
         }
     }
 }
@@ -54,7 +54,7 @@ fn smooth_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let system = couple(f64::from(ft), Some(25e3));
     let hertz = f64::from(centihertz) / 100.0;
     let mut solver = Shooting::default().solver(&system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().start;
+    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().initial_state;
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
 }
 
@@ -75,7 +75,7 @@ fn mass(law: SharedLaw) -> System {
 /// Times one orbit of method `auto`, with a warm start from 0.05 Hz below.
 fn warm(bencher: Bencher, system: &System, hertz: f64) {
     let mut solver = Auto.solver(system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.05), None).unwrap().start;
+    let start = solver.orbit(TAU * (hertz - 0.05), None).unwrap().initial_state;
     bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
 }
 

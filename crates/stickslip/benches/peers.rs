@@ -86,7 +86,7 @@ impl Ours {
 /// Returns the initial state, and the median time (s) and the amplitude of the orbit.
 fn time(method: &dyn Method, system: &System, hertz: f64) -> (Vec<f64>, (f64, f64)) {
     let mut solver = method.solver(system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().start;
+    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().initial_state;
     let mut amplitude = 0.0;
     let mut seconds: Vec<f64> = (0..RUNS)
         .map(|_| {

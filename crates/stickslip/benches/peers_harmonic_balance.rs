@@ -81,7 +81,7 @@ fn amplitudes(harmonics: usize, system: &System, hertz: impl Iterator<Item = f64
         .map(|hertz| {
             let orbit = solver.orbit(TAU * hertz, start.as_deref()).unwrap();
             let amplitude = orbit.places[0].amplitude();
-            start = Some(orbit.start);
+            start = Some(orbit.initial_state);
             amplitude
         })
         .collect()

@@ -15,7 +15,7 @@ use brick::Brick;
 use python::{Peer, number};
 use std::f64::consts::TAU;
 use std::time::Instant;
-use stickslip::structure::reduction::{Damping, Free, Reference, Whole};
+use stickslip::structure::reduction::{FullStructure, ReferenceReceptance, RubinBasis, StructureDamping};
 use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SymbolicAnalysis};
 
 const SCIPY: Peer = Peer { package: "scipy", version: "1.17.1", folder: "peers" };
@@ -40,10 +40,10 @@ fn main() {
 
     let up_to = modes.values[MODES - 1].sqrt();
     let ports = brick.face(16);
-    let damping = Damping::Ratio { ratio: 0.005, up_to };
-    let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).expect("a structure");
+    let damping = StructureDamping::Ratio { ratio: 0.005, up_to };
+    let whole = FullStructure::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).expect("a structure");
     clock.tell("analysis again");
-    let free = Free::new(&whole, &modes, 0.0, 1).expect("residual vectors");
+    let free = RubinBasis::new(&whole, &modes, 0.0, 1).expect("residual vectors");
     let rubin = free.reduced(MODES, 1).expect("reduced");
     clock.tell(&format!("reduction: {}", rubin.kind));
     memory("with modes and reduction");
@@ -57,7 +57,7 @@ fn main() {
     clock.tell(&format!("reduction: {}", bampton.kind));
     println!("  frequencies off by {:.1e}", worst(bampton.frequencies().expect("frequencies")));
     let samples: Vec<f64> = [0.5, 0.8].iter().map(|share| share * up_to).collect();
-    let reference = Reference::at(&whole, &samples).expect("samples");
+    let reference = ReferenceReceptance::at_frequencies(&whole, &samples).expect("samples");
     clock.tell("2 samples of the whole receptance");
     for reduced in [&rubin, &bampton] {
         let deviation = reference.deviation(reduced);

@@ -67,10 +67,10 @@ impl Dimension {
     /// # Example
     /// ```
     /// use stickslip::dimension::Dimension;
-    /// assert_eq!(Dimension::LENGTH.to_the(2.0), Some(Dimension { kg: 0, m: 2, s: 0, rad: 0 }));
-    /// assert_eq!(Dimension::LENGTH.to_the(1.5), None);
+    /// assert_eq!(Dimension::LENGTH.pow(2.0), Some(Dimension { kg: 0, m: 2, s: 0, rad: 0 }));
+    /// assert_eq!(Dimension::LENGTH.pow(1.5), None);
     /// ```
-    pub fn to_the(self, power: f64) -> Option<Dimension> {
+    pub fn pow(self, power: f64) -> Option<Dimension> {
         if power.fract() != 0.0 || power.abs() > f64::from(i8::MAX) {
             return None;
         }

@@ -50,7 +50,7 @@ fn sweep(system: &System, omegas: &[f64]) -> Vec<Orbit> {
     let mut orbits = Vec::new();
     for &omega in omegas {
         let orbit = solver.orbit(omega, start.as_deref()).unwrap_or_else(|error| panic!("{error}"));
-        start = Some(orbit.start.clone());
+        start = Some(orbit.initial_state.clone());
         orbits.push(orbit);
     }
     orbits
@@ -126,11 +126,11 @@ fn iterations(blades: usize, from: f64, step: f64, points: u32) -> (f64, usize) 
     let system = mistuned(blades);
     let method = HarmonicBalance { harmonics: Some(5), samples: None, tolerance: Some(0.1) };
     let mut solver = method.solver(&system).unwrap();
-    let mut start = solver.orbit(TAU * from, None).unwrap().start;
+    let mut start = solver.orbit(TAU * from, None).unwrap().initial_state;
     let counts: Vec<usize> = (1..=points)
         .map(|i| {
             let orbit = solver.orbit(TAU * (from + step * f64::from(i)), Some(&start)).unwrap();
-            start = orbit.start;
+            start = orbit.initial_state;
             orbit.evidence.iterations
         })
         .collect();

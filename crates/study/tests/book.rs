@@ -142,13 +142,13 @@ fn laws() -> String {
         // have
         let directions: BTreeSet<_> = [1.0, 2.0]
             .iter()
-            .map(|count| law.with(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
+            .map(|count| law.with_value(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
             .collect();
         let directions: Vec<_> = directions.iter().map(usize::to_string).collect();
-        let pieces = law.pieces().unwrap_or_default();
+        let pieces = law.ideal_elements().unwrap_or_default();
         let says = [
-            ("sliders", pieces.iter().any(|piece| matches!(piece, law::Piece::Slider(_)))),
-            ("stops", pieces.iter().any(|piece| matches!(piece, law::Piece::Stop { .. }))),
+            ("sliders", pieces.iter().any(|piece| matches!(piece, law::IdealElement::Slider(_)))),
+            ("stops", pieces.iter().any(|piece| matches!(piece, law::IdealElement::Stop { .. }))),
             ("first loading", law.masing().is_some()),
             ("slip curve", law.sliding().is_some()),
             ("resolvent", law.prox().is_some()),

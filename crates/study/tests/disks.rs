@@ -109,7 +109,7 @@ fn bars_stand_at_the_peak() {
 /// k (1 + deviation) for any name of the parameter; dependent parameters follow.
 #[test]
 fn mistuning_by_parameter_mass_and_spring() {
-    let pattern = stickslip::model::normal_pattern(6, 0.02, 7);
+    let pattern = stickslip::model::normal_deviations(6, 0.02, 7);
     let by_parameter = case("", "mistuning = { of = \"k\", deviation = \"2 %\", seed = 7 }");
     for (s, deviation) in pattern.iter().enumerate() {
         let spring = &by_parameter.model.springs[2 * s];
@@ -339,7 +339,7 @@ fn samples_of_a_disk_by_its_matrices() {
     let model = study.case(0).unwrap().model;
     assert_eq!(model.joints[5].between, ["tip_5", "tip_0"]);
     let disk = model.substructure.unwrap().disk.unwrap();
-    for (own, drawn) in disk.deviations.iter().zip(stickslip::model::normal_pattern(6, 0.01, 3)) {
+    for (own, drawn) in disk.deviations.iter().zip(stickslip::model::normal_deviations(6, 0.01, 3)) {
         assert!((own - ((1.0 + drawn).powi(2) - 1.0)).abs() < 1e-15, "a share of frequency is nearly two of stiffness");
     }
     let data = run(&study, &Context::without_progress(1)).unwrap();

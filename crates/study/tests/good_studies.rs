@@ -75,7 +75,7 @@ vary = { Ft = { from = \"2 N\", to = \"4 N\", points = 3 } }
     assert_eq!(study.cases(), 3);
     // a replaced law does not need valid values
     let study = read_study("a.toml", &text.replace("limit = \"Ft\"", "limit = \"1 N\""), &set("Ft", "-1 N")).unwrap();
-    assert_eq!(study.case(0).unwrap().model.joints[0].law.scale(), 1.0);
+    assert_eq!(study.case(0).unwrap().model.joints[0].law.force_scale(), 1.0);
 }
 
 #[test]
@@ -376,8 +376,8 @@ fn a_unit_can_be_written_for_every_exponent() {
     for row in law::TABLE {
         for (raised, power) in row.parameters.iter().filter_map(|p| Some((p, p.power?))) {
             let range = row.parameters.iter().find(|p| p.key == power).unwrap().range;
-            for exponent in (0..=1000).map(f64::from).filter(|exponent| range.has(*exponent)) {
-                let dimension = raised.dimension.to_the(exponent).unwrap();
+            for exponent in (0..=1000).map(f64::from).filter(|exponent| range.contains(*exponent)) {
+                let dimension = raised.dimension.pow(exponent).unwrap();
                 let value = |p: &law::Parameter, sample: f64| match p.key {
                     key if key == raised.key => {
                         format!("{key} = \"2 m^{} s^{} kg^{}\"", dimension.m, dimension.s, dimension.kg)

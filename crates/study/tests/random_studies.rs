@@ -310,7 +310,7 @@ fn methods_agree_within_their_errors() {
             continue;
         };
         // the system has at most one orbit, except for offsets of stuck joints
-        if !system.contracts() {
+        if !system.is_incrementally_stable() {
             continue;
         }
         let Ok(mut exact) = EventDriven.solver(&system) else { continue };
@@ -322,11 +322,11 @@ fn methods_agree_within_their_errors() {
         for (which, method) in others.iter().enumerate() {
             let Ok(mut solver) = method.solver(&system) else { continue };
             let Ok(orbit) = solver.orbit(omega, None) else { continue };
-            if exact.is_one_of_many() || orbit.is_one_of_many() || orbit.evidence.accuracy != Accuracy::Converged {
+            if exact.is_in_continuum() || orbit.is_in_continuum() || orbit.evidence.accuracy != Accuracy::Converged {
                 continue;
             }
             compared[which] += 1;
-            let allowed = ESTIMATE * orbit.evidence.truncation.unwrap_or(0.0) + CLOSED;
+            let allowed = ESTIMATE * orbit.evidence.error_estimate.unwrap_or(0.0) + CLOSED;
             let (size, gap) = distance(&exact, &orbit);
             if gap > allowed * size {
                 let name = method.name();

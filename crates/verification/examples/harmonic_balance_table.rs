@@ -45,7 +45,7 @@ fn main() {
                 .map(|omega| {
                     let orbit = exact.orbit(*omega, start.as_deref()).unwrap();
                     let amplitudes = orbit.places.iter().map(|p| p.amplitude()).collect();
-                    start = Some(orbit.start);
+                    start = Some(orbit.initial_state);
                     amplitudes
                 })
                 .collect();
@@ -63,8 +63,8 @@ fn main() {
                             for (place, exact) in orbit.places.iter().zip(judge) {
                                 worst = worst.max((place.amplitude() - exact).abs() / size);
                             }
-                            estimate = estimate.max(orbit.evidence.truncation.unwrap_or(0.0));
-                            start = Some(orbit.start);
+                            estimate = estimate.max(orbit.evidence.error_estimate.unwrap_or(0.0));
+                            start = Some(orbit.initial_state);
                         }
                         Err(error) => {
                             failed += 1;

@@ -266,7 +266,7 @@ pub fn with_mass(system: &System, change: impl FnOnce(&mut DMatrix<f64>)) -> Res
     let mut mass = old.mass().clone();
     change(&mut mass);
     let structure = Structure::new(old.places().to_vec(), mass, old.damping().clone(), old.stiffness().clone())?;
-    Ok(system.on(structure).expect("as many degrees of freedom"))
+    Ok(system.with_structure(structure).expect("as many degrees of freedom"))
 }
 
 /// Assembles a template with the laws of all joints replaced by `law(limit)`, given the slip
@@ -275,7 +275,7 @@ pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> S
     let template = templates::find(name).unwrap_or_else(|| panic!("no template {name}"));
     let mut model = template.model_with(changes).unwrap_or_else(|error| panic!("{error}"));
     for joint in &mut model.joints {
-        joint.law = law(joint.law.scale());
+        joint.law = law(joint.law.force_scale());
     }
     model.assemble().expect("well formed")
 }
@@ -386,7 +386,7 @@ pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) 
 /// Returns harmonic `n` of a quantity of an orbit, `X` in `Re(X e^{jnΩt})`, by the Gauss rule
 /// between the switches.
 pub fn harmonic(orbit: &Orbit, n: u32, quantity: impl Fn(&Sample) -> f64) -> Complex64 {
-    let (period, mut breaks) = (orbit.period(), orbit.switch_times());
+    let (period, mut breaks) = (orbit.period(), orbit.transition_times());
     breaks.push(0.5 * period);
     let rate = f64::from(n) * orbit.omega;
     let part = |turn: fn(f64) -> f64| {

@@ -11,16 +11,16 @@
 
 use crate::replay::{self, NODES};
 use nalgebra::DVector;
-use stickslip::law::{MOST_DIRECTIONS, Piece, Relative, SharedLaw, Slider};
+use stickslip::law::{IdealElement, MAX_DIRECTIONS, RelativeMotion, SharedLaw, Slider};
 use stickslip::model::{Axis, System};
 
-type Along = [f64; MOST_DIRECTIONS];
+type Along = [f64; MAX_DIRECTIONS];
 
 /// A law with its states in this motion.
 #[derive(Debug, Clone)]
 struct Contact {
     law: SharedLaw,
-    pieces: Option<Vec<Piece>>,
+    pieces: Option<Vec<IdealElement>>,
     axes: Vec<Axis>,
     /// Internal states, or forces of sliders; `moving` tells which sliders moved in the last
     /// step.
@@ -71,15 +71,15 @@ impl<'a> Reference<'a> {
     pub fn new(system: &'a System, omega: f64, steps: usize, displacement: &[f64], velocity: &[f64]) -> Self {
         let contacts = system.joints().iter().map(|joint| {
             let mut law = joint.law().clone();
-            if law.step().is_none() && law.rate().is_none() && law.pieces().is_none() {
+            if law.step().is_none() && law.rate().is_none() && law.ideal_elements().is_none() {
                 // a set-valued law that is not a sum of sliders: smooth it over a velocity far
                 // below that of the motion
                 law = law.regularised(NARROW / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
-            let pieces = if law.step().is_none() && law.rate().is_none() { law.pieces() } else { None };
+            let pieces = if law.step().is_none() && law.rate().is_none() { law.ideal_elements() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));
             let states = states.unwrap_or(pieces.as_ref().map_or(0, Vec::len));
-            let rest = [0.0; MOST_DIRECTIONS];
+            let rest = [0.0; MAX_DIRECTIONS];
             let (z, moving) = (vec![0.0; states], vec![false; states]);
             Contact { law, pieces, axes: joint.axes().to_vec(), z, moving, u: rest, v: rest }
         });
@@ -114,8 +114,7 @@ impl<'a> Reference<'a> {
         let mut found = Vec::new();
         for contact in &self.contacts {
             let mut z = contact.z.clone();
-            let elastic =
-                |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > 0.0);
+            let elastic = |piece: &IdealElement| matches!(piece, IdealElement::Slider(s) if s.stiffness.is_some() && s.static_limit > 0.0);
             match &contact.pieces {
                 Some(pieces) => {
                     for (z, _) in z.iter_mut().zip(pieces).filter(|(_, piece)| elastic(piece)) {
@@ -137,9 +136,9 @@ impl<'a> Reference<'a> {
     }
 
     fn motion(&self, j: usize, x: &DVector<f64>, v: &DVector<f64>, time: f64) -> (Along, Along) {
-        let (mut u, mut rate) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS]);
+        let (mut u, mut rate) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS]);
         for (k, axis) in self.contacts[j].axes.iter().enumerate() {
-            (u[k], rate[k]) = (axis.along(x.as_slice()), axis.along(v.as_slice()));
+            (u[k], rate[k]) = (axis.component(x.as_slice()), axis.component(v.as_slice()));
             for &(h, g) in axis.imposed() {
                 let turn = num_complex::Complex64::cis(f64::from(h) * self.omega * time) * g;
                 u[k] += turn.re;
@@ -252,7 +251,7 @@ impl Contact {
     fn after(&self, u: Along, v: Along, h: f64, stiff: f64) -> (Along, Vec<f64>, Vec<bool>) {
         let (mut z, mut moving) = (self.z.clone(), self.moving.clone());
         if let Some(step) = self.law.step() {
-            let force = step.value(&self.u, &u, &mut z);
+            let force = step.advance_values(&self.u, &u, &mut z);
             return (force, z, moving);
         }
         if let Some(rate) = self.law.rate() {
@@ -260,17 +259,18 @@ impl Contact {
             let motion = NODES.map(|c| {
                 let velocity = std::array::from_fn(|a| self.v[a] + c * (v[a] - self.v[a]));
                 let way = |a: usize| c * h * (self.v[a] + 0.5 * c * (v[a] - self.v[a]));
-                Relative { displacement: std::array::from_fn(|a| self.u[a] + way(a)), velocity }
+                RelativeMotion { displacement: std::array::from_fn(|a| self.u[a] + way(a)), velocity }
             });
             z = replay::after(rate, self.axes.len(), h, &motion, &self.z);
-            let force = rate.value(&Relative { displacement: u, velocity: v }, &z, &mut vec![0.0; z.len()]);
+            let force =
+                rate.evaluate_values(&RelativeMotion { displacement: u, velocity: v }, &z, &mut vec![0.0; z.len()]);
             return (force, z, moving);
         }
         let mut force = 0.0;
         for (i, piece) in self.pieces.iter().flatten().enumerate() {
             match *piece {
-                Piece::Stop { gap, stiffness } => force += stiffness * (u[0] - gap).max(0.0),
-                Piece::Slider(Slider { stiffness, limit, static_limit }) => {
+                IdealElement::Stop { gap, stiffness } => force += stiffness * (u[0] - gap).max(0.0),
+                IdealElement::Slider(Slider { stiffness, limit, static_limit }) => {
                     let trial = self.z[i] + stiffness.unwrap_or(stiff) * (u[0] - self.u[0]);
                     let most = if self.moving[i] { limit } else { static_limit };
                     moving[i] = trial.abs() > most;

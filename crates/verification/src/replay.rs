@@ -3,12 +3,12 @@
 
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
-use stickslip::law::{Law, MOST_DIRECTIONS, Piece, Prox, Rate, RatePoint, Relative, Step};
+use stickslip::law::{IdealElement, Law, MAX_DIRECTIONS, ProxView, RatePoint, RateView, RelativeMotion, StepView};
 
 use crate::Random;
 
 /// Displacement (m) and velocity (m/s) along all directions.
-pub type Instant = ([f64; MOST_DIRECTIONS], [f64; MOST_DIRECTIONS]);
+pub type Instant = ([f64; MAX_DIRECTIONS], [f64; MAX_DIRECTIONS]);
 
 /// A given motion as a function of time, from zero on.
 pub type Given<'a> = &'a dyn Fn(f64) -> Instant;
@@ -26,7 +26,7 @@ pub enum View {
 /// Returns the views that a law offers.
 pub fn views(law: &dyn Law) -> Vec<View> {
     let offered = [
-        (View::Pieces, law.pieces().is_some()),
+        (View::Pieces, law.ideal_elements().is_some()),
         (View::Step, law.step().is_some()),
         (View::Rate, law.rate().is_some()),
         (View::Prox, law.prox().is_some()),
@@ -43,16 +43,16 @@ pub fn views(law: &dyn Law) -> Vec<View> {
 ///
 /// # Panics
 /// If the law does not offer the view.
-pub fn forces(law: &dyn Law, view: View, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+pub fn forces(law: &dyn Law, view: View, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     match view {
-        View::Pieces => pieces(&law.pieces().expect("pieces"), motion, times),
+        View::Pieces => pieces(&law.ideal_elements().expect("pieces"), motion, times),
         View::Step => step(law.step().expect("a step"), motion, times),
         View::Rate => rate(law.directions(), law.rate().expect("a rate"), motion, times),
         View::Prox => prox(law.directions(), law.prox().expect("a resolvent"), motion, times),
     }
 }
 
-fn pieces(pieces: &[Piece], motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn pieces(pieces: &[IdealElement], motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let mut held = vec![0.0; pieces.len()];
     let mut before = motion(times[0]).0[0];
     times
@@ -62,7 +62,7 @@ fn pieces(pieces: &[Piece], motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_
             let (u, v, way) = (u[0], v[0], u[0] - before);
             before = u;
             let each = pieces.iter().zip(&mut held).map(|(piece, held)| match *piece {
-                Piece::Slider(slider) => {
+                IdealElement::Slider(slider) => {
                     *held = match slider.stiffness {
                         Some(stiffness) => (*held + stiffness * way).clamp(-slider.limit, slider.limit),
                         None if v != 0.0 => slider.limit * v.signum(),
@@ -70,21 +70,21 @@ fn pieces(pieces: &[Piece], motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_
                     };
                     *held
                 }
-                Piece::Stop { gap, stiffness } => stiffness * (u - gap).max(0.0),
+                IdealElement::Stop { gap, stiffness } => stiffness * (u - gap).max(0.0),
             });
             [each.sum(), 0.0, 0.0]
         })
         .collect()
 }
 
-fn step(step: &dyn Step, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn step(step: &dyn StepView, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let mut z = vec![0.0; step.states()];
     let mut before = motion(times[0]).0;
     times
         .iter()
         .map(|&time| {
             let to = motion(time).0;
-            let force = step.value(&before, &to, &mut z);
+            let force = step.advance_values(&before, &to, &mut z);
             before = to;
             force
         })
@@ -107,7 +107,7 @@ const STAGES: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 /// # Panics
 /// If the equations of the step are singular.
 #[must_use]
-pub fn after(law: &dyn Rate, directions: usize, h: f64, motion: &[Relative<f64>; 2], z: &[f64]) -> Vec<f64> {
+pub fn after(law: &dyn RateView, directions: usize, h: f64, motion: &[RelativeMotion<f64>; 2], z: &[f64]) -> Vec<f64> {
     let n = law.states();
     let mut point = RatePoint::new(directions, n);
     let mut stages = DVector::from_fn(2 * n, |i, _| z[i % n]);
@@ -115,7 +115,7 @@ pub fn after(law: &dyn Rate, directions: usize, h: f64, motion: &[Relative<f64>;
         let mut rates = vec![0.0; 2 * n];
         let mut slopes = DMatrix::zeros(2 * n, n);
         for s in 0..2 {
-            law.linearise(directions, &motion[s], &stages.as_slice()[s * n..(s + 1) * n], &mut point);
+            law.evaluate_with_derivatives(directions, &motion[s], &stages.as_slice()[s * n..(s + 1) * n], &mut point);
             rates[s * n..(s + 1) * n].copy_from_slice(&point.rate);
             for i in 0..n {
                 for j in 0..n {
@@ -142,11 +142,11 @@ pub fn after(law: &dyn Rate, directions: usize, h: f64, motion: &[Relative<f64>;
     stages.as_slice()[n..].to_vec()
 }
 
-fn rate(directions: usize, law: &dyn Rate, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn rate(directions: usize, law: &dyn RateView, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let mut z = vec![0.0; law.states()];
     let relative = |time: f64| {
         let (displacement, velocity) = motion(time);
-        Relative { displacement, velocity }
+        RelativeMotion { displacement, velocity }
     };
     let mut last = times[0];
     times
@@ -155,18 +155,18 @@ fn rate(directions: usize, law: &dyn Rate, motion: Given<'_>, times: &[f64]) -> 
             let h = time - last;
             z = after(law, directions, h, &NODES.map(|c| relative(last + c * h)), &z);
             last = time;
-            law.value(&relative(time), &z, &mut vec![0.0; z.len()])
+            law.evaluate_values(&relative(time), &z, &mut vec![0.0; z.len()])
         })
         .collect()
 }
 
-fn prox(directions: usize, law: &dyn Prox, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MOST_DIRECTIONS]> {
+fn prox(directions: usize, law: &dyn ProxView, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let resolve = |y: &[f64], penalty: f64| {
-        let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
+        let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
         law.resolve(y, penalty, &mut force[..directions], &mut slope[..directions * directions]);
         force
     };
-    let mut force = [0.0; MOST_DIRECTIONS];
+    let mut force = [0.0; MAX_DIRECTIONS];
     let mut before = motion(times[0]).0;
     let mut last = times[0];
     times
@@ -180,7 +180,7 @@ fn prox(directions: usize, law: &dyn Prox, motion: Given<'_>, times: &[f64]) -> 
                 force = resolve(&y, stiffness * (time - last));
             } else if law.compliance() == 0.0 {
                 // `λ = J(λ + ε v)`: a larger penalty converges faster
-                let penalty = 1e6 + 1e3 * law.least_penalty();
+                let penalty = 1e6 + 1e3 * law.minimum_penalty();
                 for _ in 0..100 {
                     let y: Vec<f64> = (0..directions).map(|a| force[a] + penalty * v[a]).collect();
                     force = resolve(&y, penalty);
@@ -193,11 +193,11 @@ fn prox(directions: usize, law: &dyn Prox, motion: Given<'_>, times: &[f64]) -> 
 }
 
 /// Returns the energy lost between the samples, `∫ f · du` by the trapezoidal rule, J.
-pub fn lost(motion: Given<'_>, times: &[f64], forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
+pub fn lost(motion: Given<'_>, times: &[f64], forces: &[[f64; MAX_DIRECTIONS]]) -> f64 {
     let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
     let each = |k: usize| -> f64 {
         let along = |a: usize| 0.5 * (forces[k][a] + forces[k + 1][a]) * (places[k + 1][a] - places[k][a]);
-        (0..MOST_DIRECTIONS).map(along).sum()
+        (0..MAX_DIRECTIONS).map(along).sum()
     };
     (0..times.len() - 1).map(each).sum()
 }
@@ -214,7 +214,7 @@ pub fn random_motion(seed: u64, directions: usize, speed: f64) -> impl Fn(f64) -
         }
     }
     move |time| {
-        let (mut u, mut v) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS]);
+        let (mut u, mut v) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS]);
         for &(direction, harmonic, amplitude, phase) in &terms {
             let omega = TAU * harmonic * speed;
             u[direction] += amplitude * ((omega * time + phase).sin() - phase.sin());

@@ -65,7 +65,7 @@ fn variable(name: &str, default: u64) -> u64 {
 fn distance(system: &System, omega: f64, orbit: &Orbit, steps: usize) -> Option<(f64, f64)> {
     let start = orbit.sample(0.0);
     let reference = Reference::new(system, omega, steps, &start.displacement, &start.velocity);
-    let mut reference = reference.with_states(orbit.start.get(2 * system.dofs()..).unwrap_or_default());
+    let mut reference = reference.with_states(orbit.initial_state.get(2 * system.dofs()..).unwrap_or_default());
     let (amplitudes, change) = reference.settle(PERIODS, SETTLED);
     if change > SETTLED || reference.lost > 0 {
         return None;
@@ -108,8 +108,10 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
             // method `transient` is slow; this tolerance is enough here
             let options = row.options.iter().filter(|o| row.name == "transient" && o.key == "tolerance");
             let method = (row.build)(&options.map(|o| (o.key.to_owned(), WAITED)).collect()).unwrap();
-            let quick =
-                system.joints().iter().all(|joint| joint.law().pieces().is_some() || joint.law().rate().is_some());
+            let quick = system
+                .joints()
+                .iter()
+                .all(|joint| joint.law().ideal_elements().is_some() || joint.law().rate().is_some());
             if row.name == "transient" && !quick && (!long || seed % RARELY != 0) {
                 continue;
             }
@@ -138,7 +140,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
                     continue;
                 }
             };
-            let allowed = NEAR + 3.0 * orbit.evidence.truncation.unwrap_or(0.0);
+            let allowed = NEAR + 3.0 * orbit.evidence.error_estimate.unwrap_or(0.0);
             // a reference that is too coarse for a law cannot judge
             let (mut coarser, mut judged) = (None, None);
             for steps in STEPS {

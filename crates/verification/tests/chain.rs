@@ -99,7 +99,7 @@ fn chain_of_eight_agrees_with_scipy() {
 /// Returns the smooth law's state near the exact orbit: in slip the slider moves with the
 /// joint, in stick it creeps.
 fn start_near(orbit: &Orbit, alpha: f64) -> Vec<f64> {
-    let mut start = orbit.start[..16].to_vec();
+    let mut start = orbit.initial_state[..16].to_vec();
     for (j, joint) in orbit.sample(0.0).joints.iter().enumerate() {
         let limit = 1.5 + 0.5 * j as f64;
         let slips = joint.force[0].abs() > 0.999 * limit;
@@ -188,7 +188,7 @@ fn joints_switch_together_by_symmetry() {
                 assert_eq!(orbit.evidence.switches, count * first.switches);
                 // between the switches all contacts have the same state (the reversed joint
                 // slips in the other direction)
-                let times = orbit.switch_times();
+                let times = orbit.transition_times();
                 for pair in times.windows(2).filter(|pair| pair[1] - pair[0] > 1e-9 * orbit.period()) {
                     let joints = orbit.sample(0.5 * (pair[0] + pair[1])).joints;
                     for (i, joint) in joints.iter().enumerate() {
@@ -238,7 +238,7 @@ fn order_of_listing_does_not_matter() {
         model.joints.reverse();
         let reversed = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None);
         let (Ok(orbit), Ok(reversed)) = (orbit, reversed) else { continue };
-        if model.joints.len() < 2 || orbit.is_one_of_many() {
+        if model.joints.len() < 2 || orbit.is_in_continuum() {
             continue; // the offset of a stuck joint is free
         }
         compared += 1;

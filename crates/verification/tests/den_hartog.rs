@@ -95,7 +95,7 @@ fn theory_7_2_amplitude_and_phase() {
         let (u, v) = functions(r);
         let (cos, sin) = (x0 / v, -beta * u / v);
         let time = sin.atan2(cos).rem_euclid(2.0 * PI) / r;
-        let nearest = orbit.switch_times().iter().map(|t| (t - time).abs()).fold(f64::INFINITY, f64::min);
+        let nearest = orbit.transition_times().iter().map(|t| (t - time).abs()).fold(f64::INFINITY, f64::min);
         near("instant of the maximum", nearest, 0.0, 1e-8);
     }
     // reference values of section 7

@@ -9,7 +9,7 @@ use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
 use stickslip::method::transient::Transient;
-use stickslip::model::{Around, Disk, normal_pattern};
+use stickslip::model::{Disk, SectorDistribution, normal_deviations};
 use stickslip::{Force, GROUND, Joint, Mass, Method, Model, Orbit, Spring};
 use stickslip_verification::close;
 use stickslip_verification::reference::Reference;
@@ -42,7 +42,7 @@ fn sector(law: SharedLaw) -> Model {
     }
 }
 
-fn ring(sector: &Model, sectors: usize, forces: &[Around]) -> Model {
+fn ring(sector: &Model, sectors: usize, forces: &[SectorDistribution]) -> Model {
     let disk = Disk { sectors, forces: forces.to_vec(), motions: Vec::new() };
     disk.ring(|_| sector.clone()).unwrap()
 }
@@ -87,7 +87,7 @@ fn a_tuned_sector_is_the_full_ring() {
         let samples = Some(sectors * 128);
         let balance = HarmonicBalance { harmonics: Some(9), samples, ..HarmonicBalance::default() };
         for law in &laws {
-            let model = ring(&sector(law.clone()), sectors, &[Around::EngineOrder(order)]);
+            let model = ring(&sector(law.clone()), sectors, &[SectorDistribution::EngineOrder(order)]);
             let one = orbit(&model, &balance, omega);
             let all = orbit(&whole(model), &balance, omega);
             let apart = distance(&one, &all);
@@ -114,7 +114,8 @@ fn a_sector_with_normal_contact_is_its_ring() {
         forces: vec![force("blade.x", 0.3, 1), force("blade.z", 0.1, 2), force("blade.z", 0.2, 0)],
         ..Model::default()
     };
-    let orders = [Around::EngineOrder(2), Around::EngineOrder(4), Around::EngineOrder(0)];
+    let orders =
+        [SectorDistribution::EngineOrder(2), SectorDistribution::EngineOrder(4), SectorDistribution::EngineOrder(0)];
     let balance = HarmonicBalance { harmonics: Some(7), samples: Some(9 * 64), ..HarmonicBalance::default() };
     let model = ring(&sector, 9, &orders);
     assert_eq!(model.ring.unwrap().order, Some(2));
@@ -129,11 +130,12 @@ fn a_sector_with_normal_contact_is_its_ring() {
 #[test]
 fn methods_in_time_find_the_wave() {
     let balance = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
-    let exact = ring(&sector(Arc::new(Jenkins { stiffness: 1.0, limit: 0.4 })), 5, &[Around::EngineOrder(1)]);
+    let exact =
+        ring(&sector(Arc::new(Jenkins { stiffness: 1.0, limit: 0.4 })), 5, &[SectorDistribution::EngineOrder(1)]);
     let apart = distance(&orbit(&exact, &balance, 3.1), &orbit(&exact, &EventDriven, 3.1));
     assert!(apart < 1e-6, "{apart:.1e}");
     let law = JenkinsArctan { stiffness: 1.0, limit: 0.4, alpha: 0.5 };
-    let smooth = ring(&sector(Arc::new(law)), 4, &[Around::EngineOrder(1)]);
+    let smooth = ring(&sector(Arc::new(law)), 4, &[SectorDistribution::EngineOrder(1)]);
     let shooting = Shooting { tolerance: 1e-9, ..Shooting::default() };
     let apart = distance(&orbit(&smooth, &balance, 3.1), &orbit(&smooth, &shooting, 3.1));
     assert!(apart < 1e-5, "{apart:.1e}");
@@ -144,7 +146,7 @@ fn methods_in_time_find_the_wave() {
 fn engine_orders_alias() {
     let balance = HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() };
     let law: SharedLaw = Arc::new(Jenkins { stiffness: 1.0, limit: 0.4 });
-    let find = |order| orbit(&ring(&sector(law.clone()), 24, &[Around::EngineOrder(order)]), &balance, 3.1);
+    let find = |order| orbit(&ring(&sector(law.clone()), 24, &[SectorDistribution::EngineOrder(order)]), &balance, 3.1);
     let (first, same, back) = (find(5), find(29), find(-19));
     for other in [&same, &back] {
         assert!(first.places.iter().zip(&other.places).all(|(a, b)| a == b), "to the last bit");
@@ -158,7 +160,7 @@ fn engine_orders_alias() {
     // linear: order e excites the nodal diameter n alone if and only if e = jN ± n
     let free = Model { joints: Vec::new(), ..sector(law.clone()) };
     for (order, diameter) in [(3, 3), (21, 3), (27, 3), (45, 3), (12, 12), (25, 1)] {
-        let orbit = orbit(&ring(&free, 24, &[Around::EngineOrder(order)]), &EventDriven, 3.1);
+        let orbit = orbit(&ring(&free, 24, &[SectorDistribution::EngineOrder(order)]), &EventDriven, 3.1);
         for n in 0..=12 {
             let share: Complex64 = (0..24)
                 .map(|s| {
@@ -215,7 +217,7 @@ fn eq10_5_optimum_of_dampers_between_blades() {
     // peak: phase resonance at `ω² = k + 4 sin²(θ/2) Re K_J(2 A sin(θ/2))`, evaluated at the
     // optimal limit and near it
     let peak = |limit: f64| {
-        let system = ring(&dampers(stiffness, limit, load), sectors, &[Around::EngineOrder(diameter)]);
+        let system = ring(&dampers(stiffness, limit, load), sectors, &[SectorDistribution::EngineOrder(diameter)]);
         largest(&system, 1, [1.0, 1.06])
     };
     let found = peak(best);
@@ -246,7 +248,7 @@ fn eq10_5_optimum_in_time() {
     let best = PI * load / (4.0 * half.sin());
     let amplitude = PI * load / (4.0 * stiffness * half.sin().powi(2));
     let omega = (1.0 + 2.0 * stiffness * half.sin().powi(2)).sqrt();
-    let model = ring(&dampers(stiffness, best, load), sectors as usize, &[Around::EngineOrder(1)]);
+    let model = ring(&dampers(stiffness, best, load), sectors as usize, &[SectorDistribution::EngineOrder(1)]);
     let waited = orbit(&model, &Transient::default(), omega);
     let balance = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
     let balanced = orbit(&model, &balance, omega);
@@ -270,7 +272,7 @@ fn eq10_5_optimum_in_time() {
 #[test]
 fn eq10_5_engine_order_zero_is_not_damped() {
     for limit in [1e-3, 1.0, 1e3] {
-        let system = ring(&dampers(0.2, limit, 1.0), 6, &[Around::EngineOrder(0)]);
+        let system = ring(&dampers(0.2, limit, 1.0), 6, &[SectorDistribution::EngineOrder(0)]);
         for omega in [0.7, 0.99, 1.3] {
             let alone = 1.0 / (1.0f64 - omega * omega).abs();
             for method in [&HarmonicBalance::default() as &dyn Method, &EventDriven] {
@@ -326,7 +328,7 @@ fn amplification(pattern: &[f64], coupling: f64) -> f64 {
         forces: vec![force("blade", 1.0, 1)],
         ..Model::default()
     };
-    let disk = Disk { sectors: pattern.len(), forces: vec![Around::EngineOrder(0)], motions: Vec::new() };
+    let disk = Disk { sectors: pattern.len(), forces: vec![SectorDistribution::EngineOrder(0)], motions: Vec::new() };
     let ring = disk.ring(one).unwrap();
     let survey = ring.survey().unwrap();
     let system = survey.system();
@@ -372,7 +374,7 @@ fn whiteheads_bound_is_reached_and_not_passed() {
         for seed in 0..60 {
             // alternate between mistuning weaker and stronger than the coupling
             let deviation = COUPLING * [0.1, 1.0, 5.0][seed as usize % 3];
-            worst = worst.max(amplification(&normal_pattern(sectors, deviation, seed), COUPLING));
+            worst = worst.max(amplification(&normal_deviations(sectors, deviation, seed), COUPLING));
         }
         assert!(worst > 1.2 && worst < bound, "{sectors}: {worst} of {bound}");
     }

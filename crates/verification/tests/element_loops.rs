@@ -42,7 +42,7 @@ fn theory_2_1_slip_begins_at_the_limit() {
             assert_eq!(orbit.evidence.stuck, ["contact"]);
             assert_eq!((orbit.joints[0].dissipation, orbit.joints[0].slip_fraction), (0.0, 0.0));
             for i in 0..64 {
-                let (x1, force) = orbit.sample(f64::from(i) / 64.0 * orbit.period()).moved[0];
+                let (x1, force) = orbit.sample(f64::from(i) / 64.0 * orbit.period()).imposed[0];
                 // the symmetric orbit of the continuum
                 near("straight line", force, kt * x1, 1e-14 * FT);
             }
@@ -62,15 +62,16 @@ fn theory_2_2_loop_is_a_parallelogram() {
             assert_eq!(orbit.evidence.switches, 4, "four break points per cycle");
             let corners = [(0.0, a, FT), (slip, a - 2.0 * d, -FT), (PI, -a, -FT), (PI + slip, -a + 2.0 * d, FT)];
             for (phase, x1, force) in corners {
-                let corner = orbit.sample(phase / omega).moved[0];
+                let corner = orbit.sample(phase / omega).imposed[0];
                 near("x1 at a corner", corner.0, x1, 1e-12 * a);
                 near("force at a corner", corner.1, force, 1e-12 * FT);
-                let at = orbit.switch_times().iter().map(|t| (t * omega - phase).abs()).fold(f64::INFINITY, f64::min);
+                let at =
+                    orbit.transition_times().iter().map(|t| (t * omega - phase).abs()).fold(f64::INFINITY, f64::min);
                 near("phase of the switch", at, 0.0, 1e-12);
             }
             for i in 0..256 {
                 let theta = f64::from(i) / 256.0 * PI;
-                let (x1, force) = orbit.sample(theta / omega).moved[0];
+                let (x1, force) = orbit.sample(theta / omega).imposed[0];
                 let slider = if theta <= slip { a - d } else { a * theta.cos() + d };
                 near("force", force, kt * (x1 - slider), 1e-11 * FT);
             }
@@ -111,28 +112,28 @@ fn theory_2_4_describing_function() {
     ];
     for ((kt, a), printed) in CASES.into_iter().zip(printed) {
         let (orbit, d) = (element(kt, a, 1.0), FT / kt);
-        let first = harmonic(&orbit, 1, |sample| sample.moved[0].1) / a;
+        let first = harmonic(&orbit, 1, |sample| sample.imposed[0].1) / a;
         let slip = (1.0 - 2.0 * d / a).acos();
         close("keq", first.re, kt / PI * (slip - (2.0 * slip).sin() / 2.0), 1e-9);
         close("w ceq", first.im, kt / PI * slip.sin().powi(2), 1e-9);
         close("w ceq, second form", first.im, 4.0 * FT / (PI * a) * (1.0 - d / a), 1e-9);
         close("w ceq from the loss", first.im, orbit.joints[0].dissipation / (PI * a * a), 1e-9);
-        let law = Jenkins { stiffness: kt, limit: FT }.linearised(a, 1.0);
+        let law = Jenkins { stiffness: kt, limit: FT }.describing_function(a, 1.0);
         assert!((law - first).norm() < 1e-9 * first.norm(), "{law} {first}");
         near("printed keq", first.re, printed.0, 0.5e-6);
         near("printed w ceq", first.im, printed.1, 0.5e-6);
         near("printed angle", slip.to_degrees(), printed.2, 0.5e-4);
-        near("printed onset", 1e3 * orbit.sample(slip).moved[0].0, printed.3, 1e-9);
+        near("printed onset", 1e3 * orbit.sample(slip).imposed[0].0, printed.3, 1e-9);
     }
     // limits: stuck, half, far
     let law = Jenkins { stiffness: 2.0, limit: FT };
     let d = FT / 2.0;
-    assert_eq!(law.linearised(d, 1.0), Complex64::new(2.0, 0.0));
-    let half = law.linearised(2.0 * d, 1.0);
+    assert_eq!(law.describing_function(d, 1.0), Complex64::new(2.0, 0.0));
+    let half = law.describing_function(2.0 * d, 1.0);
     assert!((half - Complex64::new(1.0, 2.0 / PI)).norm() < 1e-15);
     let far = 1e6;
     let orbit = element(2.0, far * d, 1.0);
-    let first = harmonic(&orbit, 1, |sample| sample.moved[0].1) / (far * d);
+    let first = harmonic(&orbit, 1, |sample| sample.imposed[0].1) / (far * d);
     close("far keq", first.re, 16.0 / (3.0 * PI) * 2.0 * far.powf(-1.5), 1e-3);
     close("far w ceq", first.im, 4.0 * FT / (PI * far * d), 2.0 / far);
 }
@@ -145,7 +146,7 @@ fn theory_3_1_smooth_element() {
         let orbit = smooth_element(kt, a, alpha, omega);
         let bound = FT * FRAC_2_PI * (alpha * a * omega).atan();
         let most =
-            (0..2000).map(|i| orbit.sample(f64::from(i) * orbit.period() / 2000.0).moved[0].1).fold(0.0, f64::max);
+            (0..2000).map(|i| orbit.sample(f64::from(i) * orbit.period() / 2000.0).imposed[0].1).fold(0.0, f64::max);
         assert!(most <= bound * (1.0 + 1e-12), "{most} {bound}");
         // the same rho and beta at another speed, stiffness and limit
         let other = {
@@ -162,7 +163,7 @@ fn theory_3_1_smooth_element() {
         let orbit = smooth_element(kt, a, alpha, omega);
         let dashpot = Complex64::new(0.0, omega * 2.0 * alpha * FT / PI);
         let maxwell = dashpot / (1.0 + dashpot / kt);
-        let first = harmonic(&orbit, 1, |sample| sample.moved[0].1) / a;
+        let first = harmonic(&orbit, 1, |sample| sample.imposed[0].1) / a;
         // the next term of the arctangent is `(alpha a w)^2 / 4` of the first; samples between
         // steps have errors of 1e-7
         let digits = 0.3 * (alpha * a * omega).powi(2) + 1e-7;
@@ -197,7 +198,7 @@ fn theory_3_1_arctan_dashpot_under_harmonic_motion() {
         let first = limit * 4.0 / PI * ((1.0 + z * z).sqrt() - 1.0) / z;
         let digits = 1e-9 + 1e-15 / (z * z); // `(√(1 + z²) - 1)/z` cancels for small z
         close("loss", orbit.joints[0].dissipation, PI * a * first, digits);
-        let law = CoulombArctan { limit, alpha }.linearised(a, omega);
+        let law = CoulombArctan { limit, alpha }.describing_function(a, omega);
         close("linearised", law.im * a, first, digits);
         // smaller intervals towards the reversals, where the arctangent is steep
         let mut breaks = vec![FRAC_PI_2, PI, 3.0 * FRAC_PI_2];
@@ -273,7 +274,7 @@ fn theory_3_2_and_3_4_printed_areas() {
         // which agrees to 1e-7
         close("ringing", 1e6 * orbit.joints[0].dissipation, printed, 2e-3);
         let most =
-            (0..4000).map(|i| orbit.sample(f64::from(i) * orbit.period() / 4000.0).moved[0].1).fold(0.0, f64::max);
+            (0..4000).map(|i| orbit.sample(f64::from(i) * orbit.period() / 4000.0).imposed[0].1).fold(0.0, f64::max);
         println!("kt {kt} a {a}: spring force reaches {:.4} Ft0", most / FT);
         assert!(most > 1.2 * FT && most < 2.05 * FT, "{}", most / FT);
     }

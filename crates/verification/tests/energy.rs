@@ -27,7 +27,7 @@ const POINTS: [(&str, f64, f64); 8] = [
 
 /// Returns the loop area of joint `j`: force times velocity, integrated between the switches.
 fn area(orbit: &Orbit, j: usize) -> f64 {
-    let mut breaks = orbit.switch_times();
+    let mut breaks = orbit.transition_times();
     breaks.push(0.5 * orbit.period());
     let power = |t: f64| {
         let joint = orbit.sample(t).joints[j];
@@ -105,7 +105,7 @@ fn theory_9_balance_of_random_models() {
         let (model, omega) = random_model(seed);
         let system: System = model.assemble().unwrap();
         let Ok(orbit) = EventDriven.solver(&system).unwrap().orbit(omega, None) else { continue };
-        let mut breaks = orbit.switch_times();
+        let mut breaks = orbit.transition_times();
         breaks.push(0.5 * orbit.period());
         let powers = |t: f64| {
             let sample = orbit.sample(t);

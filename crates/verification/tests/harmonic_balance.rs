@@ -4,7 +4,7 @@
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use stickslip::curve::modes::{ModeRequest, mode, self_excited};
+use stickslip::curve::modes::{ModeRequest, nonlinear_mode, self_excited};
 use stickslip::curve::performance::Performance;
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
 use stickslip::method::{Method, OrbitError, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
@@ -116,8 +116,8 @@ fn theory_10_1_and_10_2_griffin() {
 fn theory_10_3_nonlinear_mode() {
     let system = griffin(1.0, 0.0).assemble().unwrap();
     let request = ModeRequest { mode: 0, range: (0.1, 1e4), points: 60, harmonics: 1, samples: 4096 };
-    let mode = mode(&system, request).unwrap();
-    assert!(mode.lost.is_none());
+    let mode = nonlinear_mode(&system, request).unwrap();
+    assert!(mode.ended.is_none());
     for point in &mode.points {
         let (kt, a) = (0.2, point.amplitude);
         let d = 1.0 / kt;
@@ -182,7 +182,7 @@ fn massless_couple_against_event_driven() {
             let mean = 0.5 * (found.places[0].first_harmonic + found.places[1].first_harmonic);
             let linear = 5.0 / Complex64::new(105_103.0 - 0.182 * omega * omega, 0.2 * omega);
             assert!((mean - linear).norm() < 1e-12 * linear.norm(), "{mean} {linear}");
-            (start, exact_start) = (Some(found.start), Some(judge.start));
+            (start, exact_start) = (Some(found.initial_state), Some(judge.initial_state));
         }
     }
 }
@@ -206,7 +206,7 @@ fn whole_curves_of_figures_6_7_and_10() {
                     let omega = TAU * (119.5 + 0.0125 * f64::from(i));
                     let orbit = solver.orbit(omega, start.as_deref());
                     let orbit = orbit.unwrap_or_else(|e| panic!("{template} {all:?} H = {harmonics}: {e}"));
-                    start = Some(orbit.start);
+                    start = Some(orbit.initial_state);
                 }
             }
         }
@@ -245,7 +245,7 @@ fn theory_6_6_performance_of_the_couple() {
         let highest = (0..500).fold(0.0, |highest: f64, i| {
             let orbit = solver.orbit(TAU * (120.5 + 0.002 * f64::from(i)), start.as_deref()).unwrap();
             let amplitude = orbit.places[0].amplitude();
-            start = Some(orbit.start);
+            start = Some(orbit.initial_state);
             highest.max(amplitude)
         });
         let peak = performance.peak(limit).unwrap().peak.unwrap().value;
@@ -338,7 +338,7 @@ fn judge_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
             Err(OrbitError::Truncation { .. }) => continue,
             Err(error) => panic!("case {case}: {error}"),
         };
-        let (error, estimate) = (distance(&found, &exact), found.evidence.truncation.unwrap());
+        let (error, estimate) = (distance(&found, &exact), found.evidence.error_estimate.unwrap());
         if error < 1e-8 {
             assert!(estimate < 1e-7, "case {case}: {estimate} for an exact motion");
             continue;
@@ -436,7 +436,7 @@ fn smooth_laws_against_shooting() {
                 let judge = orbit(&Shooting::default(), &system, TAU * hertz);
                 let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
                 let found = orbit(&method, &system, TAU * hertz);
-                let estimate = found.evidence.truncation.unwrap();
+                let estimate = found.evidence.error_estimate.unwrap();
                 let error = distance(&found, &judge);
                 assert!(
                     error < 3.0 * estimate + 1e-6,
@@ -470,13 +470,13 @@ fn clear_words_instead_of_wrong_amplitudes() {
     let exact = orbit(&EventDriven, &system, TAU * 121.0);
     let method = HarmonicBalance { harmonics: Some(3), ..HarmonicBalance::default() };
     let found = orbit(&method, &system, TAU * 121.0);
-    let (error, estimate) = (distance(&found, &exact), found.evidence.truncation.unwrap());
+    let (error, estimate) = (distance(&found, &exact), found.evidence.error_estimate.unwrap());
     assert!(error > 1e-3 && found.evidence.accuracy == Accuracy::Truncated, "{error:.1e}");
     assert!(estimate > error / 3.0 && estimate < 3.0 * error, "{estimate:.1e} {error:.1e}");
     let enough = HarmonicBalance { tolerance: Some(0.5), ..method };
     assert_eq!(orbit(&enough, &system, TAU * 121.0).evidence.accuracy, Accuracy::Converged);
     // a remote state has no effect: a series starts from its own initial guess
-    let far = vec![1e3; exact.start.len()];
+    let far = vec![1e3; exact.initial_state.len()];
     let method = balance(9, 1024);
     let found = method.solver(&system).unwrap().orbit(TAU * 121.0, Some(&far)).unwrap();
     assert_eq!(found.places[0].amplitude(), orbit(&method, &system, TAU * 121.0).places[0].amplitude());

@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
+use stickslip::curve::continuation::BranchContinuation;
 use stickslip::curve::performance::Performance;
-use stickslip::curve::trace::Trace;
 use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
@@ -24,8 +24,8 @@ fn along_frequency_to_the_peak() {
         for limit in [2.0, 4.0, 6.0] {
             let couple = templates::find(template).unwrap();
             let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
-            let branch = Trace {
-                at: &|omega| (system.clone(), omega),
+            let branch = BranchContinuation {
+                system_at: &|omega| (system.clone(), omega),
                 method: balance(harmonics),
                 range: (TAU * 119.5, TAU * 122.5),
                 step: TAU * 0.1,
@@ -64,8 +64,8 @@ fn figures_6_7_and_10_by_continuation() {
             let system = templates::find(template).unwrap().model_with(&all).unwrap().assemble().unwrap();
             for harmonics in [3, 9] {
                 let method = balance(harmonics);
-                let branch = Trace {
-                    at: &|omega| (system.clone(), omega),
+                let branch = BranchContinuation {
+                    system_at: &|omega| (system.clone(), omega),
                     method,
                     range: (TAU * 119.5, TAU * 122.5),
                     step: TAU * 0.05,
@@ -112,8 +112,8 @@ fn along_a_force_around_a_turning_point() {
         forces: vec![Force { on: "m".into(), amplitude: force, phase: 0.0, harmonic: 1 }],
         ..Model::default()
     };
-    let branch = Trace {
-        at: &|force| (model(force).assemble().unwrap(), omega),
+    let branch = BranchContinuation {
+        system_at: &|force| (model(force).assemble().unwrap(), omega),
         method: HarmonicBalance { harmonics: Some(1), samples: Some(4096), tolerance: None },
         range: (0.05, 2.0),
         step: 0.02,
@@ -158,8 +158,8 @@ fn rigid_friction_around_two_turning_points() {
         };
         model.assemble().unwrap()
     };
-    let branch = Trace {
-        at: &|force| (system(force), omega),
+    let branch = BranchContinuation {
+        system_at: &|force| (system(force), omega),
         method: balance(31),
         range: (2.0, 0.5),
         step: 0.02,
@@ -190,7 +190,9 @@ fn rigid_friction_around_two_turning_points() {
             continue;
         }
         judged += 1;
-        let Ok(exact) = EventDriven.solver(&system(point.value)).unwrap().orbit(omega, Some(&point.orbit.start)) else {
+        let Ok(exact) =
+            EventDriven.solver(&system(point.value)).unwrap().orbit(omega, Some(&point.orbit.initial_state))
+        else {
             failed += 1;
             continue;
         };

@@ -38,7 +38,7 @@ fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
 fn agrees(model: &Model, omega: f64) {
     let system = model.assemble().unwrap();
     let (found, exact) = (orbit(&HarmonicBalance::default(), &system, omega), orbit(&EventDriven, &system, omega));
-    let estimate = found.evidence.truncation.unwrap();
+    let estimate = found.evidence.error_estimate.unwrap();
     assert_eq!(found.evidence.accuracy, Accuracy::Converged);
     let largest = exact.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
     for (a, b) in found.places.iter().zip(&exact.places) {
@@ -157,7 +157,7 @@ fn a_resonance_at_the_highest_harmonic() {
         let method = HarmonicBalance { harmonics: Some(15), ..HarmonicBalance::default() };
         let (found, exact) = (orbit(&method, &system, omega), orbit(&EventDriven, &system, omega));
         let error = (found.places[0].amplitude() / exact.places[0].amplitude() - 1.0).abs();
-        assert!(error < 3.0 * found.evidence.truncation.unwrap(), "{error:.1e} {:?}", found.evidence);
+        assert!(error < 3.0 * found.evidence.error_estimate.unwrap(), "{error:.1e} {:?}", found.evidence);
     }
 }
 
@@ -257,7 +257,7 @@ fn rigid_and_elastic_friction_in_a_plane_have_their_long_series() {
     let exact = orbit(&EventDriven, &system(&stiffness[1..], line), omega);
     let error = (found.places[1].amplitude() / exact.places[0].amplitude() - 1.0).abs();
     assert_eq!(found.evidence.accuracy, Accuracy::Converged);
-    assert!(error < 2e-3 && error < 3.0 * found.evidence.truncation.unwrap(), "{error:.1e} {:?}", found.evidence);
+    assert!(error < 2e-3 && error < 3.0 * found.evidence.error_estimate.unwrap(), "{error:.1e} {:?}", found.evidence);
 }
 
 /// Without excitation the orbit is at rest.
@@ -340,7 +340,7 @@ fn friction_that_is_shared_is_that_of_one_contact() {
         let method = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
         let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
         assert!(orbit.evidence.residual <= 1e-6, "{}", orbit.evidence.residual);
-        (orbit.places[0].amplitude(), orbit.evidence.truncation.unwrap())
+        (orbit.places[0].amplitude(), orbit.evidence.error_estimate.unwrap())
     };
     // mostly in stick, and mostly in slip
     for force in [5.0, 12.0] {

@@ -66,7 +66,7 @@ fn the_estimate_holds_for_every_law() {
                 continue;
             };
             let Some(truth) = judge(&system, omega) else { continue };
-            let (error, estimate) = (distance(&found, &truth), found.evidence.truncation.unwrap());
+            let (error, estimate) = (distance(&found, &truth), found.evidence.error_estimate.unwrap());
             judged += 1;
             errors.push(error);
             if error > TRUE {
@@ -117,7 +117,7 @@ fn the_estimate_holds_for_stiff_laws_with_states() {
                 let method = HarmonicBalance { tolerance: Some(tolerance), ..HarmonicBalance::default() };
                 let found = method.solver(&system).unwrap().orbit(omega, None);
                 let Ok(found) = found else { continue };
-                let (error, estimate) = (distance(&found, &truth), found.evidence.truncation.unwrap());
+                let (error, estimate) = (distance(&found, &truth), found.evidence.error_estimate.unwrap());
                 println!("{} {stiffness:.0e} {tolerance:.0e}: error {error:.1e}, estimate {estimate:.1e}", law.name());
                 if error > FACTOR * estimate {
                     low.push(format!("{} {stiffness:e}: error {error:.1e}, estimate {estimate:.1e}", law.name()));

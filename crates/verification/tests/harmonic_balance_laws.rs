@@ -91,11 +91,11 @@ fn every_law_balances_the_structure() {
         // the time integration from the start of the series, with the states of the port,
         // returns
         if let Some(defect) = orbit.evidence.return_defect {
-            let bound = SAMPLED + RETURN * orbit.evidence.truncation.expect("an estimate");
+            let bound = SAMPLED + RETURN * orbit.evidence.error_estimate.expect("an estimate");
             assert!(defect < bound, "{} {constant}: returns {defect:.1e} of {bound:.1e}", info.name);
             returned += 1;
         }
-        let bound = SAMPLED + SERIES * orbit.evidence.truncation.expect("an estimate");
+        let bound = SAMPLED + SERIES * orbit.evidence.error_estimate.expect("an estimate");
         let off = |periods: &usize| off_balance(&law, view, &orbit, constant, *periods);
         let balances = |off: Vec<f64>| off.iter().all(|off| *off < bound);
         assert!(

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode};
+use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, nonlinear_mode};
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw};
 use stickslip::model::{Axis, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::structure::Structure;
@@ -24,8 +24,8 @@ fn oscillator(law: SharedLaw) -> System {
 
 /// Returns the mode, and asserts that it is complete.
 fn followed(system: &System, request: ModeRequest) -> Mode {
-    let mode = mode(system, request).unwrap();
-    assert_eq!(mode.lost, None, "{request:?}");
+    let mode = nonlinear_mode(system, request).unwrap();
+    assert_eq!(mode.ended, None, "{request:?}");
     assert_eq!(mode.points.len(), request.points);
     mode
 }
@@ -214,22 +214,22 @@ fn a_mode_does_not_depend_on_its_points() {
         let system = stickslip_verification::random_model(seed).0.assemble().unwrap();
         let number = seed as usize % system.dofs();
         let request = ModeRequest { mode: number, range: (1e-6, 1.0), points: 121, harmonics: 7, samples: 256 };
-        let fine = mode(&system, request).unwrap();
-        assert!(fine.missing.is_empty(), "seed {seed}: {:?}", fine.missing);
+        let fine = nonlinear_mode(&system, request).unwrap();
+        assert!(fine.not_found.is_empty(), "seed {seed}: {:?}", fine.not_found);
         for points in [2, 13] {
-            let coarse = mode(&system, ModeRequest { points, ..request }).unwrap();
+            let coarse = nonlinear_mode(&system, ModeRequest { points, ..request }).unwrap();
             assert_eq!(
-                (&coarse.turns, &coarse.merges, coarse.lost),
-                (&fine.turns, &fine.merges, fine.lost),
+                (&coarse.turns, &coarse.coalescences, coarse.ended),
+                (&fine.turns, &fine.coalescences, fine.ended),
                 "seed {seed}"
             );
             assert_eq!(compare(&format!("seed {seed}, {points} points"), &coarse, &fine), coarse.points.len());
             same(&format!("seed {seed}, largest"), &coarse.largest.unwrap(), fine.largest.as_ref().unwrap());
         }
         // a part of the range; its points are points of the whole
-        let part = mode(&system, ModeRequest { range: (1e-4, 1e-2), points: 41, ..request }).unwrap();
+        let part = nonlinear_mode(&system, ModeRequest { range: (1e-4, 1e-2), points: 41, ..request }).unwrap();
         assert_eq!(compare(&format!("seed {seed}, part"), &part, &fine), part.points.len());
-        lost.extend(fine.lost.map(|lost| (seed, number, lost)));
+        lost.extend(fine.ended.map(|lost| (seed, number, lost)));
     }
     assert!(lost.is_empty(), "{lost:?}");
 }
@@ -241,15 +241,15 @@ fn blade_couple_has_one_largest_damping() {
     let system = stickslip_verification::template("blade-couple", &[("Ft", 8.0)]);
     let range = (4.255467e-6, 4.255467e-2);
     let request = |mode, points| ModeRequest { mode, range, points, harmonics: 15, samples: 1024 };
-    let followed: Vec<Mode> = [2, 61, 200].map(|points| mode(&system, request(1, points)).unwrap()).into();
+    let followed: Vec<Mode> = [2, 61, 200].map(|points| nonlinear_mode(&system, request(1, points)).unwrap()).into();
     for one in &followed {
         same("largest", one.largest.as_ref().unwrap(), followed[0].largest.as_ref().unwrap());
         assert_eq!(one.points.len(), [2, 61, 200][followed.iter().position(|other| other == one).unwrap()]);
     }
-    let other = mode(&system, request(0, 61)).unwrap();
+    let other = nonlinear_mode(&system, request(0, 61)).unwrap();
     for one in [&followed[1], &other] {
-        assert_eq!(one.lost, None);
-        assert!(one.merges.len() == 1 && (6e-3..8e-3).contains(&one.merges[0]), "{:?}", one.merges);
+        assert_eq!(one.ended, None);
+        assert!(one.coalescences.len() == 1 && (6e-3..8e-3).contains(&one.coalescences[0]), "{:?}", one.coalescences);
     }
     // one mode ends with blades in antiphase, which friction damps, the other with blades that
     // move together and stick
@@ -279,7 +279,7 @@ fn blade_couple_agrees_with_a_search_from_random_starts() {
     for (number, amplitude, omega, damping) in expected {
         let request =
             ModeRequest { mode: number, range: (amplitude, 2.0 * amplitude), points: 2, harmonics: 5, samples: 512 };
-        let found = mode(&system, request).unwrap().points.remove(0);
+        let found = nonlinear_mode(&system, request).unwrap().points.remove(0);
         assert!((found.omega - omega).abs() < 0.06 && (found.damping - damping).abs() < 2e-3 * damping, "{found:?}");
     }
 }
@@ -304,7 +304,7 @@ fn full_mass_matrices_are_respected() {
         }
         let full = builder.build().unwrap();
         let request = ModeRequest { mode: 0, range: (1e-3, 1.0), points: 13, harmonics: 5, samples: 256 };
-        let (one, other) = (mode(&plain, request).unwrap(), mode(&full, request).unwrap());
+        let (one, other) = (nonlinear_mode(&plain, request).unwrap(), nonlinear_mode(&full, request).unwrap());
         assert_eq!(compare(&format!("seed {seed}"), &one, &other), 13);
     }
 }

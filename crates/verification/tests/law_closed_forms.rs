@@ -5,7 +5,8 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::law::{
-    BoucWen, Cubic, Dahl, FrictionContact, Gap, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Piece, Stribeck, Valanis,
+    BoucWen, Cubic, Dahl, FrictionContact, Gap, IdealElement, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Stribeck,
+    Valanis,
 };
 use stickslip_verification::replay::{Instant, View, forces, lost, steps};
 use stickslip_verification::{close, integral, near, zero};
@@ -68,7 +69,7 @@ fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form
         let times = steps(1.0, 5, 1);
         let found = forces(&law, View::Pieces, &along(&places), &times);
         near("loss", lost(&along(&places), &times[1..], &found[1..]), loss, 1e-12);
-        let linear = law.linearised(a, 3.0);
+        let linear = law.describing_function(a, 3.0);
         near("stiffness", linear.re, keq, 5e-7);
         near("damping", linear.im, ceq, 5e-7);
     }
@@ -129,7 +130,7 @@ fn theory_11_3_a_normal_load_in_phase_makes_a_polygon() {
 #[test]
 fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
-    let far = law(1).slips_at();
+    let far = law(1).slip_displacement();
     close("phi_max", far, 1.3 / (10.0 * (0.3 + 0.5 / 1.5)), 1e-14);
     let u = 0.4 * far;
     for elements in [32, 62, 250, 1000] {
@@ -147,7 +148,7 @@ fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
         close("backbone", force[1], expected, 5e-4);
     }
     near("all slips", first(&law(1000), View::Pieces, &[0.0, 2.0 * far], 1)[1], 1.0, 1e-12);
-    close("at rest", law(32).linearised(1e-12, 1.0).re, 10.0, 1e-12);
+    close("at rest", law(32).describing_function(1e-12, 1.0).re, 10.0, 1e-12);
 }
 
 /// (11.4) without sliders: the law itself. Amplitudes go from a thousandth of full slip to
@@ -156,7 +157,7 @@ fn theory_11_4_iwan_has_segalmans_backbone_and_loss() {
 fn theory_11_4_iwan_is_exact() {
     for (chi, beta) in [(-0.5, 0.3), (-0.5, 0.0), (-0.95, 0.0), (-0.99, 0.2), (-0.1, 3.0), (0.0, 0.0)] {
         let law = Iwan { stiffness: 10.0, limit: 1.0, chi, beta, elements: 0 };
-        let far = law.slips_at();
+        let far = law.slip_displacement();
         let d = beta + (chi + 1.0) / (chi + 2.0);
         let (r, s) = ((chi + 1.0) / (far.powf(chi + 2.0) * d), beta / (far * d));
         close("phi_max", far, (1.0 + beta) / (10.0 * d), 1e-14);
@@ -180,7 +181,7 @@ fn theory_11_4_iwan_is_exact() {
         close("beyond full slip", loop_loss(&law, View::Step, &cycles(beyond), FINE), loss, 1e-6);
     }
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 0 };
-    let loss = loop_loss(&law, View::Step, &cycles(0.4 * law.slips_at()), FINE);
+    let loss = loop_loss(&law, View::Step, &cycles(0.4 * law.slip_displacement()), FINE);
     close("loss", loss, 0.017_491_512_553_529_69, 1e-7);
 }
 
@@ -188,12 +189,14 @@ fn theory_11_4_iwan_is_exact() {
 /// to slip are corners.
 fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
     let mut slips: Vec<f64> = law
-        .pieces()
+        .ideal_elements()
         .unwrap()
         .iter()
         .filter_map(|piece| match piece {
-            Piece::Slider(slider) => Some(2.0 * slider.limit / slider.stiffness.unwrap()).filter(|way| *way < 2.0 * u),
-            Piece::Stop { .. } => None,
+            IdealElement::Slider(slider) => {
+                Some(2.0 * slider.limit / slider.stiffness.unwrap()).filter(|way| *way < 2.0 * u)
+            }
+            IdealElement::Stop { .. } => None,
         })
         .collect();
     slips.sort_by(f64::total_cmp);
@@ -213,7 +216,7 @@ fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
 #[test]
 fn theory_11_4_iwan_tends_to_segalmans_loss() {
     let law = |elements: u32| Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements };
-    let far = law(1).slips_at();
+    let far = law(1).slip_displacement();
     let d = 0.3 + 0.5 / 1.5;
     let (r, s) = (0.5 / (far.powf(1.5) * d), 1.0 / far * 0.3 / d);
     // value at zero of the polynomial in `1 / elements` through the losses
@@ -264,7 +267,7 @@ fn theory_11_6_bouc_wen_and_lugre_contain_dahl() {
             near(law.name(), *found, *expected, 1e-12);
         }
     }
-    near("bound", bouc_wen.scale(), 2.0, 1e-14);
+    near("bound", bouc_wen.force_scale(), 2.0, 1e-14);
 }
 
 /// (11.15): a long motion to one side ends at the bound for any gamma and exponent. Without
@@ -302,7 +305,7 @@ fn theory_11_6_lugre_slides_steadily_with_its_curve_and_holds_like_a_spring() {
 
 /// Parallel sliders with a given force of first loading, linear between its corners.
 #[derive(Debug)]
-struct Graded(Vec<Piece>);
+struct Graded(Vec<IdealElement>);
 
 static GRADED: LawInfo = LawInfo {
     name: "graded",
@@ -322,7 +325,7 @@ impl Law for Graded {
     fn is_odd(&self) -> bool {
         true
     }
-    fn pieces(&self) -> Option<Vec<Piece>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         Some(self.0.clone())
     }
 }
@@ -336,7 +339,8 @@ impl Graded {
             edges.windows(2).map(|pair| (backbone(pair[1]) - backbone(pair[0])) / (pair[1] - pair[0])).collect();
         slopes.push(0.0);
         // the slider that slips at a corner has the change of slope as its stiffness
-        let piece = |k: usize| Piece::slider(Some(slopes[k] - slopes[k + 1]), (slopes[k] - slopes[k + 1]) * corners[k]);
+        let piece =
+            |k: usize| IdealElement::slider(Some(slopes[k] - slopes[k + 1]), (slopes[k] - slopes[k + 1]) * corners[k]);
         Graded((0..corners.len()).map(piece).collect())
     }
 }
@@ -539,7 +543,7 @@ fn theory_11_11_both_readings_of_separation_are_one_law() {
 #[test]
 fn theory_11_14_iwan_remembers_in_its_mean_alone() {
     let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.5, beta: 0.3, elements: 64 };
-    let (a, far) = (0.4 * law.slips_at(), law.slips_at());
+    let (a, far) = (0.4 * law.slip_displacement(), law.slip_displacement());
     let measured = [vec![0.0], vec![0.0, 0.9 * far], vec![0.0, -0.7 * far, 0.5 * far]].map(|mut places| {
         places.extend([a, -a, a, -a, a, -a, a]);
         let force = first(&law, View::Pieces, &places, 64);
@@ -573,7 +577,7 @@ fn valanis_turns_along_a_logarithm() {
         near("turned", back, 2.0 * (u - way) - 10.0 / 3.0 * y, 1e-9);
     }
     let far = first(&law, View::Rate, &[0.0, 30.0], FINE)[FINE];
-    near("slip", far, 2.0 * 30.0 + law.scale(), 1e-9);
+    near("slip", far, 2.0 * 30.0 + law.force_scale(), 1e-9);
 }
 
 #[test]
@@ -588,7 +592,7 @@ fn springs_of_any_shape_lose_nothing() {
     // closed while `cos θ > gap / a`: `(k/π) (θ - sin θ cos θ)`
     let closed = (0.2f64 / 0.8).acos();
     let expected = 5.0 / PI * (closed - closed.sin() * closed.cos());
-    close("gap", gap.linearised(0.8, 1.0).re, expected, 1e-14);
+    close("gap", gap.describing_function(0.8, 1.0).re, expected, 1e-14);
 }
 
 #[test]
@@ -601,7 +605,7 @@ fn stribecks_describing_function_is_a_mean_of_its_curve() {
             (2.0 + 0.5 * (-share * share).exp()) * theta.sin()
         };
         let expected = 4.0 / (PI * a) * integral(friction, PI / 2.0, &[]);
-        let found = law.linearised(a, omega);
+        let found = law.describing_function(a, omega);
         close("damping", found.im, expected, 1e-3);
         near("stiffness", found.re, 0.0, 1e-3 * expected);
     }

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use stickslip::law::{
-    BuildError, LawError, LawInfo, MOST_DIRECTIONS, Range, RatePoint, Relative, SharedLaw, StepPoint, TABLE, find,
+    BuildError, LawError, LawInfo, MAX_DIRECTIONS, Range, RatePoint, RelativeMotion, SharedLaw, StepPoint, TABLE, find,
 };
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
@@ -27,15 +27,15 @@ const SAMPLES: usize = 2000;
 const QUADRATURE: f64 = 1e-5;
 
 /// Returns the largest size of the forces.
-fn largest(forces: &[[f64; MOST_DIRECTIONS]]) -> f64 {
+fn largest(forces: &[[f64; MAX_DIRECTIONS]]) -> f64 {
     forces.iter().flatten().fold(0.0, |most, force| most.max(force.abs()))
 }
 
 /// Returns the length of the path between the times.
 fn way(motion: &dyn Fn(f64) -> Instant, times: &[f64]) -> f64 {
     let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
-    let each = |pair: &[[f64; MOST_DIRECTIONS]]| {
-        (0..MOST_DIRECTIONS).map(|a| (pair[1][a] - pair[0][a]).powi(2)).sum::<f64>().sqrt()
+    let each = |pair: &[[f64; MAX_DIRECTIONS]]| {
+        (0..MAX_DIRECTIONS).map(|a| (pair[1][a] - pair[0][a]).powi(2)).sum::<f64>().sqrt()
     };
     places.windows(2).map(each).sum()
 }
@@ -47,17 +47,17 @@ fn rows_are_whole() {
         let law = row.sample();
         assert!(names.insert(row.name), "{} appears twice", row.name);
         assert!(std::ptr::eq(find(row.name).unwrap(), *row));
-        assert!((1..=MOST_DIRECTIONS).contains(&law.directions()), "{}", row.name);
+        assert!((1..=MAX_DIRECTIONS).contains(&law.directions()), "{}", row.name);
         assert!(!views(&*law).is_empty(), "{} offers no view", row.name);
         assert_eq!(law.values(), row.sample, "{}: values come back as they were given", row.name);
-        assert!(law.check().is_ok() && law.scale() > 0.0, "{}", row.name);
+        assert!(law.check().is_ok() && law.force_scale() > 0.0, "{}", row.name);
         assert!(std::ptr::eq(law.info(), *row));
         let keys: BTreeSet<_> = row.parameters.iter().map(|p| p.key).collect();
         assert_eq!(keys.len(), row.parameters.len(), "{}: a key appears twice", row.name);
         for parameter in row.parameters {
             assert!(parameter.power.is_none_or(|power| keys.contains(power)), "{}: {}", row.name, parameter.key);
             assert!(
-                parameter.default.is_none_or(|value| parameter.range.has(value)),
+                parameter.default.is_none_or(|value| parameter.range.contains(value)),
                 "{}: {}",
                 row.name,
                 parameter.key
@@ -279,18 +279,18 @@ fn derivatives_of_rates_are_differences() {
             );
             x.extend((0..states).map(|_| rate.state_scale() * random.between(-1.2, 1.2)));
             let value = |x: &[f64], row: usize| {
-                let mut motion = Relative::along(0.0, 0.0);
+                let mut motion = RelativeMotion::along(0.0, 0.0);
                 motion.displacement[..n].copy_from_slice(&x[..n]);
                 motion.velocity[..n].copy_from_slice(&x[n..2 * n]);
                 let mut rates = vec![0.0; states];
-                let force = rate.value(&motion, &x[2 * n..], &mut rates);
+                let force = rate.evaluate_values(&motion, &x[2 * n..], &mut rates);
                 if row < n { force[row] } else { rates[row - n] }
             };
             let mut point = RatePoint::new(n, states);
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             motion.displacement[..n].copy_from_slice(&x[..n]);
             motion.velocity[..n].copy_from_slice(&x[n..2 * n]);
-            rate.linearise(n, &motion, &x[2 * n..], &mut point);
+            rate.evaluate_with_derivatives(n, &motion, &x[2 * n..], &mut point);
             for out in 0..n + states {
                 let slopes = if out < n { point.force_slope(out) } else { point.rate_slope(out - n) };
                 for k in 0..x.len() {
@@ -337,17 +337,17 @@ fn derivatives_of_steps_are_differences() {
             let mut z = vec![0.0; states];
             let mut start = places(&x).0;
             start[0] += random.between(-1e-4, 1e-4);
-            step.value(&start, &places(&x).0, &mut z);
+            step.advance_values(&start, &places(&x).0, &mut z);
             x.extend(z.iter().map(|z| 0.99 * z));
             let value = |x: &[f64], row: usize| {
                 let (from, to) = places(x);
                 let mut z = x[2 * n..].to_vec();
-                let force = step.value(&from, &to, &mut z);
+                let force = step.advance_values(&from, &to, &mut z);
                 if row < n { force[row] } else { z[row - n] }
             };
             let mut point = StepPoint::new(n, states);
             let (from, to) = places(&x);
-            step.linearise(n, &from, &to, &x[2 * n..], &mut point);
+            step.advance_with_derivatives(n, &from, &to, &x[2 * n..], &mut point);
             for out in 0..n + states {
                 let slopes = if out < n { point.force_slope(out) } else { point.state_slope(out - n) };
                 // do not vary an unused leg of a Masing history: a nonzero value of either sign
@@ -380,8 +380,8 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
         let n = law.directions();
         let mut random = Random::new(9);
         for _ in 0..300 {
-            let penalty = 2.0 * prox.least_penalty() + 10f64.powf(random.between(-3.0, 5.0));
-            let y: Vec<f64> = (0..n).map(|_| law.scale() * random.between(-3.0, 3.0)).collect();
+            let penalty = 2.0 * prox.minimum_penalty() + 10f64.powf(random.between(-3.0, 5.0));
+            let y: Vec<f64> = (0..n).map(|_| law.force_scale() * random.between(-3.0, 3.0)).collect();
             let resolve = |y: &[f64]| {
                 let (mut force, mut slope) = (vec![0.0; n], vec![0.0; n * n]);
                 prox.resolve(y, penalty, &mut force, &mut slope);
@@ -390,9 +390,9 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
             let (force, slope) = resolve(&y);
             // compare with the law at the velocity that follows from the resolvent
             if n == 1
-                && let Some((at, _)) = prox.at_velocity((y[0] - force[0]) / penalty)
+                && let Some((at, _)) = prox.force_at_velocity((y[0] - force[0]) / penalty)
             {
-                near(row.name, at, force[0], 1e-9 * law.scale());
+                near(row.name, at, force[0], 1e-9 * law.force_scale());
             }
             for out in 0..n {
                 for k in 0..n {
@@ -402,7 +402,7 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
                         resolve(&y).0[out]
                     };
                     let what = format!("{}: {out} by {k} at {y:?}, penalty {penalty}", row.name);
-                    derivative_is_difference(&what, moved, slope[out * n + k], 1e-6 * law.scale());
+                    derivative_is_difference(&what, moved, slope[out * n + k], 1e-6 * law.force_scale());
                 }
             }
         }
@@ -481,7 +481,7 @@ fn smooth_neighbours_tend_to_the_law() {
                 let smooth = law.regularised(width).unwrap();
                 let found = forces(&*smooth, View::Rate, &motion, &times);
                 let differences = reference.iter().zip(&found).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
-                differences.sum::<f64>() / reference.len() as f64 / law.scale()
+                differences.sum::<f64>() / reference.len() as f64 / law.force_scale()
             })
             .collect();
         println!("{}: widths 1e-3 to 1e-5 m/s: mean differences {errors:?} of its scale", row.name);
@@ -493,11 +493,11 @@ fn smooth_neighbours_tend_to_the_law() {
 #[test]
 fn free_laws_carry_no_force() {
     for row in TABLE {
-        let Some(law) = row.sample().free() else { continue };
+        let Some(law) = row.sample().frictionless_reference() else { continue };
         let motion = random_motion(1, law.directions(), 1.0);
         for view in views(&*law) {
             let found = forces(&*law, view, &motion, &steps(1.0, 1, 100));
-            assert!(!law.is_free() || largest(&found) == 0.0, "{} by {view:?}", row.name);
+            assert!(!law.carries_no_force() || largest(&found) == 0.0, "{} by {view:?}", row.name);
         }
     }
 }
@@ -508,14 +508,14 @@ fn describing_functions_are_first_harmonics() {
     for row in TABLE {
         let law = row.sample();
         for amplitude in [1e-4, 1e-3] {
-            // fast compared with the width of the smooth laws; `linearised` uses their exact
-            // laws
+            // fast compared with the width of the smooth laws; `describing_function` uses their
+            // exact laws
             let omega = 300.0;
             let motion = |time: f64| {
                 let (sin, cos) = (omega * time).sin_cos();
                 ([amplitude * cos, 0.0, 0.0], [-amplitude * omega * sin, 0.0, 0.0])
             };
-            let linear = law.linearised(amplitude, omega);
+            let linear = law.describing_function(amplitude, omega);
             for view in views(&*law) {
                 let times = steps(TAU / omega, 4, SAMPLES);
                 let found = forces(&*law, view, &motion, &times);

@@ -39,7 +39,7 @@ const SAMPLED: f64 = 5e-6;
 /// of periods; a motion that is not an orbit still leaves its start.
 fn followed(system: &System, steps: usize, orbit: &Orbit) -> (Vec<f64>, f64) {
     let begin = orbit.sample(0.0);
-    let states = &orbit.start[2 * system.dofs()..];
+    let states = &orbit.initial_state[2 * system.dofs()..];
     let mut reference = Reference::new(system, OMEGA, steps, &begin.displacement, &begin.velocity).with_states(states);
     let (amplitudes, change) = reference.settle(PERIODS, SETTLED);
     (amplitudes, if change > SETTLED { PERIODS as f64 * change } else { change })
@@ -71,7 +71,7 @@ fn every_law_in_every_method_moves_as_the_reference() {
             };
             taken += 1;
             let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{}: {error}", info.name));
-            let allowed = SAMPLED + apart + SHARE * orbit.evidence.truncation.unwrap_or(0.0);
+            let allowed = SAMPLED + apart + SHARE * orbit.evidence.error_estimate.unwrap_or(0.0);
             let off = orbit.places.iter().zip(&fine).map(|(place, x)| (place.amplitude() - x).abs() / size);
             let off = off.fold(0.0, f64::max);
             println!("{} in {}: {off:.1e} of {allowed:.1e}", info.name, row.name);

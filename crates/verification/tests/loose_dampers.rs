@@ -108,7 +108,7 @@ fn judge(damper: &LooseDamper, name: &str, counts: &mut Counts) {
         };
         *counts.found_by.entry(orbit.evidence.found_by).or_default() += 1;
         let amplitudes: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
-        let error = orbit.evidence.truncation.unwrap_or(0.0);
+        let error = orbit.evidence.error_estimate.unwrap_or(0.0);
         counts.inaccurate += usize::from(error > 0.01);
         let allowed = NEAR.max(error);
         let distance = distance(damper, &amplitudes, omega, allowed);
@@ -171,7 +171,7 @@ fn a_roof_damper_has_its_orbits_at_all_speeds() {
         let mut start: Option<Vec<f64>> = None;
         for &omega in damper.frequencies.iter().step_by(5) {
             match solver.orbit(omega, start.as_deref()) {
-                Ok(orbit) => start = Some(orbit.start),
+                Ok(orbit) => start = Some(orbit.initial_state),
                 Err(error) => missed.push(format!("{speed} rpm, {} Hz: {error}", omega / TAU)),
             }
         }

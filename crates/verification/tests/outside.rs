@@ -8,13 +8,13 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::law::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative, SharedLaw, Step, StepLaw};
+use stickslip::law::{Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion, SharedLaw, StepLaw, StepView};
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
 use stickslip::method::transient::Transient;
-use stickslip::method::{Breakdown, Method, MethodError, OrbitError, Solver};
+use stickslip::method::{IntegrationError, Method, MethodError, OrbitError, Solver};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
-use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
+use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
 use stickslip_numerics::dual::Real;
 use stickslip_verification::reference::Reference;
 
@@ -53,10 +53,10 @@ impl Law for TwoSurfaces {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
 }
@@ -65,7 +65,7 @@ impl RateLaw for TwoSurfaces {
     fn states(&self) -> usize {
         2
     }
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let v = motion.velocity[0];
         // without a limit it carries nothing, whatever its states are
         let share = if self.limit > 0.0 { 1.0 / self.limit } else { 0.0 };
@@ -108,10 +108,10 @@ impl Law for Hardening {
         true
     }
     /// Without a limit the law is two springs in series, with an unbounded force.
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         if self.limit > 0.0 { self.limit } else { f64::INFINITY }
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }
 }
@@ -165,7 +165,7 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
             [&HarmonicBalance::default(), &Shooting::default(), &Transient { tolerance: 1e-6, ..Transient::default() }];
         for method in methods {
             let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
-            let allowed = 2e-4 + 2.0 * orbit.evidence.truncation.unwrap_or(0.0);
+            let allowed = 2e-4 + 2.0 * orbit.evidence.error_estimate.unwrap_or(0.0);
             for (found, expected) in amplitudes(&orbit).iter().zip(&expected) {
                 assert!(
                     (found / expected - 1.0).abs() < allowed,
@@ -237,13 +237,13 @@ impl Law for Wrong {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         1.0
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         if self.by_rate { None } else { Some(self) }
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         if self.by_rate { Some(self) } else { None }
     }
 }
@@ -275,7 +275,7 @@ impl RateLaw for Wrong {
     fn state_scale(&self) -> f64 {
         self.size
     }
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         rate[0] = motion.velocity[0] - z[0];
         self.force(motion.displacement[0])
     }
@@ -294,7 +294,7 @@ fn laws_that_give_no_numbers_are_named() {
         let system = model(Arc::new(Wrong { size: 1e-3, reach: 1e-4, by_rate })).assemble().unwrap();
         for method in [&Shooting::default() as &dyn Method, &Transient::default()] {
             let error = method.solver(&system).unwrap().orbit(TAU * 24.0, None).unwrap_err();
-            let OrbitError::Breakdown { cause: Breakdown::NoNumber { joint, law, .. }, .. } = &error else {
+            let OrbitError::Breakdown { cause: IntegrationError::NotFinite { joint, law, .. }, .. } = &error else {
                 panic!("{by_rate} {}: {error}", method.name())
             };
             assert_eq!((joint.as_str(), *law), ("rub", "wrong"));
@@ -326,10 +326,10 @@ impl Law for OneSided {
     fn is_odd(&self) -> bool {
         true
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         if self.by_rate { None } else { Some(self) }
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         if self.by_rate { Some(self) } else { None }
     }
 }
@@ -351,7 +351,7 @@ impl StepLaw for OneSided {
 }
 
 impl RateLaw for OneSided {
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         Self::force(motion.displacement[0])
     }
 }
@@ -392,9 +392,9 @@ impl Path for Harmonics {
                 .collect()
         };
         let [displacement, velocity, acceleration] = [of(0), of(1), of(2)];
-        Sample { displacement, velocity, acceleration, joints: Vec::new(), moved: Vec::new() }
+        Sample { displacement, velocity, acceleration, joints: Vec::new(), imposed: Vec::new() }
     }
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         Vec::new()
     }
 }
@@ -424,15 +424,15 @@ impl Solver for LinearSolver<'_> {
         });
         let path = Harmonics { omega, x: x.collect() };
         let start = path.sample(0.0);
-        let found = Found {
+        let found = OrbitData {
             method: "linear",
             omega,
             periods: 1,
             symmetry: Symmetry::FullPeriod,
-            start: [start.displacement, start.velocity].concat(),
+            initial_state: [start.displacement, start.velocity].concat(),
             residual: 0.0,
             iterations: 1,
-            truncation: None,
+            error_estimate: None,
             accuracy: Accuracy::Converged,
         };
         Orbit::new(self.0, Arc::new(path), found)

@@ -167,7 +167,7 @@ fn theory_6_5_sensitivity_to_alpha() {
         let mut start: Option<Vec<f64>> = None;
         let amplitude = |hertz: f64| {
             let orbit = solver.orbit(TAU * hertz, start.as_deref()).unwrap();
-            start = Some(orbit.start.clone());
+            start = Some(orbit.initial_state.clone());
             100.0 * orbit.places[2].amplitude()
         };
         let (at, value) = maximum(amplitude, [120.3, 121.0], 35, 1e-5);

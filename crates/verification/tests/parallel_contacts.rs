@@ -5,12 +5,14 @@ use nalgebra::{DMatrix, dmatrix};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::curve::modes::{ModeRequest, mode};
-use stickslip::curve::trace::Trace;
+use stickslip::curve::continuation::BranchContinuation;
+use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw, Stribeck};
 use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip::model::{Around, Axis, Disk, Force, GROUND, Joint, Mass, Model, Spring, System, SystemBuilder};
+use stickslip::model::{
+    Axis, Disk, Force, GROUND, Joint, Mass, Model, SectorDistribution, Spring, System, SystemBuilder,
+};
 use stickslip::orbit::{Accuracy, Orbit};
 use stickslip::structure::Structure;
 use stickslip_verification::{close, exact, near};
@@ -161,7 +163,7 @@ fn the_exact_method_shares_alike() {
     let many = system(3.0, &contacts);
     let (found, expected) = (orbit(&HarmonicBalance::default(), &many, 1.31), exact(&many, 1.31));
     assert_eq!(found.evidence.accuracy, Accuracy::Converged);
-    let error = 3.0 * found.evidence.truncation.unwrap();
+    let error = 3.0 * found.evidence.error_estimate.unwrap();
     for (a, b) in found.joints.iter().zip(&expected.joints) {
         near(&a.name, a.dissipation, b.dissipation, error * expected.energy.work_in);
     }
@@ -215,8 +217,8 @@ fn modes_are_those_of_the_one() {
     let parts = [(1.0, 0.25), (-1.0, 0.25), (2.0, 0.0625), (0.5, 0.75)].map(|(factor, limit)| (factor, coulomb(limit)));
     let request = ModeRequest { mode: 0, range: (0.3, 30.0), points: 15, harmonics: 9, samples: 1024 };
     let [many, one] =
-        [&parts[..], &[(1.0, coulomb(1.0))]].map(|contacts| mode(&system(0.0, contacts), request).unwrap());
-    assert_eq!((many.lost, many.points.len()), (None, 15));
+        [&parts[..], &[(1.0, coulomb(1.0))]].map(|contacts| nonlinear_mode(&system(0.0, contacts), request).unwrap());
+    assert_eq!((many.ended, many.points.len()), (None, 15));
     for (many, one) in many.points.iter().zip(&one.points) {
         close("frequency", many.omega, one.omega, SOLVED);
         close("damping", many.damping, one.damping, SOLVED);
@@ -231,8 +233,8 @@ fn branches_are_those_of_the_one() {
     let parts = [(1.0, 0.35), (-2.0, 0.15), (1.0, 0.35)].map(|(factor, limit)| (factor, coulomb(limit)));
     let follow = |contacts: &[Contact]| {
         let system = system(4.0, contacts);
-        Trace {
-            at: &|omega| (system.clone(), omega),
+        BranchContinuation {
+            system_at: &|omega| (system.clone(), omega),
             method: balance(9),
             range: (0.6, 1.6),
             step: 0.1,
@@ -269,7 +271,7 @@ fn ring(sectors: usize, contacts: &[(bool, f64)]) -> Model {
         forces: vec![Force { on: "blade".into(), amplitude: 1.0, phase: 0.3, harmonic: 1 }],
         ..Model::default()
     };
-    let disk = Disk { sectors, forces: vec![Around::EngineOrder(1)], motions: Vec::new() };
+    let disk = Disk { sectors, forces: vec![SectorDistribution::EngineOrder(1)], motions: Vec::new() };
     disk.ring(|_| sector.clone()).unwrap()
 }
 
@@ -294,7 +296,7 @@ fn rings_with_contacts_side_by_side() {
         assert!(one.joints[0].dissipation > 1e-3, "a test without slip tests nothing");
         for wave in [true, false] {
             let many = of(&parts, wave);
-            let error = if wave || sectors > 2 { SOLVED } else { one.evidence.truncation.unwrap() };
+            let error = if wave || sectors > 2 { SOLVED } else { one.evidence.error_estimate.unwrap() };
             for (a, b) in many.places.iter().zip(&one.places) {
                 close(&format!("{sectors} sectors, wave {wave}: amplitude"), a.amplitude(), b.amplitude(), error);
             }

@@ -9,7 +9,7 @@
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use stickslip::law::{Contact, Coulomb, Gap, Jenkins, Law, LawInfo, Parameter, Piece, SharedLaw, Stribeck};
+use stickslip::law::{Contact, Coulomb, Gap, IdealElement, Jenkins, Law, LawInfo, Parameter, SharedLaw, Stribeck};
 use stickslip::method::event_driven::{EventDriven, Subharmonic};
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::time_history::{Excitation, TimeHistory};
@@ -115,7 +115,7 @@ fn stops_agree_with_integration() {
         for omega in [0.4, 0.8, 1.3, 1.9, 2.6, 3.1] {
             let orbit = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
             let shooting = Shooting { tolerance: 1e-10, ..Shooting::default() };
-            let other = shooting.solver(&system).unwrap().orbit(omega, Some(&orbit.start)).unwrap();
+            let other = shooting.solver(&system).unwrap().orbit(omega, Some(&orbit.initial_state)).unwrap();
             let (a, b) = (&orbit.places[0], &other.places[0]);
             let scale = a.amplitude();
             for (a, b) in [(a.maximum, b.maximum), (a.minimum, b.minimum), (a.mean, b.mean)] {
@@ -128,7 +128,7 @@ fn stops_agree_with_integration() {
             assert_eq!(orbit.is_stable(), other.is_stable());
             unstable += usize::from(orbit.is_stable() == Some(false));
             assert_eq!((orbit.joints[0].slip_fraction, orbit.joints[0].dissipation), (0.0, 0.0));
-            assert!(!orbit.is_one_of_many(), "a stop does not stick");
+            assert!(!orbit.is_in_continuum(), "a stop does not stick");
             // all work of the excitation goes into the damper, none into the stop
             assert!(orbit.evidence.energy_gap < 1e-10, "{}", orbit.evidence.energy_gap);
             for i in 0..20 {
@@ -157,11 +157,11 @@ fn subharmonic_motion_beside_an_unstable_one() {
     multiplied(&single, [-1.878_280_613_595_553, -0.418_107_055_970_699].map(Complex64::from));
     let double = Subharmonic { period: 2 }.solver(&system).unwrap().orbit(omega, Some(&[-1.0, 0.3])).unwrap();
     let other = Shooting { period: 2, tolerance: 1e-10, ..Shooting::default() };
-    let other = other.solver(&system).unwrap().orbit(omega, Some(&double.start)).unwrap();
+    let other = other.solver(&system).unwrap().orbit(omega, Some(&double.initial_state)).unwrap();
     close("maximum", double.places[0].maximum, other.places[0].maximum, 1e-7);
     assert_eq!(double.is_stable(), Some(true));
     let later = double.sample(TAU / omega).displacement[0];
-    assert!((double.start[0] - later).abs() > 0.1, "it repeats after one period");
+    assert!((double.initial_state[0] - later).abs() > 0.1, "it repeats after one period");
     multiplied(&double, [1.0, -1.0].map(|sign| Complex64::new(0.446_922_437_899_297, sign * 0.645_748_845_388_059)));
 }
 
@@ -184,7 +184,7 @@ fn a_multiplier_of_1_18_is_unstable() {
         within(&orbit, [-1.18, -shrinks / 1.18].map(Complex64::from), digits);
     }
     let orbit = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
-    for (found, expected) in orbit.start.iter().zip(start) {
+    for (found, expected) in orbit.initial_state.iter().zip(start) {
         near("start", *found, expected, PRINTED);
     }
 }
@@ -229,7 +229,7 @@ fn motions_of_one_three_and_five_periods_side_by_side() {
         assert!((multiplier.norm_sqr() - shrinks).abs() < PRINTED, "{period}");
         let method = Subharmonic { period: period as usize };
         let orbit = method.solver(&system).unwrap().orbit(omega, Some(&start)).unwrap();
-        for (found, expected) in orbit.start.iter().zip(start) {
+        for (found, expected) in orbit.initial_state.iter().zip(start) {
             near("start", *found, expected, PRINTED);
         }
         assert_eq!(orbit.is_stable(), Some(true), "{period}");
@@ -309,9 +309,9 @@ impl Law for Mixed {
     fn is_odd(&self) -> bool {
         false
     }
-    fn pieces(&self) -> Option<Vec<Piece>> {
-        let stop = Piece::Stop { gap: 0.4, stiffness: 3.0 };
-        Some(vec![Piece::slider(Some(2.0), 0.3), stop, Piece::slider(None, 0.1)])
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
+        let stop = IdealElement::Stop { gap: 0.4, stiffness: 3.0 };
+        Some(vec![IdealElement::slider(Some(2.0), 0.3), stop, IdealElement::slider(None, 0.1)])
     }
 }
 
@@ -367,7 +367,7 @@ fn static_friction_agrees_with_scipy() {
         }
         model.forces = vec![force("m1", 1.0, 1)];
         let system = model.assemble().unwrap();
-        assert!(!system.contracts());
+        assert!(!system.is_incrementally_stable());
         let orbit = exact(&system, omega);
         let state = orbit.sample(0.0);
         for row in rows.iter().filter(|row| row["case"] == name) {
@@ -442,7 +442,7 @@ fn shares(what: &str, many: &Sample, one: &Sample, limits: &[(f64, f64)]) {
         near(&format!("{what}: force {i}"), joint.force[0], force, 1e-8 * static_limit);
         near(&format!("{what}: displacement {i}"), joint.displacement[0], sign * whole.displacement[0], 1e-12);
     }
-    for (many, one) in many.moved.iter().zip(&one.moved) {
+    for (many, one) in many.imposed.iter().zip(&one.imposed) {
         near(&format!("{what}: reaction"), many.1, one.1, 1e-8 * held);
     }
 }
@@ -578,7 +578,7 @@ fn creeping_orbits_are_found() {
         let system = model.assemble().unwrap();
         let orbit = exact(&system, omega);
         let smooth = Shooting { width: Some(1e-9), ..Shooting::default() };
-        let smooth = smooth.solver(&system).unwrap().orbit(omega, Some(&orbit.start)).unwrap();
+        let smooth = smooth.solver(&system).unwrap().orbit(omega, Some(&orbit.initial_state)).unwrap();
         close("amplitude", orbit.places[0].amplitude(), smooth.places[0].amplitude(), 1e-3);
         close("loss", orbit.energy.friction, smooth.energy.friction, 1e-2);
     }
@@ -622,9 +622,9 @@ fn a_drop_behind_a_spring_is_refused() {
         fn is_odd(&self) -> bool {
             true
         }
-        fn pieces(&self) -> Option<Vec<Piece>> {
+        fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
             let slider = stickslip::law::Slider { stiffness: Some(2.0), limit: 0.3, static_limit: 0.4 };
-            Some(vec![Piece::Slider(slider)])
+            Some(vec![IdealElement::Slider(slider)])
         }
     }
     let system = oscillator(1.0, 0.1, &[Arc::new(Dropping)]).assemble().unwrap();

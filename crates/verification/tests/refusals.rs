@@ -137,7 +137,7 @@ fn a_place_without_mass_has_ways_too() {
 fn friction_that_drops_at_once_is_told_to_fall_over_a_velocity() {
     let cubic = stickslip::law::find("cubic").unwrap().sample();
     let stribeck = stickslip::law::find("stribeck").unwrap().sample();
-    let dropping = stribeck.with("velocity", 0.0).unwrap();
+    let dropping = stribeck.with_value("velocity", 0.0).unwrap();
     let error = asked(named("auto"), false, &system(&[dropping, cubic.clone()], 1.0)).unwrap_err().to_string();
     assert!(error.contains("no method takes this system") && error.contains("`velocity` above zero"), "{error}");
     assert!(asked(named("shooting"), true, &system(&[stribeck, cubic], 1.0)).is_ok());

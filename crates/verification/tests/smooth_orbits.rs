@@ -40,14 +40,14 @@ fn couple_agrees_with_scipy() {
                 near("phase", place.phase_deg(), number(row, &format!("x{}_phase_deg", i + 1)), 200.0 * amplitudes);
                 near(
                     "displacement at 0",
-                    orbit.start[i],
+                    orbit.initial_state[i],
                     number(row, &format!("x{}_0_m", i + 1)),
                     1e2 * amplitudes * expected,
                 );
                 let speed = orbit.omega * expected;
                 near(
                     "velocity at 0",
-                    orbit.start[3 + i],
+                    orbit.initial_state[3 + i],
                     number(row, &format!("v{}_0_m_per_s", i + 1)),
                     1e2 * amplitudes * speed,
                 );
@@ -75,7 +75,7 @@ fn the_end_of_stick_is_not_jumped_over() {
     let system = couple(8.0, 25e3);
     let mut solver = Shooting { tolerance: 1e-8, ..Shooting::default() }.solver(&system).unwrap();
     let neighbour = solver.orbit(TAU * 120.9875, None).unwrap();
-    let orbit = solver.orbit(TAU * 121.0, Some(&neighbour.start)).unwrap();
+    let orbit = solver.orbit(TAU * 121.0, Some(&neighbour.initial_state)).unwrap();
     let reference = shoot(&system, TAU * 121.0, 1e-12);
     let pairs = orbit.places.iter().zip(&reference.places);
     let worst = pairs.map(|(a, b)| (a.amplitude() / b.amplitude() - 1.0).abs()).fold(0.0, f64::max);
@@ -119,7 +119,7 @@ fn figure_6_converges_on_every_point() {
             gap = gap.max(orbit.evidence.energy_gap);
             iterations += orbit.evidence.iterations;
             points += 1;
-            start = Some(orbit.start);
+            start = Some(orbit.initial_state);
         }
     }
     let seconds = begin.elapsed().as_secs_f64();
@@ -141,7 +141,7 @@ fn figure_6_does_not_depend_on_the_start() {
             for (a, b) in warm.places.iter().zip(&cold.places) {
                 worst = worst.max((a.amplitude() / b.amplitude() - 1.0).abs());
             }
-            start = Some(warm.start);
+            start = Some(warm.initial_state);
         }
     }
     println!("warm and cold starts differ by {worst:.1e}");
@@ -208,7 +208,7 @@ fn settling_agrees_with_newton_within_its_own_estimate() {
         } else {
             EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap()
         };
-        let missing = waited.evidence.truncation.unwrap();
+        let missing = waited.evidence.error_estimate.unwrap();
         assert!(missing <= 1e-4, "{missing}");
         for (waited, found) in waited.places.iter().zip(&found.places) {
             let error = (waited.amplitude() / found.amplitude() - 1.0).abs();

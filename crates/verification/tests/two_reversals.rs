@@ -108,7 +108,7 @@ impl Line {
                 a[n + i][n + k] = -system.structure().damping()[(i, k)] / mass;
             }
             g[n + i] = force[i].re / mass;
-            h[n + i] = w[i] * system.joints()[0].law().scale() / mass;
+            h[n + i] = w[i] * system.joints()[0].law().force_scale() / mass;
             c[n + i] = w[i];
         }
         Line { n, a, g, h, c }
@@ -221,7 +221,7 @@ fn compare(system: &System, hertz: f64) -> bool {
     };
     assert_eq!(orbit.evidence.switches, 2, "{hertz} Hz");
     let reversal = (closed.psi / omega).rem_euclid(0.5 * orbit.period());
-    let found = orbit.switch_times()[0].rem_euclid(0.5 * orbit.period());
+    let found = orbit.transition_times()[0].rem_euclid(0.5 * orbit.period());
     near("reversal", (found - reversal).abs().min(0.5 * orbit.period() - (found - reversal).abs()), 0.0, 1e-8 / omega);
     for (i, place) in orbit.places.iter().enumerate() {
         let largest = closed.amplitude(i);
@@ -242,7 +242,7 @@ fn compare(system: &System, hertz: f64) -> bool {
         });
         b - a
     };
-    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law().scale() * slide, 1e-8);
+    close("loss", orbit.joints[0].dissipation, 4.0 * system.joints()[0].law().force_scale() * slide, 1e-8);
     true
 }
 
@@ -340,7 +340,7 @@ fn theory_8_4_fourier_form() {
         let friction = -ft * 4.0 / PI * sum;
         // psi: `Re(drive e^{j psi}) + friction = 0` at the reversal to positive sliding
         let t0 = orbit
-            .switch_times()
+            .transition_times()
             .into_iter()
             .find(|t| orbit.sample(t + 1e-3 * orbit.period()).joints[0].velocity[0] > 0.0);
         let psi = omega * t0.unwrap();

@@ -10,7 +10,7 @@ use python_law::{Magnitude, PythonLaw};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::law::{self, LawInfo, MOST_DIRECTIONS, Parameter, SharedLaw};
+use stickslip::law::{self, LawInfo, MAX_DIRECTIONS, Parameter, SharedLaw};
 
 /// The friction or contact law of a joint, made by `stickslip.law` or `stickslip.rate_law`.
 ///
@@ -147,10 +147,10 @@ impl PyLaw {
 
 /// Returns a law with another value (SI) of one parameter, or the reason why it is invalid.
 pub fn with(law: &SharedLaw, key: &str, value: f64) -> Result<SharedLaw, String> {
-    let changed = law.with(key, value).ok_or_else(|| format!("law `{}` has no parameter `{key}`", law.name()))?;
+    let changed = law.with_value(key, value).ok_or_else(|| format!("law `{}` has no parameter `{key}`", law.name()))?;
     // The symmetry of a law written in Python was tested when it was made.
     let checked = if python_law::is_written(law) {
-        changed.consistent()
+        changed.check_consistency()
     } else {
         changed.check().map_err(|cause| cause.to_string())
     };
@@ -218,7 +218,7 @@ pub fn law_by_name(py: Python<'_>, name: &str, parameters: Option<&Bound<'_, PyD
             let default = || row.parameters.iter().find(|other| other.key == key).and_then(|other| other.default);
             values.get(key).copied().or_else(default)
         };
-        let dimension = parameter.dimension_under(of).unwrap_or(Dimension::NONE);
+        let dimension = parameter.dimension_for(of).unwrap_or(Dimension::NONE);
         let what = format!("`{}` of law `{name}`", parameter.key);
         values.insert(parameter.key, quantity::to_si(value, dimension, &what)?);
     }
@@ -237,7 +237,7 @@ pub fn laws(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     for row in law::TABLE {
         let (entry, parameters) = (PyDict::new(py), PyDict::new(py));
         for parameter in row.parameters {
-            parameters.set_item(parameter.key, format!("{}: {}", parameter.takes(), parameter.doc))?;
+            parameters.set_item(parameter.key, format!("{}: {}", parameter.describe_values(), parameter.doc))?;
         }
         entry.set_item("summary", row.summary)?;
         entry.set_item("parameters", parameters)?;
@@ -288,8 +288,8 @@ pub fn _rate_law(
     odd: bool,
     passive: bool,
 ) -> PyResult<PyLaw> {
-    if !(1..=MOST_DIRECTIONS).contains(&directions) {
-        return Err(error::model(py, format!("a law has 1 to {MOST_DIRECTIONS} directions, found {directions}")));
+    if !(1..=MAX_DIRECTIONS).contains(&directions) {
+        return Err(error::model(py, format!("a law has 1 to {MAX_DIRECTIONS} directions, found {directions}")));
     }
     let (mut keys, mut values) = (Vec::new(), Vec::new());
     for (key, value) in parameters {
@@ -310,6 +310,6 @@ pub fn _rate_law(
     law.scale = magnitude(scale, "scale", name, &keys)?;
     let written = law.register();
     let law = written.law(values);
-    law.consistent().map_err(|message| error::model(py, format!("law `{name}`: {message}")))?;
+    law.check_consistency().map_err(|message| error::model(py, format!("law `{name}`: {message}")))?;
     Ok(PyLaw { law, written: Some(written) })
 }

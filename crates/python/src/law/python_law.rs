@@ -14,7 +14,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use stickslip::dimension::Dimension;
-use stickslip::law::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Rate, RatePoint, Relative, SharedLaw};
+use stickslip::law::{Law, LawInfo, MAX_DIRECTIONS, Parameter, Range, RatePoint, RateView, RelativeMotion, SharedLaw};
 use stickslip_numerics::interrupt;
 
 /// A size: a number, or the value of a parameter.
@@ -154,7 +154,7 @@ impl PythonLawInstance {
     ///
     /// Returns forces, then rates, as (row, point), and slopes as (row, argument, point). A
     /// Python exception ends the computation.
-    fn call(&self, motions: &[Relative<f64>], z: &[f64], linear: bool) -> (Vec<f64>, Vec<f64>) {
+    fn call(&self, motions: &[RelativeMotion<f64>], z: &[f64], linear: bool) -> (Vec<f64>, Vec<f64>) {
         interrupt::check();
         match Python::attach(|py| self.call_python(py, motions, z, linear)) {
             Ok(answer) => answer,
@@ -171,7 +171,7 @@ impl PythonLawInstance {
     fn call_python(
         &self,
         py: Python<'_>,
-        motions: &[Relative<f64>],
+        motions: &[RelativeMotion<f64>],
         z: &[f64],
         linear: bool,
     ) -> PyResult<(Vec<f64>, Vec<f64>)> {
@@ -216,10 +216,10 @@ impl Law for PythonLawInstance {
     fn directions(&self) -> usize {
         self.written.directions
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.magnitude(self.written.scale)
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
     fn is_odd(&self) -> bool {
@@ -228,8 +228,8 @@ impl Law for PythonLawInstance {
     fn is_incrementally_passive(&self) -> bool {
         self.written.passive
     }
-    fn consistent(&self) -> Result<(), String> {
-        let sizes = [("scale", self.scale()), ("state_scale", self.magnitude(self.written.state_scale))];
+    fn check_consistency(&self) -> Result<(), String> {
+        let sizes = [("scale", self.force_scale()), ("state_scale", self.magnitude(self.written.state_scale))];
         match sizes.into_iter().find(|(_, size)| size.is_nan() || *size <= 0.0) {
             Some((name, size)) => Err(format!("its `{name}` must be more than zero, found {size}")),
             None => Ok(()),
@@ -237,36 +237,48 @@ impl Law for PythonLawInstance {
     }
 }
 
-impl Rate for PythonLawInstance {
+impl RateView for PythonLawInstance {
     fn states(&self) -> usize {
         self.written.states
     }
     fn state_scale(&self) -> f64 {
         self.magnitude(self.written.state_scale)
     }
-    fn state_under(&self, _force: &[f64], _z: &mut [f64]) -> bool {
+    fn state_from_force(&self, _force: &[f64], _z: &mut [f64]) -> bool {
         false
     }
-    fn value(&self, motion: &Relative<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MOST_DIRECTIONS] {
+    fn evaluate_values(&self, motion: &RelativeMotion<f64>, z: &[f64], rate: &mut [f64]) -> [f64; MAX_DIRECTIONS] {
         let (out, _) = self.call(std::slice::from_ref(motion), z, false);
-        let mut force = [0.0; MOST_DIRECTIONS];
+        let mut force = [0.0; MAX_DIRECTIONS];
         force[..self.written.directions].copy_from_slice(&out[..self.written.directions]);
         rate.copy_from_slice(&out[self.written.directions..]);
         force
     }
-    fn linearise(&self, directions: usize, motion: &Relative<f64>, z: &[f64], point: &mut RatePoint) {
-        self.linearise_many(directions, std::slice::from_ref(motion), z, std::slice::from_mut(point));
+    fn evaluate_with_derivatives(
+        &self,
+        directions: usize,
+        motion: &RelativeMotion<f64>,
+        z: &[f64],
+        point: &mut RatePoint,
+    ) {
+        self.evaluate_many_with_derivatives(directions, std::slice::from_ref(motion), z, std::slice::from_mut(point));
     }
     fn is_batched(&self) -> bool {
         true
     }
-    fn value_many(&self, motions: &[Relative<f64>], forces: &mut [[f64; MOST_DIRECTIONS]]) {
+    fn evaluate_many_values(&self, motions: &[RelativeMotion<f64>], forces: &mut [[f64; MAX_DIRECTIONS]]) {
         let (out, _) = self.call(motions, &[], false);
         for (i, force) in forces.iter_mut().enumerate() {
             (0..self.written.directions).for_each(|a| force[a] = out[a * motions.len() + i]);
         }
     }
-    fn linearise_many(&self, directions: usize, motions: &[Relative<f64>], z: &[f64], points: &mut [RatePoint]) {
+    fn evaluate_many_with_derivatives(
+        &self,
+        directions: usize,
+        motions: &[RelativeMotion<f64>],
+        z: &[f64],
+        points: &mut [RatePoint],
+    ) {
         let (out, slopes) = self.call(motions, z, true);
         let n = motions.len();
         for (i, point) in points.iter_mut().enumerate() {

@@ -4,7 +4,9 @@ use crate::{error, quantity};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use stickslip::dimension::Dimension;
-use stickslip::model::{Around, Disk, Mistuned, Model, ModelError, Ring, normal_pattern, too_far};
+use stickslip::model::{
+    Disk, MistunedProperty, Model, ModelError, Ring, SectorDistribution, deviation_error, normal_deviations,
+};
 use stickslip_study::schema::MAX_MASSES;
 
 /// Returns the distribution of a force or an imposed motion around a disk, if one is given.
@@ -13,9 +15,12 @@ pub fn around(
     engine_order: Option<i64>,
     nodal_diameter: Option<i64>,
     sector: Option<usize>,
-) -> PyResult<Option<Around>> {
-    let said =
-        [engine_order.map(Around::EngineOrder), nodal_diameter.map(Around::NodalDiameter), sector.map(Around::Sector)];
+) -> PyResult<Option<SectorDistribution>> {
+    let said = [
+        engine_order.map(SectorDistribution::EngineOrder),
+        nodal_diameter.map(SectorDistribution::NodalDiameter),
+        sector.map(SectorDistribution::Sector),
+    ];
     let mut said = said.into_iter().flatten();
     match (said.next(), said.next()) {
         (first, None) => Ok(first),
@@ -34,7 +39,7 @@ fn names(of: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
 }
 
 /// Parses `mistuning`: the deviating quantity, and the deviation of each sector.
-fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyResult<(Mistuned, Vec<f64>)> {
+fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyResult<(MistunedProperty, Vec<f64>)> {
     let py = given.py();
     if let Some(key) = given
         .keys()
@@ -51,13 +56,13 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
     };
     let of = given.get_item("of")?.ok_or_else(|| missing("of"))?;
     let of = match &names(&of)?[..] {
-        [name] => Mistuned::Mass(name.clone()),
-        [a, b] => Mistuned::Spring([a.clone(), b.clone()]),
+        [name] => MistunedProperty::Mass(name.clone()),
+        [a, b] => MistunedProperty::Spring([a.clone(), b.clone()]),
         _ => return Err(error::model(py, "`of` must be the name of a mass, or the two ends of a spring")),
     };
     if !of.is_in(sector) {
         let message = match &of {
-            Mistuned::Spring([a, b]) => {
+            MistunedProperty::Spring([a, b]) => {
                 format!("no spring between `{a}` and `{b}`: write its ends in the order of `spring`")
             }
             _ => format!(
@@ -84,10 +89,10 @@ fn mistuning(given: &Bound<'_, PyDict>, sector: &Model, sectors: usize) -> PyRes
         (true, None) => {}
         (false, seed) => {
             let seed: u64 = seed.map_or(Ok(0), |seed| seed.extract())?;
-            deviations = normal_pattern(sectors, deviations[0], seed);
+            deviations = normal_deviations(sectors, deviations[0], seed);
         }
     }
-    if let Some(message) = too_far(&deviations) {
+    if let Some(message) = deviation_error(&deviations) {
         return Err(error::model(py, format!("{message}; deviations are fractions: 0.02 is 2 %")));
     }
     Ok((of, deviations))
@@ -119,7 +124,7 @@ pub fn ring(
     }
     let mistuned = given.map(|given| mistuning(given, sector, disk.sectors)).transpose()?;
     Ok(disk.ring(|s| match &mistuned {
-        Some((of, deviations)) => of.deviated(sector, deviations[s]),
+        Some((of, deviations)) => of.apply(sector, deviations[s]),
         None => sector.clone(),
     }))
 }

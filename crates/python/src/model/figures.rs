@@ -16,7 +16,8 @@ pub fn curves(table: &Table, system: &System, along: Option<&str>) -> Figure {
         Some(name) => (Axis::new(name, "SI"), numbers(&name.replace(['.', '-'], "_"))),
         None => (Axis::new("frequency", "Hz"), frequencies),
     };
-    let series = system.places().iter().zip(system.seen()).enumerate().filter(|(_, (_, along))| !along.is_rotation());
+    let series =
+        system.places().iter().zip(system.place_axes()).enumerate().filter(|(_, (_, along))| !along.is_rotation());
     let series =
         series.map(|(i, (place, _))| Series::line(place, values.clone(), numbers(&format!("{place}_amplitude_m")), i));
     let y = Axis::new("amplitude", "m").log();
@@ -77,7 +78,7 @@ pub fn mode(found: &Mode, system: &System) -> (Table, Figure) {
         numbers("viscous_damping_ratio", &|point| point.viscous),
     ];
     let phases: Vec<Vec<f64>> = found.points.iter().map(ModePoint::phases).collect();
-    for (i, (place, along)) in system.places().iter().zip(system.seen()).enumerate() {
+    for (i, (place, along)) in system.places().iter().zip(system.place_axes()).enumerate() {
         let (name, unit) = (column_name(place), along.unit());
         columns.push(numbers(&format!("{name}_amplitude_{unit}"), &|point| point.amplitudes[i]));
         columns.push(numbers(&format!("{name}_first_harmonic_{unit}"), &|point| point.places[i].norm()));

@@ -33,11 +33,12 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use stickslip::curve::modes::{ModeRequest, mode};
+use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 use stickslip::dimension::Dimension;
 use stickslip::method::{self, Method, Options, Solver, advised};
 use stickslip::model::{
-    Around, Disk, Force, Joint, Mass, Model, ModelError, Motion, Spring, Substructure, SubstructureDamping, System,
+    Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure, SubstructureDamping,
+    System,
 };
 use stickslip::structure::Reduction;
 use stickslip_study::dataset::{Column, Dataset, Failure, Figure, Record, Table};
@@ -65,7 +66,7 @@ use stickslip_study::run::{CONVERGED, NOT_REACHED};
 pub struct PyModel {
     model: Model,
     /// Distribution of each force and each imposed motion around a disk, if given.
-    around: [Vec<Option<Around>>; 2],
+    around: [Vec<Option<SectorDistribution>>; 2],
     /// Study and index of the case that the model comes from. Its structure by matrices then
     /// belongs to the study.
     study: Option<(PyStudy, usize)>,
@@ -175,12 +176,12 @@ impl PyModel {
             }
         };
         let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
-        if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.start.len()) {
+        if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.initial_state.len()) {
             let message = format!(
                 "`start` has {} numbers, but orbits of this model by this method have {}: use the `start` of \
                  such an orbit",
                 start.len(),
-                orbit.start.len()
+                orbit.initial_state.len()
             );
             return Err(error::model(py, message));
         }
@@ -342,7 +343,7 @@ impl PyModel {
             None => Reduction::None { up_to: 0.0 },
             Some(reduce) => Reduction::up_to(quantity::to_si(&reduce, Dimension::FREQUENCY, "reduce")?),
         };
-        let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: None });
+        let substructure = Some(Substructure { component, damping, reduction, earlier_reduction: None, disk: None });
         let made = PyModel::from_model(Model { substructure, places, ..Model::default() });
         let model = made.model.clone();
         run_on_new_thread(py, move || model.assemble().map(drop))?
@@ -468,9 +469,9 @@ impl PyModel {
     #[pyo3(signature = (sectors, *, mistuning=None))]
     fn disk(&self, py: Python<'_>, sectors: usize, mistuning: Option<&Bound<'_, PyAny>>) -> PyResult<PyModel> {
         let mistuning = mistuning.map(|given| quantity::dictionary(given, "`mistuning`")).transpose()?;
-        let all = |which: usize, count: usize| -> Vec<Around> {
+        let all = |which: usize, count: usize| -> Vec<SectorDistribution> {
             let said = |i: usize| self.around[which].get(i).copied().flatten();
-            (0..count).map(|i| said(i).unwrap_or(Around::EngineOrder(0))).collect()
+            (0..count).map(|i| said(i).unwrap_or(SectorDistribution::EngineOrder(0))).collect()
         };
         let forces = all(0, self.model.forces.len());
         let disk = Disk { sectors, forces, motions: all(1, self.model.motions.len()) };
@@ -518,7 +519,7 @@ impl PyModel {
     fn matrices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let system = self.system(py)?;
         let structure = system.structure();
-        if structure.dofs() > stickslip::structure::MOST_IN_FULL {
+        if structure.dofs() > stickslip::structure::MAX_FULL_DOFS {
             return Err(error::model(
                 py,
                 format!("the full matrices of {} degrees of freedom are too large", structure.dofs()),
@@ -559,8 +560,9 @@ impl PyModel {
         out.set_item("method", choice.to_string())?;
         if request.system.dofs() <= MOST_SURVEYED {
             let survey = run_here(py, || self.model.survey())?.map_err(|cause| model_error(py, &cause, &self.model))?;
-            let hertz =
-                |modes: &stickslip::model::Modes| modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>();
+            let hertz = |modes: &stickslip::model::LinearModes| {
+                modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>()
+            };
             out.set_item("free_Hz", hertz(survey.free()))?;
             out.set_item("stuck_Hz", hertz(survey.stuck()))?;
         }
@@ -716,12 +718,14 @@ impl PyModel {
         let request = ModeRequest { mode: mode - 1, range: (low, high), points, harmonics, samples };
         let system = Arc::new(system);
         let moved = system.clone();
-        let outcome = run_on_new_thread(py, move || self::mode(&moved, request))?;
+        let outcome = run_on_new_thread(py, move || nonlinear_mode(&moved, request))?;
         let found = outcome.map_err(|cause| error::method(py, cause))?;
         let (table, figure) = figures::mode(&found, &system);
         let mut record = RunRecord::of(&[], &|_| String::new(), Vec::new(), 1, start);
         record.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
-        record.notes.extend(found.lost.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
+        record
+            .notes
+            .extend(found.ended.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
         Ok(self.result("modes", "Nonlinear mode", vec![table], figure, record))
     }
 

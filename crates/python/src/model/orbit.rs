@@ -127,14 +127,14 @@ impl PyOrbit {
         let evidence = PyDict::new(py);
         evidence.set_item("residual", found.residual)?;
         evidence.set_item("energy_gap", found.energy_gap)?;
-        evidence.set_item("truncation", found.truncation)?;
+        evidence.set_item("truncation", found.error_estimate)?;
         evidence.set_item("return_defect", run_here(py, || self.orbit.return_defect())?)?;
         evidence.set_item("status", found.accuracy.status())?;
         evidence.set_item("found_by", found.found_by)?;
         evidence.set_item("iterations", found.iterations)?;
         evidence.set_item("switches", found.switches)?;
         evidence.set_item("stuck", &found.stuck)?;
-        evidence.set_item("history", &found.history)?;
+        evidence.set_item("history", &found.history_dependent)?;
         Ok(evidence)
     }
 
@@ -159,13 +159,13 @@ impl PyOrbit {
     /// It is an initial guess for orbits at similar frequencies.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.orbit.start.to_pyarray(py)
+        self.orbit.initial_state.to_pyarray(py)
     }
 
     /// Switching times of the joints in s, ascending.
     #[getter]
     fn switch_times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.orbit.switch_times().to_pyarray(py)
+        self.orbit.transition_times().to_pyarray(py)
     }
 
     /// Names of the places, in the order of `sample`.
@@ -200,7 +200,7 @@ impl PyOrbit {
                 for (signal, values) in
                     signals.iter_mut().zip([&sample.displacement, &sample.velocity, &sample.acceleration])
                 {
-                    signal.extend(self.system.seen().iter().map(|place| place.along(values)));
+                    signal.extend(self.system.place_axes().iter().map(|place| place.component(values)));
                 }
             }
         })?;
@@ -294,7 +294,7 @@ impl PyOrbit {
     pub fn loop_of(&self, joint: usize, points: usize) -> (Vec<f64>, [Vec<f64>; 3]) {
         let d = self.system.joints()[joint].axes().len();
         let mut times = self.times(points);
-        times.extend(self.orbit.switch_times());
+        times.extend(self.orbit.transition_times());
         times.sort_by(f64::total_cmp);
         times.dedup();
         let mut signals: [Vec<f64>; 3] = Default::default();

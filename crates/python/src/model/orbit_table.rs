@@ -36,7 +36,12 @@ impl Row {
                         .collect(),
                     joints: orbit.joints.iter().map(|joint| [joint.dissipation, joint.slip_fraction]).collect(),
                     stable: orbit.is_stable(),
-                    evidence: [found.residual, found.energy_gap, number(found.truncation), number(found.return_defect)],
+                    evidence: [
+                        found.residual,
+                        found.energy_gap,
+                        number(found.error_estimate),
+                        number(found.return_defect),
+                    ],
                     iterations: found.iterations as u64,
                     found_by: found.found_by,
                     status: found.accuracy.status(),
@@ -70,7 +75,7 @@ pub fn table(name: &str, first: Vec<Column>, system: &System, method: &dyn Metho
         |name: &str, value: &dyn Fn(&Row) -> f64| Column::numbers(&column_name(name), rows.iter().map(value).collect());
     let mut columns = first;
     columns.push(numbers("frequency_Hz", &|row| hertz(row.omega)));
-    for (i, (place, along)) in system.places().iter().zip(system.seen()).enumerate() {
+    for (i, (place, along)) in system.places().iter().zip(system.place_axes()).enumerate() {
         let unit = along.unit();
         let names = [format!("amplitude_{unit}"), format!("mean_{unit}"), "phase_deg".to_owned()];
         for (k, what) in names.iter().enumerate() {

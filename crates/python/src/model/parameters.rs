@@ -57,7 +57,7 @@ pub fn dimension(model: &Model, name: &str) -> Option<Option<Dimension>> {
                 return Some(None); // The author of the law gave a number in SI units.
             }
             // A quantity raised to a fractional power is a plain number.
-            Some(Some(parameter.dimension_under(|key| law.value(key)).unwrap_or(Dimension::NONE)))
+            Some(Some(parameter.dimension_for(|key| law.value(key)).unwrap_or(Dimension::NONE)))
         }
     }
 }

@@ -4,13 +4,13 @@ use super::matrices::Entries;
 use serde::{Deserialize, Serialize};
 use stickslip::law::SharedLaw;
 use stickslip::model::{
-    Around, Body, Force, Joint, Mass, Model, Motion, Place, Ring, Spring, Substructure, SubstructureDamping,
+    Body, Force, Joint, Mass, Model, Motion, Place, Ring, SectorDistribution, Spring, Substructure, SubstructureDamping,
 };
 use stickslip::structure::{Component, Reduction};
 use stickslip_numerics::sparse::SparseMatrix;
 
 /// Distribution of forces and of imposed motions around a disk.
-type Arounds = [Vec<Option<Around>>; 2];
+type Arounds = [Vec<Option<SectorDistribution>>; 2];
 
 /// Name, mass, inertia matrix, directions.
 type StoredBody = (String, f64, [[f64; 3]; 3], Vec<String>);
@@ -59,10 +59,10 @@ type Entry = Vec<(usize, f64)>;
 /// Returns the parts of a model as bytes, without a structure that belongs to a study.
 pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>, String> {
     let around = around.each_ref().map(|all| {
-        let stored = |around: &Around| match *around {
-            Around::EngineOrder(order) => StoredAround::EngineOrder(order),
-            Around::NodalDiameter(diameter) => StoredAround::NodalDiameter(diameter),
-            Around::Sector(sector) => StoredAround::Sector(sector),
+        let stored = |around: &SectorDistribution| match *around {
+            SectorDistribution::EngineOrder(order) => StoredAround::EngineOrder(order),
+            SectorDistribution::NodalDiameter(diameter) => StoredAround::NodalDiameter(diameter),
+            SectorDistribution::Sector(sector) => StoredAround::Sector(sector),
         };
         all.iter().map(|around| around.as_ref().map(stored)).collect()
     });
@@ -127,9 +127,9 @@ pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), Str
     };
     let around = stored.around.map(|all| {
         let made = |around: StoredAround| match around {
-            StoredAround::EngineOrder(order) => Around::EngineOrder(order),
-            StoredAround::NodalDiameter(diameter) => Around::NodalDiameter(diameter),
-            StoredAround::Sector(sector) => Around::Sector(sector),
+            StoredAround::EngineOrder(order) => SectorDistribution::EngineOrder(order),
+            StoredAround::NodalDiameter(diameter) => SectorDistribution::NodalDiameter(diameter),
+            StoredAround::Sector(sector) => SectorDistribution::Sector(sector),
         };
         all.into_iter().map(|around| around.map(made)).collect()
     });
@@ -170,7 +170,7 @@ impl StoredStructure {
             component,
             damping: self.damping_ratio.map_or(SubstructureDamping::Own, SubstructureDamping::Ratio),
             reduction: self.reduce.map_or(Reduction::None { up_to: 0.0 }, Reduction::up_to),
-            earlier: None,
+            earlier_reduction: None,
             disk: None,
         };
         let place = |(name, directions, rows)| Place { directions, rows, ..Place::new(name, Vec::new()) };

@@ -5,8 +5,8 @@
 //! its ends. Bisection proceeds level by level, so the points are identical for any number of
 //! threads.
 
-use super::onward;
-use super::peak::Point;
+use super::branch_following;
+use super::peak::CurvePoint;
 use crate::method::{Method, MethodError, OrbitError};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 /// Specification of an adaptive curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Adaptive {
+pub struct AdaptiveCurve {
     /// First and last frequency, rad/s.
     pub range: (f64, f64),
     /// Permitted distance between the curve and its polygon, relative to the largest value of
@@ -23,17 +23,17 @@ pub struct Adaptive {
 }
 
 /// Number of initial intervals.
-pub const FIRST: usize = 64;
+pub const INITIAL_INTERVALS: usize = 64;
 /// Number of bisections of an initial interval. The resulting width, 1/4096 of it, is below the
 /// width of any peak that the initial grid can indicate.
 const LEVELS: usize = 12;
 /// No interval is bisected beyond this number of points.
-pub const MOST: usize = 20_000;
+pub const MAX_POINTS: usize = 20_000;
 
 /// A point of the curve, with the result of `keep`.
-pub type Kept<R> = (Point, R);
+pub type KeptPoint<R> = (CurvePoint, R);
 
-impl Adaptive {
+impl AdaptiveCurve {
     /// Computes the points in order of frequency. The polygon must be accurate for all
     /// `quantities` of an orbit. `keep` converts each outcome into the stored result. If `stop`
     /// returns true, the points so far are returned.
@@ -43,11 +43,11 @@ impl Adaptive {
     ///
     /// # Example
     /// ```
-    /// use stickslip::curve::adaptive::Adaptive;
+    /// use stickslip::curve::adaptive::AdaptiveCurve;
     /// use stickslip::method::event_driven::EventDriven;
     /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// let range = (std::f64::consts::TAU * 110.0, std::f64::consts::TAU * 130.0);
-    /// let curve = Adaptive { range, tolerance: 0.01 }
+    /// let curve = AdaptiveCurve { range, tolerance: 0.01 }
     ///     .curve(&EventDriven, &system, &|orbit| vec![orbit.places[0].amplitude()], &|_| (), &|| false)
     ///     .unwrap();
     /// // the resonance at 121.25 Hz is 0.2 Hz wide; a uniform grid takes 1000 points
@@ -60,18 +60,18 @@ impl Adaptive {
         quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
         keep: &(dyn Fn(Result<&Orbit, &OrbitError>) -> R + Sync),
         stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Vec<Kept<R>>, MethodError> {
+    ) -> Result<Vec<KeptPoint<R>>, MethodError> {
         // If the laws allow several orbits at a frequency, a search without initial guess can
         // find another orbit than the branch of the previous points. All points are then solved
         // in sequence.
-        let chunk = if system.has_passive_joints() { CHUNK } else { MOST };
-        let solve = |omegas: &[(f64, Option<&[f64]>)]| -> Result<Vec<Kept<R>>, MethodError> {
+        let chunk = if system.has_passive_joints() { CHUNK } else { MAX_POINTS };
+        let solve = |omegas: &[(f64, Option<&[f64]>)]| -> Result<Vec<KeptPoint<R>>, MethodError> {
             // One solver per chunk, because its stored data save work. The chunks are identical
             // for any number of threads.
-            let chunks: Vec<Result<Vec<Kept<R>>, MethodError>> = omegas
+            let chunks: Vec<Result<Vec<KeptPoint<R>>, MethodError>> = omegas
                 .par_chunks(chunk)
                 .map(|chunk| {
-                    let mut solver = onward::solver(method, system)?;
+                    let mut solver = branch_following::solver(method, system)?;
                     let mut kept = Vec::with_capacity(chunk.len());
                     let mut last: Option<Vec<f64>> = None;
                     for (omega, start) in chunk {
@@ -81,8 +81,8 @@ impl Adaptive {
                         let outcome = solver.orbit(*omega, start.or(last.as_deref()));
                         let row = keep(outcome.as_ref());
                         let point = match &outcome {
-                            Ok(orbit) => Point::new(orbit, quantities),
-                            Err(_) => Point::failed(*omega),
+                            Ok(orbit) => CurvePoint::new(orbit, quantities),
+                            Err(_) => CurvePoint::failed(*omega),
                         };
                         last = point.start.clone();
                         kept.push((point, row));
@@ -97,14 +97,17 @@ impl Adaptive {
             Ok(all)
         };
         let (from, to) = self.range;
-        let grid: Vec<(f64, Option<&[f64]>)> = (0..=FIRST)
-            .map(|i| if i == FIRST { to } else { from + (to - from) * (i as f64 / FIRST as f64) })
-            .map(|omega| (omega, None))
-            .collect();
+        let grid: Vec<(f64, Option<&[f64]>)> =
+            (0..=INITIAL_INTERVALS)
+                .map(|i| {
+                    if i == INITIAL_INTERVALS { to } else { from + (to - from) * (i as f64 / INITIAL_INTERVALS as f64) }
+                })
+                .map(|omega| (omega, None))
+                .collect();
         let mut points = solve(&grid)?;
         let mut open: Vec<bool> = vec![true; points.len().saturating_sub(1)];
         for _ in 0..LEVELS {
-            if stop() || points.len() + open.iter().filter(|open| **open).count() > MOST {
+            if stop() || points.len() + open.iter().filter(|open| **open).count() > MAX_POINTS {
                 break;
             }
             let middles: Vec<(f64, Option<&[f64]>)> = (0..open.len())
@@ -118,14 +121,19 @@ impl Adaptive {
             if found.len() < middles.len() {
                 break;
             }
-            (points, open) = self.joined(points, &open, found);
+            (points, open) = self.insert_middles(points, &open, found);
         }
         Ok(points)
     }
 
     /// Inserts the middle points of the open intervals. Returns all points, and which of the new
     /// intervals are open.
-    fn joined<R>(&self, points: Vec<Kept<R>>, open: &[bool], middles: Vec<Kept<R>>) -> (Vec<Kept<R>>, Vec<bool>) {
+    fn insert_middles<R>(
+        &self,
+        points: Vec<KeptPoint<R>>,
+        open: &[bool],
+        middles: Vec<KeptPoint<R>>,
+    ) -> (Vec<KeptPoint<R>>, Vec<bool>) {
         let all = || points.iter().chain(&middles).map(|(point, _)| &point.values);
         let count = all().map(Vec::len).max().unwrap_or(0);
         let largest = |quantity: usize| {
@@ -133,7 +141,7 @@ impl Adaptive {
             values.filter(|value| value.is_finite()).fold(0.0f64, |a, b| a.max(b.abs()))
         };
         let allowed: Vec<f64> = (0..count).map(|quantity| self.tolerance * largest(quantity)).collect();
-        let bends = |a: &Point, middle: &Point, b: &Point| {
+        let bends = |a: &CurvePoint, middle: &CurvePoint, b: &CurvePoint| {
             let [a, middle, b] = [a, middle, b].map(|point| &point.values);
             // Next to a failed point the shape of the curve is unknown. The failure is already a
             // point of the curve.
@@ -183,7 +191,7 @@ mod tests {
         let system = couple.assemble().unwrap();
         let tolerance = 0.01;
         let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
-        let curve = Adaptive { range: (TAU * 119.0, TAU * 123.0), tolerance }
+        let curve = AdaptiveCurve { range: (TAU * 119.0, TAU * 123.0), tolerance }
             .curve(&EventDriven, &system, &amplitude, &|outcome| outcome.is_ok(), &|| false)
             .unwrap();
         assert!(curve.iter().all(|(_, converged)| *converged));
@@ -203,9 +211,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_stopped_returns_what_is_there() {
+    fn stopping_returns_the_points_so_far() {
         let system = crate::model::example::blade_couple().assemble().unwrap();
-        let adaptive = Adaptive { range: (700.0, 800.0), tolerance: 0.01 };
+        let adaptive = AdaptiveCurve { range: (700.0, 800.0), tolerance: 0.01 };
         assert!(adaptive.curve(&EventDriven, &system, &|_| vec![0.0], &|_| (), &|| true).unwrap().is_empty());
     }
 }

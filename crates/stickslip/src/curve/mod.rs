@@ -2,10 +2,10 @@
 //! modes.
 
 pub mod adaptive;
-pub mod both_ways;
+pub mod bidirectional_sweep;
+mod branch_following;
+pub mod continuation;
 pub mod modes;
-mod onward;
 pub mod peak;
 pub mod performance;
 pub mod sweep;
-pub mod trace;

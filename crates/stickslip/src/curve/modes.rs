@@ -13,21 +13,21 @@
 //! for small motion.
 //!
 //! Friction can bring two frequencies together, so that two modes nearly coalesce:
-//! [`Mode::merges`]. Below this amplitude there are two modes again, with other shapes. Small
-//! effects, such as the number of harmonics, decide which mode continues which. The curve may
-//! also turn there. Its amplitude then grows again before it falls, and the motion at the next
-//! smaller amplitude is a different one ([`Mode::turns`]). If the curve does not return, the
-//! mode ends ([`Lost`]).
+//! [`Mode::coalescences`]. Below this amplitude there are two modes again, with other shapes.
+//! Small effects, such as the number of harmonics, decide which mode continues which. The curve
+//! may also turn there. Its amplitude then grows again before it falls, and the motion at the
+//! next smaller amplitude is a different one ([`Mode::turns`]). If the curve does not return, the
+//! mode ends ([`ModeEnd`]).
 //! Source: the extended periodic motion concept of Krack (2015).
 
-mod follow;
+mod mode_curve;
 
-pub use follow::{Lost, Reason, Turn};
+pub use mode_curve::{ModeEnd, ModeEndCause, TurningPart};
 
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
 use crate::method::{MethodError, ways};
 use crate::model::System;
-use follow::ModeCurve;
+use mode_curve::ModeCurve;
 use num_complex::Complex64;
 use stickslip_numerics::tie_break::first_largest;
 
@@ -78,15 +78,15 @@ pub struct Mode {
     pub largest: Option<ModePoint>,
     /// Modal amplitudes within the range at which the mode nearly coalesces with another one, in
     /// decreasing order, m √kg.
-    pub merges: Vec<f64>,
+    pub coalescences: Vec<f64>,
     /// Turning points of the curve within the range, in decreasing order of amplitude.
-    pub turns: Vec<Turn>,
+    pub turns: Vec<TurningPart>,
     /// Requested amplitudes on the curve at which no motion was found.
-    pub missing: Vec<f64>,
+    pub not_found: Vec<f64>,
     /// Amplitude and cause of the end, if the mode ends above the smallest amplitude.
-    pub lost: Option<Lost>,
+    pub ended: Option<ModeEnd>,
     /// True if the mode is one of the two travelling waves of a pair of equal modes.
-    pub travels: bool,
+    pub is_travelling_wave: bool,
 }
 
 /// Specification of a nonlinear mode.
@@ -105,7 +105,7 @@ pub struct ModeRequest {
 }
 
 /// Displacements of places below this fraction of a mode's largest coordinate are rounding.
-const UNSEEN: f64 = 1e-12;
+const PLACE_ROUNDING: f64 = 1e-12;
 
 /// Checks that a system can have nonlinear modes.
 ///
@@ -129,38 +129,39 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 ///
 /// # Example
 /// ```
-/// use stickslip::curve::modes::{ModeRequest, mode};
+/// use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// // friction affects only the mode in which the blades move in antiphase
 /// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
-/// let mode = mode(&system, request).unwrap();
-/// assert!(mode.lost.is_none());
+/// let mode = nonlinear_mode(&system, request).unwrap();
+/// assert!(mode.ended.is_none());
 /// let stuck = ((105_103.0 + 2.0 * 1e4) / 0.182f64).sqrt();
 /// assert!((mode.points[0].omega / stuck - 1.0).abs() < 1e-6);
 /// ```
-pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
+pub fn nonlinear_mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let (low, high) = request.range;
     let last = request.points.max(2) - 1;
-    let followed = Followed::new(&mut equations, request);
+    let followed = ModeBranches::new(&mut equations, request);
     let larger = |a: &(f64, ModeState), b: &(f64, ModeState)| a.1.damping.total_cmp(&b.1.damping);
-    let largest = followed.curves().filter_map(|curve| curve.largest(&mut equations, (low, high))).max_by(larger);
+    let largest =
+        followed.curves().filter_map(|curve| curve.largest_damping(&mut equations, (low, high))).max_by(larger);
     let merges = followed.curves().flat_map(|curve| curve.merges(&equations)).filter(|a| (low..high).contains(a));
-    let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.at < high);
+    let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.amplitude < high);
     let mut mode = Mode {
         points: Vec::new(),
         largest: largest.map(|(a, state)| point(&equations, a, &state)),
-        merges: merges.collect(),
+        coalescences: merges.collect(),
         turns: turns.collect(),
-        missing: Vec::new(),
-        lost: followed.lost(high),
-        travels: followed.curves().any(ModeCurve::travels),
+        not_found: Vec::new(),
+        ended: followed.ended(high),
+        is_travelling_wave: followed.curves().any(ModeCurve::travels),
     };
     for i in 0..=last {
         let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
-        match followed.curves().find_map(|curve| curve.at(&mut equations, amplitude)) {
+        match followed.curves().find_map(|curve| curve.state_at(&mut equations, amplitude)) {
             Some(state) => mode.points.push(point(&equations, amplitude, &state)),
-            None if followed.passes(amplitude) => mode.missing.push(amplitude),
+            None if followed.passes(amplitude) => mode.not_found.push(amplitude),
             None => {}
         }
     }
@@ -169,28 +170,28 @@ pub fn mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> 
 
 /// The curve of a mode: a branch from large amplitudes downwards. A branch from small amplitudes
 /// upwards is added if the first one does not reach them.
-struct Followed {
+struct ModeBranches {
     falling: Option<ModeCurve>,
     rising: Option<ModeCurve>,
 }
 
-impl Followed {
+impl ModeBranches {
     fn new(equations: &mut ModeEquations<'_>, request: ModeRequest) -> Self {
         let (low, high) = request.range;
         // A single mode has the same number at both ends. For a law with memory, large motions
         // are expensive, so the branch from small amplitudes is tried first.
         let rising = match equations.is_alone_with_memory() {
-            true => ModeCurve::from_rest(equations, request.mode, request.range),
+            true => ModeCurve::from_small_amplitude(equations, request.mode, request.range),
             false => None,
         };
-        if rising.as_ref().is_some_and(|rising| rising.top() >= high) {
-            return Followed { falling: None, rising };
+        if rising.as_ref().is_some_and(|rising| rising.largest_amplitude() >= high) {
+            return ModeBranches { falling: None, rising };
         }
         let falling = ModeCurve::follow(equations, request.mode, request.range);
-        let end = falling.end().min(high);
-        let is_sought = rising.is_none() && falling.lost.is_some() && end > low;
-        let below = if is_sought { ModeCurve::from_rest(equations, request.mode, (low, end)) } else { None };
-        Followed { falling: Some(falling), rising: rising.or(below) }
+        let end = falling.smallest_amplitude().min(high);
+        let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
+        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, (low, end)) } else { None };
+        ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
 
     fn curves(&self) -> impl Iterator<Item = &ModeCurve> {
@@ -199,21 +200,21 @@ impl Followed {
 
     /// Tells whether a branch passes an amplitude.
     fn passes(&self, amplitude: f64) -> bool {
-        self.falling.as_ref().is_some_and(|curve| amplitude > curve.end())
-            || self.rising.as_ref().is_some_and(|curve| amplitude < curve.top())
+        self.falling.as_ref().is_some_and(|curve| amplitude > curve.smallest_amplitude())
+            || self.rising.as_ref().is_some_and(|curve| amplitude < curve.largest_amplitude())
     }
 
     /// Returns amplitude and cause of the end of the mode, if it ends above the smallest
     /// amplitude. Amplitudes above `high` are not considered.
-    fn lost(&self, high: f64) -> Option<Lost> {
+    fn ended(&self, high: f64) -> Option<ModeEnd> {
         let falling = self.falling.as_ref()?;
-        let lost = falling.lost?;
+        let ended = falling.ended?;
         match &self.rising {
-            Some(rising) if rising.top() >= falling.end().min(high) => None,
-            Some(rising) if lost.reason == Reason::NoBeginning => {
-                Some(Lost { at: rising.top(), reason: Reason::FromRest })
+            Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
+            Some(rising) if ended.reason == ModeEndCause::NoStart => {
+                Some(ModeEnd { at: rising.largest_amplitude(), reason: ModeEndCause::FromSmallAmplitudes })
             }
-            _ => Some(lost),
+            _ => Some(ended),
         }
     }
 }
@@ -223,17 +224,17 @@ impl Followed {
 /// such mode, or if it moves no place.
 ///
 /// # Errors
-/// See [`mode()`].
-pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
+/// See [`nonlinear_mode`].
+pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
     let equations = equations(system, 1, 8)?;
     let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
     let displacements = |x: Vec<Complex64>| -> Vec<Complex64> {
-        x.into_iter().zip(system.seen()).filter(|(_, place)| !place.is_rotation()).map(|(x, _)| x).collect()
+        x.into_iter().zip(system.place_axes()).filter(|(_, place)| !place.is_rotation()).map(|(x, _)| x).collect()
     };
     Ok(equations.linear_modes().get(index).and_then(|linear| {
         let shape = linear.shape.as_slice();
         let largest = size(&displacements(equations.at_places(shape)));
-        (largest > UNSEEN * size(shape)).then(|| 1.0 / largest)
+        (largest > PLACE_ROUNDING * size(shape)).then(|| 1.0 / largest)
     }))
 }
 
@@ -241,12 +242,12 @@ pub fn unit(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
 /// An orbit is stable if the damping rises with amplitude there.
 ///
 /// # Errors
-/// See [`mode()`].
+/// See [`nonlinear_mode`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
     let path = ModeCurve::follow(&mut equations, request.mode, request.range);
     let mut orbits = Vec::new();
-    for pair in path.within(&mut equations, request.range).windows(2) {
+    for pair in path.states_within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
         // The curve turns between states that are not consecutive, and the damping jumps.
         if (upper.damping < 0.0) == (lower.damping < 0.0) || k - i > 1 {
@@ -257,7 +258,7 @@ pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoi
         let (mut a, mut fa, mut b, mut fb) = (below.ln(), lower.damping, above.ln(), upper.damping);
         for _ in 0..100 {
             let c = (a * fb - b * fa) / (fb - fa);
-            let Some(state) = path.at(&mut equations, c.exp()) else { break };
+            let Some(state) = path.state_at(&mut equations, c.exp()) else { break };
             let fc = state.damping;
             found = Some((c.exp(), state));
             if fc == 0.0 || (b - a).abs() < 1e-14 || fc.abs() < 1e-15 {
@@ -304,12 +305,12 @@ mod tests {
     /// while the dampers stick. The frequency is that of the wave with one nodal diameter,
     /// `√((k + 4 kt sin²(π/N))/m)`.
     #[test]
-    fn the_modes_of_a_tuned_ring_go_down_to_where_all_sticks() {
+    fn modes_of_a_tuned_ring_reach_full_stick() {
         let (blades, k, kt) = (6, 4.0, 0.8);
         let system = ring(blades);
         let request = ModeRequest { mode: 1, range: (1e-6, 1e-2), points: 5, harmonics: 3, samples: 128 };
-        let mode = mode(&system, request).unwrap();
-        assert_eq!((mode.points.len(), mode.lost, &mode.missing[..]), (5, None, &[][..]));
+        let mode = nonlinear_mode(&system, request).unwrap();
+        assert_eq!((mode.points.len(), mode.ended, &mode.not_found[..]), (5, None, &[][..]));
         let stuck = (k + 4.0 * kt * (PI / blades as f64).sin().powi(2)).sqrt();
         for point in &mode.points {
             assert!((point.omega / stuck - 1.0).abs() < 1e-10, "{} instead of {stuck}", point.omega);
@@ -345,7 +346,7 @@ mod tests {
             for diameter in 1..blades / 2 {
                 let sine = (PI * diameter as f64 / blades as f64).sin();
                 for index in [2 * diameter - 1, 2 * diameter] {
-                    let unit = unit(&system, index).unwrap().unwrap();
+                    let unit = unit_amplitude(&system, index).unwrap().unwrap();
                     // Only 1e-9 of the joints' stiffness distinguishes the modes of blades
                     // without coupling springs, and rounding disturbs it.
                     assert!(
@@ -359,8 +360,12 @@ mod tests {
                         harmonics: 1,
                         samples: 1024,
                     };
-                    let mode = mode(&system, request).unwrap();
-                    assert_eq!((mode.lost, mode.points.len(), mode.travels), (None, 11, true), "{blades} {diameter}");
+                    let mode = nonlinear_mode(&system, request).unwrap();
+                    assert_eq!(
+                        (mode.ended, mode.points.len(), mode.is_travelling_wave),
+                        (None, 11, true),
+                        "{blades} {diameter}"
+                    );
                     for point in &mode.points {
                         let (kt, limit) = (0.8, 0.2);
                         let (d, slips) = (2.0 * sine * point.amplitude / unit, limit / kt);
@@ -392,7 +397,7 @@ mod tests {
     /// At a cubic stiffness of a million times the linear one, the linear mode is not a useful
     /// initial guess.
     #[test]
-    fn a_cubic_spring_is_followed_to_where_it_is_all_there_is() {
+    fn a_dominant_cubic_spring_has_the_elliptic_solution() {
         let (k, b) = (1e4, 1e9);
         let quarter = |m: f64| {
             let (mut x, mut y) = (1.0, (1.0 - m).sqrt());
@@ -417,8 +422,8 @@ mod tests {
         let system = model.assemble().unwrap();
         for harmonics in [3, 15, 31] {
             let request = ModeRequest { mode: 0, range: (1e-9, 1.0), points: 15, harmonics, samples: 1024 };
-            let mode = mode(&system, request).unwrap();
-            assert_eq!((mode.lost, &mode.missing[..], mode.points.len()), (None, &[][..], 15), "{harmonics}");
+            let mode = nonlinear_mode(&system, request).unwrap();
+            assert_eq!((mode.ended, &mode.not_found[..], mode.points.len()), (None, &[][..], 15), "{harmonics}");
             for point in mode.points.iter().filter(|point| harmonics > 3 && point.amplitude > 1e-5) {
                 // Find the largest displacement with this first harmonic by bisection; the
                 // harmonic increases with the displacement.
@@ -441,7 +446,7 @@ mod tests {
     /// A mass with rigid friction that falls with velocity does not vibrate if friction is
     /// thousands of times the spring force. The curve ends there after some hundred steps.
     #[test]
-    fn a_mode_is_left_where_nothing_vibrates() {
+    fn an_overdamped_mode_ends() {
         let mut model = Model::default();
         let between = || ["m".to_owned(), GROUND.to_owned()];
         model.masses.push(Mass::new("m", 1.0));
@@ -450,11 +455,11 @@ mod tests {
         model.joints.push(Joint { name: "j".into(), between: between(), law });
         let system = model.assemble().unwrap();
         let request = ModeRequest { mode: 0, range: (1e-9, 1e-2), points: 5, harmonics: 15, samples: 1024 };
-        let mode = mode(&system, request).unwrap();
-        let lost = mode.lost.unwrap();
-        assert_eq!(lost.reason, Reason::Overdamped);
+        let mode = nonlinear_mode(&system, request).unwrap();
+        let ended = mode.ended.unwrap();
+        assert_eq!(ended.reason, ModeEndCause::Overdamped);
         // (4/π · 1 N) / (2 · 1e4 N/m · a) is a damping ratio of one at a = 0.06 mm
-        assert!(lost.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{lost:?}");
+        assert!(ended.at < 6.4e-5 && mode.points.last().unwrap().damping < 0.1, "{ended:?}");
     }
 
     /// A mode equals the forced vibration under the forces `2 ζ ω M x'` with all their
@@ -462,7 +467,7 @@ mod tests {
     /// and its energy loss `2 π ζ ω² Σ h² Xₕᴴ M Xₕ` under these forces. With positive damping
     /// its orbit is unique.
     #[test]
-    fn the_exact_orbit_under_the_forces_of_a_mode_is_the_mode() {
+    fn a_mode_equals_the_forced_exact_orbit() {
         let mut couple = example::blade_couple();
         couple.joints[0].law = std::sync::Arc::new(Coulomb { limit: 8.0 });
         let system = couple.assemble().unwrap();
@@ -471,7 +476,7 @@ mod tests {
         for index in [0, 1] {
             let path = ModeCurve::follow(&mut equations, index, (1e-4, 2e-2));
             for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
-                let state = path.at(&mut equations, amplitude).unwrap();
+                let state = path.state_at(&mut equations, amplitude).unwrap();
                 let n = system.dofs();
                 let mut model = couple.clone();
                 model.forces.clear();

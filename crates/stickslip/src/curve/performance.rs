@@ -6,10 +6,10 @@
 //! damper: free at the left, stuck at the right, with a minimum between.
 //! Source: Griffin (1980), Fig. 4.
 
-use super::both_ways::{BothWays, stretches};
-use super::onward;
-use super::peak::{Peak, Point, highest};
-use super::sweep::{Watch, stretch};
+use super::bidirectional_sweep::{BidirectionalSweep, other_intervals};
+use super::branch_following;
+use super::peak::{CurvePoint, Peak, highest_peak};
+use super::sweep::{Watch, solve_sequence};
 use crate::method::{Method, MethodError};
 use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
@@ -36,15 +36,15 @@ pub struct Performance<'a, E> {
 
 /// The peak at one value of the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
+pub struct PerformanceRow {
     /// Value of the parameter.
     pub value: f64,
     /// The highest peak; `None` if no orbit converged.
     pub peak: Option<Peak>,
     /// True if only the reverse sweep has this peak, in a system that allows several orbits at a
-    /// frequency ([`super::both_ways`]).
-    pub way_back: bool,
-    /// Number of grid orbits that were not found, plus one if the peak is unsettled.
+    /// frequency ([`super::bidirectional_sweep`]).
+    pub reverse_sweep_only: bool,
+    /// Number of grid orbits that were not found, plus one if the peak is unresolved.
     pub failed: usize,
     /// Number of grid orbits whose series is too short for the tolerance, or whose error was not
     /// estimated.
@@ -55,26 +55,29 @@ pub struct Row {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerformanceCurve {
     /// One row per value, in the given order.
-    pub rows: Vec<Row>,
+    pub rows: Vec<PerformanceRow>,
     /// The value with the lowest peak, refined between its neighbours. `None` if the lowest row
     /// is the first or the last one, or if several rows are equally low.
-    pub optimum: Option<Row>,
+    pub optimum: Option<PerformanceRow>,
 }
 
 /// Peaks that differ by less than this fraction of the highest are equal. Orbits are accurate to
 /// about 1e-10, and smaller differences do not matter to a design.
-const SAME: f64 = 1e-9;
+const EQUAL_PEAKS: f64 = 1e-9;
 
 /// Returns the height of a row; infinity without a peak.
-fn height(row: &Row) -> f64 {
+fn height(row: &PerformanceRow) -> f64 {
     row.peak.map_or(f64::INFINITY, |peak| peak.value)
 }
 
 /// Returns the rows with the lowest peak.
-fn lowest(rows: &[Row]) -> Vec<usize> {
+fn lowest(rows: &[PerformanceRow]) -> Vec<usize> {
     let heights = || rows.iter().map(height).filter(|height| height.is_finite());
     let (least, most) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));
-    (0..rows.len()).filter(|row| height(&rows[*row]) <= least + SAME * most).filter(|_| least.is_finite()).collect()
+    (0..rows.len())
+        .filter(|row| height(&rows[*row]) <= least + EQUAL_PEAKS * most)
+        .filter(|_| least.is_finite())
+        .collect()
 }
 
 impl PerformanceCurve {
@@ -103,54 +106,55 @@ pub enum PerformanceError<E> {
 
 /// Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10, and the
 /// curve is flat to second order or kinked at the optimum.
-const BRACKET: f64 = 1e-7;
+const OPTIMUM_TOLERANCE: f64 = 1e-7;
 
 impl<E: Send> Performance<'_, E> {
     /// Computes the peak at one value of the parameter.
     ///
     /// # Errors
     /// The system cannot be built, or the method does not support it.
-    pub fn peak(&self, value: f64) -> Result<Row, PerformanceError<E>> {
+    pub fn peak(&self, value: f64) -> Result<PerformanceRow, PerformanceError<E>> {
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
-        let mut solver = onward::solver(self.method, &system).map_err(PerformanceError::Method)?;
+        let mut solver = branch_following::solver(self.method, &system).map_err(PerformanceError::Method)?;
         let last = self.points.max(3) - 1;
         let omegas: Vec<f64> =
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
         let (mut failed, mut inaccurate) = (0, 0);
-        let mut points: Vec<Point> = Vec::with_capacity(omegas.len());
-        let mut ways = BothWays::of(&system);
+        let mut points: Vec<CurvePoint> = Vec::with_capacity(omegas.len());
+        let mut bidirectional = BidirectionalSweep::for_system(&system);
         let (stop, finished) = (AtomicBool::new(false), || ());
         let watch = Watch { finished: &finished, stop: &stop };
-        stretch(&mut *solver, &mut omegas.into_iter(), watch, &mut |omega, outcome| {
+        solve_sequence(&mut *solver, &mut omegas.into_iter(), watch, &mut |omega, outcome| {
             let Some(outcome) = outcome else { return };
-            ways.iter_mut().for_each(|ways| ways.add(omega, outcome));
+            bidirectional.iter_mut().for_each(|sweep| sweep.add(omega, outcome));
             points.push(match outcome {
                 Ok(orbit) => {
                     inaccurate += usize::from(orbit.evidence.accuracy != Accuracy::Converged);
-                    Point::new(orbit, self.quantities)
+                    CurvePoint::new(orbit, self.quantities)
                 }
                 Err(_) => {
                     failed += 1;
-                    Point::failed(omega)
+                    CurvePoint::failed(omega)
                 }
             });
         });
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
-        let mut peak = highest(&mut *solver, &points, wanted, self.quantities);
-        let mut way_back = false;
-        if let Some(ways) = ways {
-            let others = ways.others(self.method, &system, &stop).map_err(PerformanceError::Method)?;
-            let others: Vec<Point> = others.iter().map(|other| Point::new(&other.orbit, self.quantities)).collect();
-            for points in stretches(&points, &others) {
-                let other = highest(&mut *solver, &points, wanted, self.quantities);
+        let mut peak = highest_peak(&mut *solver, &points, wanted, self.quantities);
+        let mut reverse_sweep_only = false;
+        if let Some(bidirectional) = bidirectional {
+            let others = bidirectional.reverse_sweep(self.method, &system, &stop).map_err(PerformanceError::Method)?;
+            let others: Vec<CurvePoint> =
+                others.iter().map(|other| CurvePoint::new(&other.orbit, self.quantities)).collect();
+            for points in other_intervals(&points, &others) {
+                let other = highest_peak(&mut *solver, &points, wanted, self.quantities);
                 if other.is_some_and(|other| peak.is_none_or(|peak| other.value > peak.value)) {
-                    (peak, way_back) = (other, true);
+                    (peak, reverse_sweep_only) = (other, true);
                 }
             }
         }
-        // an unsettled peak counts as not found
-        failed += usize::from(peak.is_some_and(|peak| peak.unsettled.is_some()));
-        Ok(Row { value, peak, way_back, failed, inaccurate })
+        // an unresolved peak counts as not found
+        failed += usize::from(peak.is_some_and(|peak| peak.unresolved.is_some()));
+        Ok(PerformanceRow { value, peak, reverse_sweep_only, failed, inaccurate })
     }
 
     /// Computes the curve over `values` (in increasing order) and its optimum.
@@ -181,7 +185,7 @@ impl<E: Send> Performance<'_, E> {
     /// assert!((best.value - 6.684).abs() < 0.01);
     /// ```
     pub fn curve(&self, values: &[f64]) -> Result<PerformanceCurve, PerformanceError<E>> {
-        let rows: Vec<Row> = values.par_iter().map(|value| self.peak(*value)).collect::<Result<_, _>>()?;
+        let rows: Vec<PerformanceRow> = values.par_iter().map(|value| self.peak(*value)).collect::<Result<_, _>>()?;
         let optimum = match lowest(&rows)[..] {
             [i] if i > 0 && i + 1 < rows.len() => Some(self.refine(rows[i - 1].value, rows[i], rows[i + 1].value)?),
             _ => None,
@@ -191,9 +195,9 @@ impl<E: Send> Performance<'_, E> {
 
     /// Refines the optimum by golden-section search, because the minimum can be smooth or a kink
     /// between two branches.
-    fn refine(&self, low: f64, middle: Row, high: f64) -> Result<Row, PerformanceError<E>> {
+    fn refine(&self, low: f64, middle: PerformanceRow, high: f64) -> Result<PerformanceRow, PerformanceError<E>> {
         let mut best = middle;
-        let close = |a: f64, b: f64| b - a <= BRACKET * (a.abs() + b.abs());
+        let close = |a: f64, b: f64| b - a <= OPTIMUM_TOLERANCE * (a.abs() + b.abs());
         golden_section((low, high), close, |value| {
             let row = self.peak(value)?;
             if height(&row) < height(&best) {

@@ -8,7 +8,7 @@
 //! then solved in reverse, from the first orbit found after them. A point that is found from
 //! neither side is solved without initial guess.
 
-use super::onward;
+use super::branch_following;
 use crate::method::{Method, MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -58,7 +58,7 @@ pub fn sweep<R: Send>(
         .map(|block| {
             let range = block * BLOCK..((block + 1) * BLOCK).min(count);
             let mut rows = Vec::with_capacity(range.len());
-            stretch(&mut *solver(method, system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
+            solve_sequence(&mut *solver(method, system)?, &mut range.clone().map(omega), watch, &mut |_, outcome| {
                 let index = range.start + rows.len();
                 rows.push(outcome.map(|outcome| row(index, outcome)));
             });
@@ -73,24 +73,29 @@ pub fn sweep<R: Send>(
 }
 
 /// Receives an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
-pub type See<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
+pub type Observer<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
 
-/// Returns a solver for [`stretch`]. For systems that use branch following, it continues the
-/// branch of its initial guess in smaller steps before it changes to another branch.
+/// Returns a solver for [`solve_sequence`]. For systems that use branch following, it continues
+/// the branch of its initial guess in smaller steps before it changes to another branch.
 ///
 /// # Errors
 /// The method does not support the system.
 pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-    onward::solver(method, system)
+    branch_following::solver(method, system)
 }
 
 /// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as initial
 /// guess. Points without an orbit from there are solved in reverse from the next orbit. `see`
 /// receives the outcomes in order.
-pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, watch: Watch<'_>, see: &mut See<'_>) {
+pub fn solve_sequence(
+    solver: &mut dyn Solver,
+    omegas: &mut dyn Iterator<Item = f64>,
+    watch: Watch<'_>,
+    see: &mut Observer<'_>,
+) {
     let mut start: Option<Vec<f64>> = None;
     // points without an orbit, until the next orbit is found
-    let mut missing: Vec<Missing> = Vec::new();
+    let mut missing: Vec<PendingPoint> = Vec::new();
     let mut omegas = omegas.peekable();
     while let Some(omega) = omegas.next() {
         if watch.stop.load(Ordering::Relaxed) {
@@ -98,22 +103,22 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
             see(omega, None);
             continue;
         }
-        let (outcome, led) = (solver.orbit(omega, start.as_deref()), start.is_some());
+        let (outcome, had_guess) = (solver.orbit(omega, start.as_deref()), start.is_some());
         (watch.finished)();
         // After a failure, the next point has no initial guess, because the last orbit may be
         // far away.
-        start = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
-        let found = outcome.as_ref().ok().map(|orbit| orbit.start.clone());
-        missing.push(Missing { omega, outcome, led });
+        start = outcome.as_ref().ok().map(|orbit| orbit.initial_state.clone());
+        let found = outcome.as_ref().ok().map(|orbit| orbit.initial_state.clone());
+        missing.push(PendingPoint { omega, outcome, had_guess });
         if found.is_none() && omegas.peek().is_some() {
             continue;
         }
         if let Some(behind) = found {
             let before = missing.len() - 1;
-            from_behind(solver, &behind, &mut missing[..before], watch);
+            solve_missing_in_reverse(solver, &behind, &mut missing[..before], watch);
         }
         for point in &mut missing {
-            point.seek_alone(solver, watch);
+            point.solve_without_guess(solver, watch);
             see(point.omega, Some(point.outcome.as_ref()));
         }
         missing.clear();
@@ -128,7 +133,7 @@ pub fn stretch(solver: &mut dyn Solver, omegas: &mut dyn Iterator<Item = f64>, w
 ///
 /// # Errors
 /// The method does not support the system.
-pub fn back(
+pub fn reverse_sweep(
     method: &dyn Method,
     system: &System,
     start: Option<Vec<f64>>,
@@ -144,48 +149,50 @@ pub fn back(
         }
         let found = solver.between(omega, start.as_deref()).ok();
         found.iter().for_each(&mut *see);
-        start = found.map(|orbit| orbit.start);
+        start = found.map(|orbit| orbit.initial_state);
     }
     Ok(())
 }
 
 /// A point whose outcome is not yet reported.
-struct Missing {
+struct PendingPoint {
     omega: f64,
     outcome: Result<Orbit, OrbitError>,
     /// True if the search began from the previous orbit.
-    led: bool,
+    had_guess: bool,
 }
 
-impl Missing {
+impl PendingPoint {
     /// Tells whether another initial guess may help. It does not for a series that is too short.
-    fn is_sought_again(&self) -> bool {
+    fn may_succeed_from_another_guess(&self) -> bool {
         self.outcome.as_ref().is_err_and(|error| !matches!(error, OrbitError::Truncation { .. }))
     }
 
     /// Solves the point without initial guess, if the searches from its neighbours failed.
-    fn seek_alone(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
-        if self.led && self.is_sought_again() && !watch.stop.load(Ordering::Relaxed) {
+    fn solve_without_guess(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
+        if self.had_guess && self.may_succeed_from_another_guess() && !watch.stop.load(Ordering::Relaxed) {
             self.outcome = solver.orbit(self.omega, None).or(self.outcome.clone());
         }
     }
 }
 
 /// Solves the missing points in reverse from the next orbit, until one of them fails.
-fn from_behind(solver: &mut dyn Solver, behind: &[f64], missing: &mut [Missing], watch: Watch<'_>) {
+fn solve_missing_in_reverse(solver: &mut dyn Solver, behind: &[f64], missing: &mut [PendingPoint], watch: Watch<'_>) {
     let mut start = behind.to_vec();
-    for Missing { omega, outcome, led } in missing.iter_mut().rev().take_while(|point| point.is_sought_again()) {
+    for PendingPoint { omega, outcome, had_guess } in
+        missing.iter_mut().rev().take_while(|point| point.may_succeed_from_another_guess())
+    {
         if watch.stop.load(Ordering::Relaxed) {
             return;
         }
         match solver.orbit(*omega, Some(&start)) {
             Ok(orbit) => {
-                start.clone_from(&orbit.start);
+                start.clone_from(&orbit.initial_state);
                 *outcome = Ok(orbit);
             }
             Err(error) => {
                 // a search that exhausted the work limit is not repeated
-                *led &= !matches!(error, OrbitError::NotConverged { spent: true, .. });
+                *had_guess &= !matches!(error, OrbitError::NotConverged { work_limit_reached: true, .. });
                 return;
             }
         }
@@ -234,7 +241,7 @@ mod tests {
         let watch = Watch { finished: &|| (), stop: &AtomicBool::new(false) };
         let mut seen = Vec::new();
         let mut solver = Folded { fold }.solver(&system).unwrap();
-        stretch(&mut *solver, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
+        solve_sequence(&mut *solver, &mut omegas.iter().copied(), watch, &mut |omega, outcome| {
             let outcome = outcome.expect("not stopped");
             if let Ok(orbit) = outcome {
                 assert_eq!(orbit.omega, omega);
@@ -245,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn points_beyond_a_fold_are_found_from_behind_and_seen_in_order() {
+    fn points_beyond_a_fold_are_solved_in_reverse_and_reported_in_order() {
         let omegas: Vec<f64> = (0..8).map(|i| 750.0 + 5.0 * f64::from(i)).collect();
         let found = outcomes((757.0, 773.0), &omegas);
         assert_eq!(found, omegas.iter().map(|omega| (*omega, true)).collect::<Vec<_>>());

@@ -9,8 +9,8 @@
 //! The law gives no energy in a closed motion for any `beta >= 0`: at the same z, the slope in
 //! loading does not exceed that in unloading.
 
-use super::kink::{power, size};
-use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use super::kernels::kink::{abs, power};
+use super::{Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -21,7 +21,7 @@ const EXPONENT: &str = "exponent";
 /// The highest exponent, because units are written up to the 9th power. At the corner of the
 /// bilinear loop (the limit of high exponents) the force is then 0.930 of its bound. For a
 /// sharper knee, use `jenkins`.
-const SHARPEST: f64 = 9.0;
+const MAX_EXPONENT: f64 = 9.0;
 
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
@@ -30,15 +30,16 @@ pub(super) static INFO: LawInfo = LawInfo {
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness"),
         Parameter::new("beta", Dimension::INVERSE_LENGTH, Range::ZeroOrMore, "size of the hysteresis loop")
-            .to_the(EXPONENT),
+            .with_power_of(EXPONENT),
         Parameter::new(
             "gamma",
             Dimension::INVERSE_LENGTH,
             Range::Any,
             "shape of the hysteresis loop; beta + gamma must be more than zero",
         )
-        .to_the(EXPONENT),
-        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, SHARPEST), "sharpness of the knee").or(1.0),
+        .with_power_of(EXPONENT),
+        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, MAX_EXPONENT), "sharpness of the knee")
+            .with_default(1.0),
     ],
     sample: &[10_000.0, 1.5e7, 1e7, 2.0],
     build: |values| Arc::new(BoucWen { stiffness: values[0], beta: values[1], gamma: values[2], exponent: values[3] }),
@@ -51,8 +52,8 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{BoucWen, Law};
 /// let law = BoucWen { stiffness: 1e4, beta: 3e3, gamma: 2e3, exponent: 1.0 };
-/// assert_eq!(law.scale(), 2.0); // stiffness / (beta + gamma)
-/// assert!(BoucWen { gamma: -4e3, ..law }.consistent().is_err()); // the force would be unbounded
+/// assert_eq!(law.force_scale(), 2.0); // stiffness / (beta + gamma)
+/// assert!(BoucWen { gamma: -4e3, ..law }.check_consistency().is_err()); // the force would be unbounded
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWen {
@@ -68,7 +69,7 @@ pub struct BoucWen {
 
 impl BoucWen {
     /// Returns the limit of z, m.
-    fn bound(&self) -> f64 {
+    fn state_limit(&self) -> f64 {
         (self.beta + self.gamma).powf(-1.0 / self.exponent)
     }
 }
@@ -83,16 +84,16 @@ impl Law for BoucWen {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
-        self.stiffness * self.bound()
+    fn force_scale(&self) -> f64 {
+        self.stiffness * self.state_limit()
     }
-    fn springs(&self) -> Option<[Vec<f64>; 2]> {
+    fn reference_springs(&self) -> Option<[Vec<f64>; 2]> {
         Some([vec![0.0], vec![self.stiffness]])
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn consistent(&self) -> Result<(), String> {
+    fn check_consistency(&self) -> Result<(), String> {
         if self.beta + self.gamma > 0.0 {
             return Ok(());
         }
@@ -107,18 +108,18 @@ impl RateLaw for BoucWen {
     fn states(&self) -> usize {
         1
     }
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
-        z.fill((force[0] / self.scale()).clamp(-1.0, 1.0));
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
+        z.fill((force[0] / self.force_scale()).clamp(-1.0, 1.0));
         true
     }
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let (zero, v, z) = (S::from(0.0), motion.velocity[0], z[0]);
         let sum = self.beta + self.gamma;
         // |z|^(n-1) z |u'| = |z|^n sgn z |u'|
-        let loop_making = size(v) * super::kink::sign(z.re()) * (self.beta / sum);
-        rate[0] = (v - power(z, self.exponent) * (loop_making + v * (self.gamma / sum))) / self.bound();
-        [z * self.scale(), zero, zero]
+        let loop_making = abs(v) * super::kernels::kink::sign(z.re()) * (self.beta / sum);
+        rate[0] = (v - power(z, self.exponent) * (loop_making + v * (self.gamma / sum))) / self.state_limit();
+        [z * self.force_scale(), zero, zero]
     }
 }
 
@@ -132,9 +133,9 @@ mod tests {
         for z in [-1.1, -0.4, 0.0, 0.9] {
             for v in [-2.0, 0.7] {
                 let mut rate = [0.0];
-                let force = law.evaluate(&Relative::along(0.0, v), &[z / law.bound()], &mut rate)[0];
+                let force = law.evaluate(&RelativeMotion::along(0.0, v), &[z / law.state_limit()], &mut rate)[0];
                 let expected = v - 0.5 * f64::abs(v) * f64::abs(z).powf(0.7) * z + 0.2 * v * f64::abs(z).powf(1.7);
-                assert!((rate[0] * law.bound() - expected).abs() < 1e-14 && (force - 3.0 * z).abs() < 1e-14);
+                assert!((rate[0] * law.state_limit() - expected).abs() < 1e-14 && (force - 3.0 * z).abs() < 1e-14);
             }
         }
     }

@@ -5,7 +5,7 @@
 //! Source: the "2V" law of Pust, Pesek, Radolfova (2015), Sec. 1; as a set-valued law Moreau
 //! (1988).
 
-use super::{CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, SharedLaw, Sliding};
+use super::{CoulombArctan, IdealElement, Law, LawInfo, Parameter, ProxView, SharedLaw, SlidingView};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -23,9 +23,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Coulomb, Law, Piece};
+/// use stickslip::law::{Coulomb, Law, IdealElement};
 /// let law = Coulomb { limit: 2.0 };
-/// assert_eq!(law.pieces().unwrap(), [Piece::slider(None, 2.0)]);
+/// assert_eq!(law.ideal_elements().unwrap(), [IdealElement::slider(None, 2.0)]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coulomb {
@@ -43,16 +43,16 @@ impl Law for Coulomb {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn pieces(&self) -> Option<Vec<Piece>> {
-        Some(vec![Piece::slider(None, self.limit)])
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
+        Some(vec![IdealElement::slider(None, self.limit)])
     }
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         Some(self)
     }
-    fn sliding(&self) -> Option<&dyn Sliding> {
+    fn sliding(&self) -> Option<&dyn SlidingView> {
         Some(self)
     }
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
@@ -61,7 +61,7 @@ impl Law for Coulomb {
     fn is_incrementally_passive(&self) -> bool {
         true // the force is a monotone set-valued function of velocity
     }
-    fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, _omega: f64) -> Complex64 {
         if self.limit == 0.0 {
             return Complex64::new(0.0, 0.0); // also at zero amplitude
         }
@@ -69,13 +69,13 @@ impl Law for Coulomb {
     }
 }
 
-impl Sliding for Coulomb {
+impl SlidingView for Coulomb {
     fn slip_force(&self, _velocity: f64) -> (f64, f64) {
         (self.limit, 0.0)
     }
 }
 
-impl Prox for Coulomb {
+impl ProxView for Coulomb {
     /// Projects onto `[-limit, limit]`.
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         force[0] = y[0].clamp(-self.limit, self.limit);

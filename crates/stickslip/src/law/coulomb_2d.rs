@@ -3,8 +3,8 @@
 //! `|f| <= limit` in stick, `f = limit u'/|u'|` in slip: the isotropic friction disk.
 //! Source: Coulomb (1785); as a set-valued law Moreau (1988).
 
-use super::plane::radial;
-use super::{Coulomb, Coulomb2dArctan, Law, LawInfo, Parameter, Prox, SharedLaw};
+use super::kernels::planar_slip::radial;
+use super::{Coulomb, Coulomb2dArctan, Law, LawInfo, Parameter, ProxView, SharedLaw};
 use num_complex::Complex64;
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Coulomb2d, Prox};
+/// use stickslip::law::{Coulomb2d, ProxView};
 /// let law = Coulomb2d { limit: 2.0 };
 /// let (mut force, mut slope) = ([0.0; 2], [0.0; 4]);
 /// law.resolve(&[3.0, 4.0], 1.0, &mut force, &mut slope);
@@ -46,10 +46,10 @@ impl Law for Coulomb2d {
     fn directions(&self) -> usize {
         2
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         Some(self)
     }
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
@@ -59,12 +59,12 @@ impl Law for Coulomb2d {
         true // the force is the subgradient of limit |u'|, which is convex
     }
     /// Motion in one direction gives Coulomb's law.
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
-        Coulomb { limit: self.limit }.linearised(amplitude, omega)
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
+        Coulomb { limit: self.limit }.describing_function(amplitude, omega)
     }
 }
 
-impl Prox for Coulomb2d {
+impl ProxView for Coulomb2d {
     /// Projects onto the disk.
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let size = y[0].hypot(y[1]);

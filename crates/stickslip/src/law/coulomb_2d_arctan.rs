@@ -4,9 +4,9 @@
 //! `coulomb-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2), made isotropic in a plane.
 
-use super::plane::dot;
-use super::plane::radial;
-use super::{CoulombArctan, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
+use super::kernels::planar_slip::dot;
+use super::kernels::planar_slip::radial;
+use super::{CoulombArctan, Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::FRAC_2_PI;
@@ -29,9 +29,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Coulomb2dArctan, RateLaw, Relative};
+/// use stickslip::law::{Coulomb2dArctan, RateLaw, RelativeMotion};
 /// let law = Coulomb2dArctan { limit: 2.0, alpha: 1.0 };
-/// let motion = Relative { displacement: [0.0_f64; 3], velocity: [0.6, -0.8, 0.0] };
+/// let motion = RelativeMotion { displacement: [0.0_f64; 3], velocity: [0.6, -0.8, 0.0] };
 /// let force = law.evaluate(&motion, &[], &mut []);
 /// assert!((force[0] - 0.6).abs() < 1e-15 && (force[1] + 0.8).abs() < 1e-15);
 /// ```
@@ -63,33 +63,33 @@ impl Law for Coulomb2dArctan {
     fn directions(&self) -> usize {
         2
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
         true // the force is the gradient of a convex function of velocity
     }
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
-        self.along().linearised(amplitude, omega)
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
+        self.along().describing_function(amplitude, omega)
     }
 }
 
 /// Below this squared argument, `arctan x / x` is evaluated as a series. The sixth term is then
 /// below rounding.
-const SMALL: f64 = 1e-3;
+const SERIES_BELOW: f64 = 1e-3;
 
 impl RateLaw for Coulomb2dArctan {
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let v = [motion.velocity[0] * self.alpha, motion.velocity[1] * self.alpha];
         let square = dot(v, v);
-        let share = if square.re() < SMALL {
+        let share = if square.re() < SERIES_BELOW {
             (((square * (1.0 / 9.0) - 1.0 / 7.0) * square + 0.2) * square - 1.0 / 3.0) * square + 1.0
         } else {
             let size = square.sqrt();
@@ -100,7 +100,7 @@ impl RateLaw for Coulomb2dArctan {
     }
 }
 
-impl Prox for Coulomb2dArctan {
+impl ProxView for Coulomb2dArctan {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let size = y[0].hypot(y[1]);
         let (mut value, mut rise) = ([0.0], [0.0]);

@@ -5,7 +5,7 @@
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2). The paper's alpha = 25 s/mm is 25 000 s/m in
 //! SI.
 
-use super::{Law, LawInfo, Mean, Parameter, Prox, Rate, RateLaw, Relative};
+use super::{Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion, SampleMeans};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, PI};
@@ -28,9 +28,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{CoulombArctan, RateLaw, Relative};
+/// use stickslip::law::{CoulombArctan, RateLaw, RelativeMotion};
 /// let law = CoulombArctan { limit: 2.0, alpha: 1.0 };
-/// let force = law.evaluate::<f64>(&Relative::along(0.0, 1.0), &[], &mut []);
+/// let force = law.evaluate::<f64>(&RelativeMotion::along(0.0, 1.0), &[], &mut []);
 /// assert!((force[0] - 1.0).abs() < 1e-15);   // arctan 1 = π/4, half the limit
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,19 +51,19 @@ impl Law for CoulombArctan {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
         true // the force grows with velocity
     }
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
         if self.limit == 0.0 {
             return Complex64::new(0.0, 0.0); // also at zero amplitude
         }
@@ -78,28 +78,28 @@ impl Law for CoulombArctan {
 impl RateLaw for CoulombArctan {
     #[doc(alias = "eq2")]
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let zero = S::from(0.0);
         let scaled = motion.velocity[0] * self.alpha;
         [scaled.atan() * (self.limit * FRAC_2_PI), zero, zero] // Eq. (2)
     }
 }
 
-impl Prox for CoulombArctan {
+impl ProxView for CoulombArctan {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let (value, rise) = resolve(y[0] / self.limit, self.alpha * self.limit / penalty);
         (force[0], slope[0]) = (self.limit * value, rise);
     }
-    fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
+    fn force_at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
         let scaled = self.alpha * velocity;
         let size = self.limit * FRAC_2_PI;
         Some((size * scaled.atan(), size * self.alpha / (1.0 + scaled * scaled)))
     }
-    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
+    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<SampleMeans> {
         let mean = mean_of_arctangent(self.alpha * velocity, self.alpha * e);
         let size = self.limit * FRAC_2_PI;
         let (force, slope) = (size, size * self.alpha);
-        Some(Mean {
+        Some(SampleMeans {
             zeroth: force * mean.zeroth,
             first: force * mean.first,
             slope: slope * mean.slope,
@@ -110,15 +110,15 @@ impl Prox for CoulombArctan {
 }
 
 /// Largest half-width of a sample, relative to the scale `1 + |y|` of the arctangent, at which
-/// the quadrature of [`Mean::of`] is exact to rounding.
-const GENTLE: f64 = 0.2;
+/// the quadrature of [`SampleMeans::by_quadrature`] is exact to rounding.
+const QUADRATURE_BELOW: f64 = 0.2;
 
 /// Returns means of `arctan(y + eξ)` over `-1 < ξ < 1`, in closed form, or by quadrature if the
 /// closed form would lose digits to cancellation.
-fn mean_of_arctangent(y: f64, e: f64) -> Mean {
+fn mean_of_arctangent(y: f64, e: f64) -> SampleMeans {
     let reach = e.abs();
-    if reach < GENTLE * (1.0 + y.abs()) {
-        return Mean::of(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x)));
+    if reach < QUADRATURE_BELOW * (1.0 + y.abs()) {
+        return SampleMeans::by_quadrature(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x)));
     }
     let (low, high) = (y - reach, y + reach);
     let (low_value, high_value) = (low.atan(), high.atan());
@@ -130,7 +130,7 @@ fn mean_of_arctangent(y: f64, e: f64) -> Mean {
         (high_1 + low_1) / (2.0 * reach) - (twice(high, high_value) - twice(low, low_value)) / (2.0 * reach * reach);
     let slope = (high_value - low_value) / (2.0 * reach);
     let sign = e.signum();
-    Mean {
+    SampleMeans {
         zeroth,
         first: first * sign,
         slope,
@@ -145,7 +145,7 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
     // The left side is increasing and concave in w, so Newton's method from below converges
     // monotonically.
     let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
-    for _ in 0..RESOLVED {
+    for _ in 0..MAX_ITERATIONS {
         let left = w + FRAC_2_PI * (s * w).atan() - target;
         let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
         let step = left / slope;
@@ -160,4 +160,4 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
 }
 
 /// Upper bound on the iterations of [`resolve`]; they converge quadratically.
-const RESOLVED: usize = 60;
+const MAX_ITERATIONS: usize = 60;

@@ -5,7 +5,7 @@
 //! oscillator.
 //! Source: Duffing (1918).
 
-use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use super::{Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// ```
 /// use stickslip::law::{Cubic, Law};
 /// let law = Cubic { stiffness: 4e9 };
-/// assert_eq!(law.linearised(1e-3, 1.0).re, 3e3); // ¾ k a²
+/// assert_eq!(law.describing_function(1e-3, 1.0).re, 3e3); // ¾ k a²
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cubic {
@@ -49,18 +49,18 @@ impl Law for Cubic {
     fn is_odd(&self) -> bool {
         true
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
     /// `cos³ θ = ¾ cos θ + ¼ cos 3θ`.
-    fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, _omega: f64) -> Complex64 {
         Complex64::new(0.75 * self.stiffness * amplitude * amplitude, 0.0)
     }
 }
 
 impl RateLaw for Cubic {
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let (zero, u) = (S::from(0.0), motion.displacement[0]);
         [u * u * u * self.stiffness, zero, zero]
     }

@@ -5,8 +5,8 @@
 //! without reaching it. It is the Bouc-Wen law with `n = 1`, `gamma = 0`, `beta = k / limit`.
 //! Source: Dahl, "A solid friction model" (1968), exponent 1.
 
-use super::kink::size;
-use super::{Law, LawInfo, Parameter, Rate, RateLaw, Relative};
+use super::kernels::kink::abs;
+use super::{Law, LawInfo, Parameter, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -27,10 +27,10 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Dahl, RateLaw, Relative};
+/// use stickslip::law::{Dahl, RateLaw, RelativeMotion};
 /// let law = Dahl { stiffness: 1e4, limit: 2.0 };
 /// let mut rate = [0.0];
-/// let force = law.evaluate(&Relative::along(0.0, 1e-3), &[0.5], &mut rate);
+/// let force = law.evaluate(&RelativeMotion::along(0.0, 1e-3), &[0.5], &mut rate);
 /// assert_eq!((force[0], rate[0]), (1.0, 2.5)); // at half the limit, half the stiffness
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,10 +51,10 @@ impl Law for Dahl {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
 }
@@ -63,16 +63,16 @@ impl RateLaw for Dahl {
     fn states(&self) -> usize {
         usize::from(self.limit > 0.0) // without a limit, the law carries no force
     }
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
         z.fill((force[0] / self.limit).clamp(-1.0, 1.0));
         true
     }
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let zero = S::from(0.0);
         let Some(&share) = z.first() else { return [zero; 3] };
         let v = motion.velocity[0];
-        rate[0] = (v - size(v) * share) * (self.stiffness / self.limit);
+        rate[0] = (v - abs(v) * share) * (self.stiffness / self.limit);
         [share * self.limit, zero, zero]
     }
 }

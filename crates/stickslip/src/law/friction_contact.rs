@@ -16,9 +16,10 @@
 //! The law has no regularized version: the state rate of a tangential spring with an arctangent
 //! slider is unbounded as the load goes to zero.
 
-use super::plane;
+use super::kernels::planar_slip;
 use super::{
-    Contact, Law, LawInfo, MOST_DIRECTIONS, Parameter, Range, Reach, SharedLaw, Step, StepLaw, StepSlopes, TANGENTS,
+    Contact, DisplacementBox, Law, LawInfo, MAX_DIRECTIONS, Parameter, Range, SharedLaw, StepDerivatives, StepLaw,
+    StepView, TANGENTS,
 };
 use crate::dimension::Dimension;
 use std::sync::Arc;
@@ -38,14 +39,14 @@ pub(super) static INFO: LawInfo = LawInfo {
             Range::Any,
             "normal load at zero displacement; an elastic structure relieves part of it; negative: a gap of -preload/normal",
         )
-        .or(0.0),
+        .with_default(0.0),
         Parameter::new(
             TANGENTS,
             Dimension::NONE,
             Range::Count(2),
             "number of tangential directions; by default that of the nodes",
         )
-        .or(2.0),
+        .with_default(2.0),
     ],
     sample: &[10_000.0, 15_000.0, 0.3, 6.0, 2.0],
     build: |values| {
@@ -99,30 +100,30 @@ impl Law for FrictionContact {
     fn normal(&self) -> Option<usize> {
         Some(self.tangents)
     }
-    fn pressed_by(&self, force: f64) -> Option<SharedLaw> {
+    fn with_preload(&self, force: f64) -> Option<SharedLaw> {
         (self.preload <= 0.0).then(|| Arc::new(FrictionContact { preload: force, ..*self }) as SharedLaw)
     }
-    fn closed(&self) -> Option<Vec<f64>> {
+    fn closed_stiffness(&self) -> Option<Vec<f64>> {
         Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())
     }
     /// The slip limit at zero displacement; infinite without a preload or friction.
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         let limit = self.friction * self.preload;
         if limit > 0.0 { limit } else { f64::INFINITY }
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }
     /// Closing and opening differ.
     fn is_odd(&self) -> bool {
         false
     }
-    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+    fn contact_state(&self, velocity: &[f64], force: &[f64]) -> Contact {
         let normal = force[self.tangents];
         if normal <= 0.0 {
             return Contact::Open;
         }
-        Contact::at_limit(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
+        Contact::of_sticking_law(self.friction * normal, &velocity[..self.tangents], &force[..self.tangents])
     }
 }
 
@@ -131,19 +132,19 @@ impl StepLaw for FrictionContact {
         self.tangents
     }
     fn state_scale(&self) -> f64 {
-        if self.scale().is_finite() { self.scale() } else { 1.0 }
+        if self.force_scale().is_finite() { self.force_scale() } else { 1.0 }
     }
     #[inline]
     fn advance<S: Real>(
         &self,
-        from: &[S; MOST_DIRECTIONS],
-        to: &[S; MOST_DIRECTIONS],
+        from: &[S; MAX_DIRECTIONS],
+        to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
-    ) -> [S; MOST_DIRECTIONS] {
+    ) -> [S; MAX_DIRECTIONS] {
         let zero = S::from(0.0);
-        let load = |u: &[S; MOST_DIRECTIONS]| u[self.tangents] * self.normal + self.preload;
+        let load = |u: &[S; MAX_DIRECTIONS]| u[self.tangents] * self.normal + self.preload;
         let (before, after) = (load(from), load(to));
-        let mut out = [zero; MOST_DIRECTIONS];
+        let mut out = [zero; MAX_DIRECTIONS];
         if after.re() <= 0.0 {
             z.fill(zero);
             return out;
@@ -170,8 +171,8 @@ impl StepLaw for FrictionContact {
                 };
             }
             [one, two, ..] => {
-                let way = [0, 1].map(|a| (to[a] - from[a]) * closed);
-                [*one, *two] = plane::step([*one, *two], way, self.tangential, [first, last]);
+                let increment = [0, 1].map(|a| (to[a] - from[a]) * closed);
+                [*one, *two] = planar_slip::step([*one, *two], increment, self.tangential, [first, last]);
             }
             [] => {}
         }
@@ -179,19 +180,19 @@ impl StepLaw for FrictionContact {
         out[self.tangents] = after;
         out
     }
-    fn tangent(
+    fn analytic_derivatives(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-        slopes: StepSlopes<'_>,
-    ) -> Option<[f64; MOST_DIRECTIONS]> {
+        slopes: StepDerivatives<'_>,
+    ) -> Option<[f64; MAX_DIRECTIONS]> {
         let (t, directions) = (self.tangents, slopes.directions);
-        let load = |u: &[f64; MOST_DIRECTIONS]| u[t] * self.normal + self.preload;
+        let load = |u: &[f64; MAX_DIRECTIONS]| u[t] * self.normal + self.preload;
         let (before, after) = (load(from), load(to));
         slopes.force.fill(0.0);
         slopes.state.fill(0.0);
-        let mut out = [0.0; MOST_DIRECTIONS];
+        let mut out = [0.0; MAX_DIRECTIONS];
         if after <= 0.0 {
             z.fill(0.0);
             return Some(out);
@@ -207,20 +208,20 @@ impl StepLaw for FrictionContact {
             (1.0, [0.0; 2])
         };
         let limits = [if closes { 0.0 } else { before * self.friction }, after * self.friction];
-        let way: [f64; 2] = std::array::from_fn(|a| if a < t { (to[a] - from[a]) * closed } else { 0.0 });
+        let increment: [f64; 2] = std::array::from_fn(|a| if a < t { (to[a] - from[a]) * closed } else { 0.0 });
         let (force, own) = match z {
             [force] => {
-                let (force, own) = along_a_line(*force, way[0], self.tangential, limits[1]);
+                let (force, own) = line_step_with_derivatives(*force, increment[0], self.tangential, limits[1]);
                 ([force, 0.0], own)
             }
-            _ => plane::step_with_slopes([z[0], z[1]], way, self.tangential, limits),
+            _ => planar_slip::step_with_slopes([z[0], z[1]], increment, self.tangential, limits),
         };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force);
         let slip = [if closes { 0.0 } else { self.friction }, self.friction].map(|by| by * self.normal);
         let width = 2 * directions + t;
         for (a, row) in slopes.state.chunks_exact_mut(width).enumerate() {
             for b in 0..t {
-                let by = own.by_way[a][b];
+                let by = own.by_increment[a][b];
                 row[b] = -by * closed;
                 row[directions + b] = by * closed;
                 row[t] += by * (to[b] - from[b]) * by_normal[0];
@@ -236,29 +237,38 @@ impl StepLaw for FrictionContact {
         out[t] = after;
         Some(out)
     }
-    fn holds(&self, (from, z): (&[f64; MOST_DIRECTIONS], &[f64]), Reach { mean, reach }: Reach<'_>) -> bool {
+    fn sticks_throughout(
+        &self,
+        (from, z): (&[f64; MAX_DIRECTIONS], &[f64]),
+        DisplacementBox { mean, half_width }: DisplacementBox<'_>,
+    ) -> bool {
         let t = self.tangents;
         let closed = self.preload + self.normal * from[t];
-        let least = self.preload + self.normal * (mean[t] - reach[t]);
+        let least = self.preload + self.normal * (mean[t] - half_width[t]);
         let at_mean = (0..t).map(|a| z[a] + self.tangential * (mean[a] - from[a]));
         let length = |squares: f64| squares.sqrt();
-        let pull =
-            length(at_mean.map(|f| f * f).sum()) + self.tangential * length(reach[..t].iter().map(|u| u * u).sum());
+        let pull = length(at_mean.map(|f| f * f).sum())
+            + self.tangential * length(half_width[..t].iter().map(|u| u * u).sum());
         // A straight path between two states inside the friction cone stays inside it.
         closed > 0.0 && least > 0.0 && pull < self.friction * least
     }
 }
 
-/// Computes [`plane::step_with_slopes`] for a single direction, where the limit at the end of
-/// the step decides.
-fn along_a_line(force: f64, way: f64, stiffness: f64, limit: f64) -> (f64, plane::Slopes) {
-    let trial = force + way * stiffness;
-    let mut slopes = plane::Slopes::NONE;
+/// Computes [`planar_slip::step_with_slopes`] for a single direction, where the limit at the end
+/// of the step decides.
+fn line_step_with_derivatives(
+    force: f64,
+    increment: f64,
+    stiffness: f64,
+    limit: f64,
+) -> (f64, planar_slip::PlanarDerivatives) {
+    let trial = force + increment * stiffness;
+    let mut slopes = planar_slip::PlanarDerivatives::NONE;
     if trial.abs() > limit {
         slopes.by_limits[0][1] = trial.signum();
         return (limit.copysign(trial), slopes);
     }
-    (slopes.by_force[0][0], slopes.by_way[0][0]) = (1.0, stiffness);
+    (slopes.by_force[0][0], slopes.by_increment[0][0]) = (1.0, stiffness);
     (trial, slopes)
 }
 
@@ -269,7 +279,7 @@ mod tests {
     /// A step that closes the contact counts only its closed part. It equals two steps that are
     /// separated at the instant of closing.
     #[test]
-    fn a_step_that_closes_is_two_steps_with_the_closing_between() {
+    fn a_closing_step_equals_two_steps() {
         for tangents in [1, 2] {
             let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.9, preload: -1.0, tangents };
             let at = |t: f64| {
@@ -290,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn one_tangent_is_two_with_a_second_that_rests() {
+    fn one_tangent_equals_two_with_one_at_rest() {
         let one = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 1 };
         let two = FrictionContact { tangents: 2, ..one };
         let (mut z, mut w) = ([0.0; 1], [0.0; 2]);
@@ -315,10 +325,10 @@ mod tests {
         }
         fn advance<S: Real>(
             &self,
-            from: &[S; MOST_DIRECTIONS],
-            to: &[S; MOST_DIRECTIONS],
+            from: &[S; MAX_DIRECTIONS],
+            to: &[S; MAX_DIRECTIONS],
             z: &mut [S],
-        ) -> [S; MOST_DIRECTIONS] {
+        ) -> [S; MAX_DIRECTIONS] {
             self.0.advance(from, to, z)
         }
     }
@@ -344,8 +354,8 @@ mod tests {
             z.iter_mut().for_each(|z| *z *= 0.99);
             let n = tangents + 1;
             let (mut hand, mut dual) = (StepPoint::new(n, tangents), StepPoint::new(n, tangents));
-            Step::linearise(&law, n, &from, &to, &z, &mut hand);
-            Step::linearise(&ByDuals(law), n, &from, &to, &z, &mut dual);
+            StepView::advance_with_derivatives(&law, n, &from, &to, &z, &mut hand);
+            StepView::advance_with_derivatives(&ByDuals(law), n, &from, &to, &z, &mut dual);
             let load = |u: &[f64; 3]| law.preload + law.normal * u[tangents];
             met[if load(&to) <= 0.0 { 0 } else { 1 + usize::from(load(&from) < 0.0) }] += 1;
             let rows = |point: &StepPoint| -> Vec<f64> {
@@ -364,14 +374,14 @@ mod tests {
     /// A contact that separates loses its history. A second cycle on the same path therefore
     /// ends early, at the first point with the states of the first cycle.
     #[test]
-    fn a_way_that_meets_its_trail_is_followed_no_farther() {
+    fn a_cycle_ends_early_at_known_states() {
         let law = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.4, preload: 1.0, tangents: 2 };
         let n = 64;
         let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
         let signal = |of: fn(f64) -> f64| (0..n).map(|i| of(angle(i))).collect::<Vec<f64>>();
-        let way = [signal(f64::cos), signal(|t| (2.0 * t).sin()), signal(|t| 0.8 * (t - 1.0).sin())];
+        let path = [signal(f64::cos), signal(|t| (2.0 * t).sin()), signal(|t| 0.8 * (t - 1.0).sin())];
         let around = |z: &mut [f64], trail: &mut [f64], force: &mut [Vec<f64>; 3]| {
-            Step::around(&law, 3, &way, (z, trail), force, None);
+            StepView::advance_cycle(&law, 3, &path, (z, trail), force, None);
         };
         let fresh = || (vec![f64::NAN; 2 * n], [(); 3].map(|()| vec![0.0; n]));
         let (mut trail, mut force) = fresh();
@@ -388,10 +398,10 @@ mod tests {
     }
 
     #[test]
-    fn faces_say_what_they_do() {
+    fn contact_states_follow_force_and_load() {
         let law = FrictionContact { tangential: 1.0, normal: 1.0, friction: 0.5, preload: 1.0, tangents: 2 };
-        assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0]), Contact::Open);
-        assert_eq!(law.contact(&[1.0, 0.0, 0.0], &[0.3, 0.4, 1.0]), Contact::Slip);
-        assert_eq!(law.contact(&[0.0, 0.0, 0.0], &[0.1, 0.1, 1.0]), Contact::Stick);
+        assert_eq!(law.contact_state(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0]), Contact::Open);
+        assert_eq!(law.contact_state(&[1.0, 0.0, 0.0], &[0.3, 0.4, 1.0]), Contact::Slip);
+        assert_eq!(law.contact_state(&[0.0, 0.0, 0.0], &[0.1, 0.1, 1.0]), Contact::Stick);
     }
 }

@@ -6,7 +6,7 @@
 //! Source: den Hartog, "Mechanical Vibrations" (1956), Sec. 8.11; Shaw and Holmes, "A
 //! periodically forced piecewise linear oscillator" (1983).
 
-use super::{Contact, Law, LawInfo, Parameter, Piece, Range, Rate, RateLaw, Relative, SharedLaw};
+use super::{Contact, IdealElement, Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -35,7 +35,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{Gap, Law};
 /// let law = Gap { gap: 0.0, stiffness: 1e4 };
 /// // closed for half of the period: half the stiffness
-/// assert!((law.linearised(1e-3, 1.0).re - 5e3).abs() < 1e-9);
+/// assert!((law.describing_function(1e-3, 1.0).re - 5e3).abs() < 1e-9);
 /// assert!(!law.is_odd());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,29 +56,29 @@ impl Law for Gap {
     fn normal(&self) -> Option<usize> {
         Some(0)
     }
-    fn pressed_by(&self, force: f64) -> Option<SharedLaw> {
+    fn with_preload(&self, force: f64) -> Option<SharedLaw> {
         (self.gap >= 0.0).then(|| Arc::new(Gap { gap: -force / self.stiffness, ..*self }) as SharedLaw)
     }
-    fn closed(&self) -> Option<Vec<f64>> {
+    fn closed_stiffness(&self) -> Option<Vec<f64>> {
         Some(vec![self.stiffness])
     }
-    fn pieces(&self) -> Option<Vec<Piece>> {
-        Some(vec![Piece::Stop { gap: self.gap, stiffness: self.stiffness }])
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
+        Some(vec![IdealElement::Stop { gap: self.gap, stiffness: self.stiffness }])
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
     fn is_odd(&self) -> bool {
         false
     }
-    fn contact(&self, _velocity: &[f64], force: &[f64]) -> Contact {
+    fn contact_state(&self, _velocity: &[f64], force: &[f64]) -> Contact {
         if force[0] > 0.0 { Contact::Touch } else { Contact::Open }
     }
 }
 
 impl RateLaw for Gap {
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let zero = S::from(0.0);
         let depth = motion.displacement[0] - self.gap;
         [if depth.re() > 0.0 { depth * self.stiffness } else { zero }, zero, zero]
@@ -88,14 +88,14 @@ impl RateLaw for Gap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Rate;
+    use crate::law::RateView;
 
     #[test]
-    fn it_is_open_before_the_gap_and_presses_at_rest_where_the_gap_is_negative() {
+    fn contact_depends_on_the_gap() {
         let at = |gap: f64, u: f64| {
             let law = Gap { gap, stiffness: 1e3 };
-            let force = Rate::value(&law, &Relative::along(u, 0.0), &[], &mut [])[0];
-            (force, law.contact(&[0.0], &[force]))
+            let force = RateView::evaluate_values(&law, &RelativeMotion::along(u, 0.0), &[], &mut [])[0];
+            (force, law.contact_state(&[0.0], &[force]))
         };
         assert_eq!(at(0.5, 0.25), (0.0, Contact::Open));
         assert_eq!(at(0.5, 0.75), (250.0, Contact::Touch));

@@ -20,17 +20,19 @@
 //! need discrete sliders. The force of first loading is then exact at the edges of the bins and
 //! too large between them.
 
-use super::describing;
-use super::masing::{LEGS, Masing, advance, counted, first_that_goes_on, share, stiffness};
-use super::pieces::STUCK;
-use super::{Law, LawInfo, MOST_DIRECTIONS, Parameter, Piece, Range, Step, StepLaw, StepSlopes};
+use super::interface::describing_function::{self, Views};
+use super::interface::ideal_elements::UNREACHABLE_LIMIT;
+use super::interface::masing::{
+    MAX_LEGS, MasingView, advance_legs, complex_stiffness, first_unreversed_leg, leg_count, leg_force,
+};
+use super::{IdealElement, Law, LawInfo, MAX_DIRECTIONS, Parameter, Range, StepDerivatives, StepLaw, StepView};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
 /// Largest number of sliders.
-const MOST: u32 = 1000;
+const MAX_ELEMENTS: u32 = 1000;
 
 /// Ratio of successive bin edges is `exp(GRADING / √elements)`. More elements make both the bins
 /// and the first bin smaller.
@@ -58,10 +60,10 @@ pub(super) static INFO: LawInfo = LawInfo {
         Parameter::new(
             "elements",
             Dimension::NONE,
-            Range::UpTo(MOST),
+            Range::UpTo(MAX_ELEMENTS),
             "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
         )
-        .or(0.0),
+        .with_default(0.0),
     ],
     sample: &[10_000.0, 2.0, -0.5, 0.3, 0.0],
     build: |values| {
@@ -82,10 +84,10 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{Iwan, Law};
 /// let law = Iwan { stiffness: 1e4, limit: 2.0, chi: -0.5, beta: 0.3, elements: 0 };
 /// // the force of first loading at macro-slip
-/// let far = law.slips_at();
+/// let far = law.slip_displacement();
 /// assert!((law.masing().unwrap().backbone(far).0 - 2.0).abs() < 1e-14);
 /// // 32 sliders and the spring that slips last
-/// assert_eq!(Iwan { elements: 32, ..law }.pieces().unwrap().len(), 33);
+/// assert_eq!(Iwan { elements: 32, ..law }.ideal_elements().unwrap().len(), 33);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Iwan {
@@ -108,16 +110,16 @@ impl Iwan {
     }
 
     /// Returns the displacement `φmax` of macro-slip, m.
-    pub fn slips_at(&self) -> f64 {
+    pub fn slip_displacement(&self) -> f64 {
         self.limit * (1.0 + self.beta) / (self.stiffness * self.denominator())
     }
 
     /// Returns the force of first loading (N) at a non-negative displacement. With a limit of
-    /// `STUCK` or more, the law is the linear spring `KT`. Without this special case, a
-    /// distribution with χ near -1 would slip in part at any displacement.
+    /// `UNREACHABLE_LIMIT` or more, the law is the linear spring `KT`. Without this special case,
+    /// a distribution with χ near -1 would slip in part at any displacement.
     fn first_loading<S: Real>(&self, u: S) -> S {
-        let far = self.slips_at();
-        if self.limit >= STUCK {
+        let far = self.slip_displacement();
+        if self.limit >= UNREACHABLE_LIMIT {
             return u * self.stiffness;
         }
         if u.re() >= far {
@@ -142,21 +144,21 @@ impl Law for Iwan {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn macro_slip(&self) -> Option<f64> {
-        (self.limit > 0.0).then(|| self.slips_at())
+    fn macro_slip_displacement(&self) -> Option<f64> {
+        (self.limit > 0.0).then(|| self.slip_displacement())
     }
     /// Available with a positive number of elements. A slip limit of zero gives no parts.
-    fn pieces(&self) -> Option<Vec<Piece>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         if self.limit == 0.0 {
             return Some(Vec::new());
         }
         if self.elements == 0 {
             return None;
         }
-        let (far, chi, count) = (self.slips_at(), self.chi, self.elements);
+        let (far, chi, count) = (self.slip_displacement(), self.chi, self.elements);
         // In units of φmax and FS, the stiffness of all sliders up to x is proportional to
         // x^(χ+1), their limit to x^(χ+2).
         let stiffness = 1.0 / self.denominator();
@@ -165,37 +167,40 @@ impl Law for Iwan {
             0 => 0.0,
             bin => (-GRADING / f64::from(count).sqrt() * f64::from(count - bin)).exp(),
         };
-        let mut pieces: Vec<Piece> = (0..count)
+        let mut pieces: Vec<IdealElement> = (0..count)
             .map(|bin| {
                 let [from, to] = [edge(bin), edge(bin + 1)];
                 let spring = stiffness * (to.powf(chi + 1.0) - from.powf(chi + 1.0));
                 let slip = limit * (to.powf(chi + 2.0) - from.powf(chi + 2.0));
-                Piece::slider(Some(spring * self.limit / far), slip * self.limit)
+                IdealElement::slider(Some(spring * self.limit / far), slip * self.limit)
             })
             .collect();
         if self.beta > 0.0 {
             let last = self.limit * self.beta / self.denominator();
-            pieces.push(Piece::slider(Some(last / far), last));
+            pieces.push(IdealElement::slider(Some(last / far), last));
         }
         Some(pieces)
     }
-    fn masing(&self) -> Option<&dyn Masing> {
+    fn masing(&self) -> Option<&dyn MasingView> {
         (self.elements == 0 && self.limit > 0.0).then_some(self)
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         (self.elements == 0 && self.limit > 0.0).then_some(self)
     }
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
         match (self.masing(), amplitude > 0.0) {
-            (Some(law), true) => stiffness(law, amplitude),
+            (Some(law), true) => complex_stiffness(law, amplitude),
             (Some(_), false) => self.stiffness.into(),
-            (None, _) => describing::stiffness(self.pieces(), None, None, (None, 1), (amplitude, omega)),
+            (None, _) => {
+                let views = Views { ideal_elements: self.ideal_elements(), directions: 1, ..Views::default() };
+                describing_function::complex_stiffness(views, amplitude, omega)
+            }
         }
     }
     fn is_incrementally_passive(&self) -> bool {
         true // each spring-slider is passive
     }
-    fn consistent(&self) -> Result<(), String> {
+    fn check_consistency(&self) -> Result<(), String> {
         if self.chi > -1.0 {
             return Ok(());
         }
@@ -203,62 +208,64 @@ impl Law for Iwan {
     }
 }
 
-impl Masing for Iwan {
+impl MasingView for Iwan {
     fn backbone(&self, displacement: f64) -> (f64, f64) {
-        let far = self.slips_at();
+        let far = self.slip_displacement();
         let slope = match displacement / far {
-            _ if self.limit >= STUCK => self.stiffness,
+            _ if self.limit >= UNREACHABLE_LIMIT => self.stiffness,
             x if x >= 1.0 => 0.0,
             x if x <= 0.0 => self.stiffness,
             x => self.stiffness * (1.0 - x.powf(self.chi + 1.0) / (1.0 + self.beta)),
         };
         (self.first_loading(displacement), slope)
     }
-    fn slips_at(&self) -> f64 {
-        Iwan::slips_at(self)
+    fn slip_displacement(&self) -> f64 {
+        Iwan::slip_displacement(self)
     }
 }
 
 impl StepLaw for Iwan {
     /// The legs of the history.
     fn states(&self) -> usize {
-        LEGS
+        MAX_LEGS
     }
     fn state_scale(&self) -> f64 {
-        self.slips_at()
+        self.slip_displacement()
     }
     fn advance<S: Real>(
         &self,
-        from: &[S; MOST_DIRECTIONS],
-        to: &[S; MOST_DIRECTIONS],
+        from: &[S; MAX_DIRECTIONS],
+        to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
-    ) -> [S; MOST_DIRECTIONS] {
-        advance(z, to[0] - from[0], self.slips_at(), |k, leg| share(k, leg, |u| self.first_loading(u)));
+    ) -> [S; MAX_DIRECTIONS] {
+        advance_legs(z, to[0] - from[0], self.slip_displacement(), |k, leg| {
+            leg_force(k, leg, |u| self.first_loading(u))
+        });
         let legs = z.iter().take_while(|leg| leg.re() != 0.0).enumerate();
-        let force: S = legs.map(|(k, leg)| share(k, *leg, |u| self.first_loading(u))).sum();
+        let force: S = legs.map(|(k, leg)| leg_force(k, *leg, |u| self.first_loading(u))).sum();
         // a leg of zero length still has a slope
         let force = if z[0].re() == 0.0 { force + z[0] * self.stiffness } else { force };
         [force, S::from(0.0), S::from(0.0)]
     }
     /// All legs but the last are unchanged. The last leg is the sum of the step and the legs
     /// that it merges with.
-    fn tangent(
+    fn analytic_derivatives(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-        slopes: StepSlopes<'_>,
-    ) -> Option<[f64; MOST_DIRECTIONS]> {
-        let before = counted(z);
+        slopes: StepDerivatives<'_>,
+    ) -> Option<[f64; MAX_DIRECTIONS]> {
+        let before = leg_count(z);
         // The step may drop or merge legs.
-        if before == z.len() || first_that_goes_on(&z[..before]).is_some() {
+        if before == z.len() || first_unreversed_leg(&z[..before]).is_some() {
             return None;
         }
         let force = self.advance(from, to, z);
-        let (last, width) = (counted(z).max(1) - 1, 2 + z.len());
+        let (last, width) = (leg_count(z).max(1) - 1, 2 + z.len());
         slopes.state.fill(0.0);
         slopes.force.fill(0.0);
-        let slipping = z[0].abs() >= self.slips_at();
+        let slipping = z[0].abs() >= self.slip_displacement();
         for (k, row) in slopes.state.chunks_exact_mut(width).enumerate().take(last + 1) {
             if k < last {
                 row[2 + k] = 1.0;
@@ -279,9 +286,9 @@ mod tests {
     use super::*;
 
     /// Returns the force of first loading and the energy dissipated per cycle of the sliders.
-    fn of_pieces(pieces: &[Piece], u: f64) -> (f64, f64) {
+    fn of_pieces(pieces: &[IdealElement], u: f64) -> (f64, f64) {
         pieces.iter().fold((0.0, 0.0), |(force, loss), piece| {
-            let Piece::Slider(slider) = piece else { panic!("{piece:?}") };
+            let IdealElement::Slider(slider) = piece else { panic!("{piece:?}") };
             let hold = slider.limit / slider.stiffness.unwrap();
             (force + slider.limit * (u / hold).min(1.0), loss + 4.0 * slider.limit * (u - hold).max(0.0))
         })
@@ -289,7 +296,7 @@ mod tests {
 
     /// Returns the exact values, by the formulas in the module documentation.
     fn exact(law: &Iwan, u: f64) -> (f64, f64) {
-        let (chi, far, d) = (law.chi, law.slips_at(), law.denominator());
+        let (chi, far, d) = (law.chi, law.slip_displacement(), law.denominator());
         let r = law.limit * (chi + 1.0) / (far.powf(chi + 2.0) * d);
         let s = law.limit / far * law.beta / d;
         let force =
@@ -303,18 +310,18 @@ mod tests {
     fn slopes_are_those_of_dual_numbers() {
         use stickslip_numerics::dual::{Dual, partials, variable};
         let law = Iwan { stiffness: 10.0, limit: 1.0, chi: -0.4, beta: 0.2, elements: 0 };
-        let (mut z, mut u, mut deepest) = ([0.0; LEGS], 0.0, 0);
+        let (mut z, mut u, mut deepest) = ([0.0; MAX_LEGS], 0.0, 0);
         for k in 0..3000 {
             let noise = ((k * 7919 + 13) as f64).sin();
-            let to = u + noise * law.slips_at() * if k % 50 == 0 { 4.0 } else { 0.6 };
-            let mut dual: [Dual<18>; LEGS] = std::array::from_fn(|i| variable(z[i], 2 + i));
+            let to = u + noise * law.slip_displacement() * if k % 50 == 0 { 4.0 } else { 0.6 };
+            let mut dual: [Dual<18>; MAX_LEGS] = std::array::from_fn(|i| variable(z[i], 2 + i));
             let (a, b): (Dual<18>, Dual<18>) = (variable(u, 0), variable(to, 1));
             let zero = Dual::<18>::from(0.0);
             let force = law.advance(&[a, zero, zero], &[b, zero, zero], &mut dual)[0];
-            let (mut of_force, mut of_state) = (vec![0.0; 18], vec![0.0; 18 * LEGS]);
-            let slopes = StepSlopes { directions: 1, force: &mut of_force, state: &mut of_state };
-            let full = z[LEGS - 1] != 0.0;
-            let found = law.tangent(&[u, 0.0, 0.0], &[to, 0.0, 0.0], &mut z, slopes);
+            let (mut of_force, mut of_state) = (vec![0.0; 18], vec![0.0; 18 * MAX_LEGS]);
+            let slopes = StepDerivatives { directions: 1, force: &mut of_force, state: &mut of_state };
+            let full = z[MAX_LEGS - 1] != 0.0;
+            let found = law.analytic_derivatives(&[u, 0.0, 0.0], &[to, 0.0, 0.0], &mut z, slopes);
             assert_eq!(found.is_none(), full);
             if let Some(found) = found {
                 assert!((found[0] - force.re).abs() < 1e-14);
@@ -338,17 +345,18 @@ mod tests {
         for chi in [-0.9, -0.5, -0.2, 0.0] {
             for beta in [0.0, 0.3, 5.0] {
                 let law = Iwan { stiffness: 10.0, limit: 1.0, chi, beta, elements: 32 };
-                let pieces = law.pieces().unwrap();
+                let pieces = law.ideal_elements().unwrap();
                 let sum = |of: fn(&super::super::Slider) -> f64| {
-                    let each =
-                        pieces.iter().map(|piece| if let Piece::Slider(slider) = piece { of(slider) } else { 0.0 });
+                    let each = pieces
+                        .iter()
+                        .map(|piece| if let IdealElement::Slider(slider) = piece { of(slider) } else { 0.0 });
                     each.sum::<f64>()
                 };
                 assert!((sum(|slider| slider.limit) - 1.0).abs() < 1e-13, "all limits are FS");
                 assert!((sum(|slider| slider.stiffness.unwrap()) - 10.0).abs() < 1e-12, "all springs are KT");
                 let (mut force, mut loss) = (0.0f64, 0.0f64);
                 for k in 0..=2000 {
-                    let u = law.slips_at() * 500f64.powf(-f64::from(k) / 2000.0);
+                    let u = law.slip_displacement() * 500f64.powf(-f64::from(k) / 2000.0);
                     let (found, expected) = (of_pieces(&pieces, u), exact(&law, u));
                     assert!(found.0 >= expected.0 * (1.0 - 1e-12), "it is never below the exact force");
                     force = force.max(found.0 / expected.0 - 1.0);

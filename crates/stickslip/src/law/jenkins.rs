@@ -6,7 +6,7 @@
 //! consistent one.
 //! Source: Jenkins (1962); Pust, Pesek, Radolfova (2015), Fig. 1a and Eq. (1).
 
-use super::{JenkinsArctan, Law, LawInfo, Parameter, Piece, SharedLaw};
+use super::{IdealElement, JenkinsArctan, Law, LawInfo, Parameter, SharedLaw};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 
@@ -26,9 +26,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Jenkins, Law, Piece};
+/// use stickslip::law::{Jenkins, Law, IdealElement};
 /// let law = Jenkins { stiffness: 1e4, limit: 2.0 };
-/// assert_eq!(law.pieces().unwrap(), [Piece::slider(Some(1e4), 2.0)]);
+/// assert_eq!(law.ideal_elements().unwrap(), [IdealElement::slider(Some(1e4), 2.0)]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jenkins {
@@ -48,12 +48,12 @@ impl Law for Jenkins {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
     #[doc(alias = "eq1")]
-    fn pieces(&self) -> Option<Vec<Piece>> {
-        Some(vec![Piece::slider(Some(self.stiffness), self.limit)]) // Eq. (1)
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
+        Some(vec![IdealElement::slider(Some(self.stiffness), self.limit)]) // Eq. (1)
     }
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
         Some(Arc::new(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))

@@ -7,9 +7,10 @@
 //! constraint having two-dimensional motion" (1998); step by Krieg and Key (1977), exact for
 //! straight steps.
 
-use super::plane;
+use super::kernels::planar_slip;
 use super::{
-    Jenkins, Jenkins2dArctan, Law, LawInfo, MOST_DIRECTIONS, Parameter, Reach, SharedLaw, Step, StepLaw, StepSlopes,
+    DisplacementBox, Jenkins, Jenkins2dArctan, Law, LawInfo, MAX_DIRECTIONS, Parameter, SharedLaw, StepDerivatives,
+    StepLaw, StepView,
 };
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -60,10 +61,10 @@ impl Law for Jenkins2d {
     fn directions(&self) -> usize {
         2
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }
     fn regularised(&self, width: f64) -> Option<SharedLaw> {
@@ -74,8 +75,8 @@ impl Law for Jenkins2d {
         true
     }
     /// Motion in one direction gives the Jenkins element.
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
-        Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
+        Jenkins { stiffness: self.stiffness, limit: self.limit }.describing_function(amplitude, omega)
     }
 }
 
@@ -89,34 +90,38 @@ impl StepLaw for Jenkins2d {
     #[inline]
     fn advance<S: Real>(
         &self,
-        from: &[S; MOST_DIRECTIONS],
-        to: &[S; MOST_DIRECTIONS],
+        from: &[S; MAX_DIRECTIONS],
+        to: &[S; MAX_DIRECTIONS],
         z: &mut [S],
-    ) -> [S; MOST_DIRECTIONS] {
-        let way = [to[0] - from[0], to[1] - from[1]];
-        let force = plane::step([z[0], z[1]], way, self.stiffness, [S::from(self.limit); 2]);
+    ) -> [S; MAX_DIRECTIONS] {
+        let increment = [to[0] - from[0], to[1] - from[1]];
+        let force = planar_slip::step([z[0], z[1]], increment, self.stiffness, [S::from(self.limit); 2]);
         z.copy_from_slice(&force);
         [force[0], force[1], S::from(0.0)]
     }
-    fn tangent(
+    fn analytic_derivatives(
         &self,
-        from: &[f64; MOST_DIRECTIONS],
-        to: &[f64; MOST_DIRECTIONS],
+        from: &[f64; MAX_DIRECTIONS],
+        to: &[f64; MAX_DIRECTIONS],
         z: &mut [f64],
-        StepSlopes { force: forces, state: states, .. }: StepSlopes<'_>,
-    ) -> Option<[f64; MOST_DIRECTIONS]> {
-        let way = [to[0] - from[0], to[1] - from[1]];
-        let (force, slopes) = plane::step_with_slopes([z[0], z[1]], way, self.stiffness, [self.limit; 2]);
+        StepDerivatives { force: forces, state: states, .. }: StepDerivatives<'_>,
+    ) -> Option<[f64; MAX_DIRECTIONS]> {
+        let increment = [to[0] - from[0], to[1] - from[1]];
+        let (force, slopes) = planar_slip::step_with_slopes([z[0], z[1]], increment, self.stiffness, [self.limit; 2]);
         z.copy_from_slice(&force);
         for (a, row) in states.chunks_exact_mut(6).enumerate() {
-            let (way, before) = (slopes.by_way[a], slopes.by_force[a]);
-            row.copy_from_slice(&[-way[0], -way[1], way[0], way[1], before[0], before[1]]);
+            let (increment, before) = (slopes.by_increment[a], slopes.by_force[a]);
+            row.copy_from_slice(&[-increment[0], -increment[1], increment[0], increment[1], before[0], before[1]]);
         }
         forces.copy_from_slice(states);
         Some([force[0], force[1], 0.0])
     }
-    fn holds(&self, (from, z): (&[f64; MOST_DIRECTIONS], &[f64]), Reach { mean, reach }: Reach<'_>) -> bool {
+    fn sticks_throughout(
+        &self,
+        (from, z): (&[f64; MAX_DIRECTIONS], &[f64]),
+        DisplacementBox { mean, half_width }: DisplacementBox<'_>,
+    ) -> bool {
         let at_mean = |a: usize| z[a] + self.stiffness * (mean[a] - from[a]);
-        at_mean(0).hypot(at_mean(1)) + self.stiffness * reach[0].hypot(reach[1]) < self.limit
+        at_mean(0).hypot(at_mean(1)) + self.stiffness * half_width[0].hypot(half_width[1]) < self.limit
     }
 }

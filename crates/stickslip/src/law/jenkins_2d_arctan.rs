@@ -5,8 +5,8 @@
 //! law `jenkins-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, made isotropic in a plane.
 
-use super::plane::dot;
-use super::{Coulomb2dArctan, Jenkins, Law, LawInfo, Parameter, Prox, Rate, RateLaw, Relative};
+use super::kernels::planar_slip::dot;
+use super::{Coulomb2dArctan, Jenkins, Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -34,9 +34,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Jenkins2dArctan, RateLaw, Relative};
+/// use stickslip::law::{Jenkins2dArctan, RateLaw, RelativeMotion};
 /// let law = Jenkins2dArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 };
-/// let motion = Relative { displacement: [0.0; 3], velocity: [0.0, 1e-3, 0.0] };
+/// let motion = RelativeMotion { displacement: [0.0; 3], velocity: [0.0, 1e-3, 0.0] };
 /// let mut rate = [0.0; 2];
 /// assert_eq!(law.evaluate(&motion, &[0.0; 2], &mut rate)[..2], [0.0; 2]);
 /// assert!((rate[1] - 1e4 * std::f64::consts::PI / 4.0 * 1e-3).abs() < 1e-12);
@@ -64,14 +64,14 @@ impl Law for Jenkins2dArctan {
     fn directions(&self) -> usize {
         2
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
     /// Resolvent of the slider without its spring.
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         if self.limit > 0.0 { Some(self) } else { None }
     }
     fn is_incrementally_passive(&self) -> bool {
@@ -79,23 +79,23 @@ impl Law for Jenkins2dArctan {
         // function of the force
         true
     }
-    fn linearised(&self, amplitude: f64, omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
         // The exact law is a sufficient initial guess for the smooth one.
-        Jenkins { stiffness: self.stiffness, limit: self.limit }.linearised(amplitude, omega)
+        Jenkins { stiffness: self.stiffness, limit: self.limit }.describing_function(amplitude, omega)
     }
 }
 
 /// Largest force that determines a state, relative to the limit.
-const BELOW: f64 = 1.0 - 1e-12;
+const MAX_FORCE_RATIO: f64 = 1.0 - 1e-12;
 
 /// Below this value of `|z|²`, functions of it are evaluated as series. Their next terms are
 /// then below rounding.
-const SMALL: f64 = 1e-3;
+const SERIES_BELOW: f64 = 1e-3;
 
 /// Even functions of ρ, smooth at zero, from `ρ²`: `arctan(sinh ρ) / ρ = G`, `sinh ρ / ρ`, and
 /// `(cosh ρ - 1/G) / ρ²`.
-fn even<S: Real>(square: S) -> [S; 3] {
-    if square.re() < SMALL {
+fn even_functions<S: Real>(square: S) -> [S; 3] {
+    if square.re() < SERIES_BELOW {
         let gudermann =
             (((square * (277.0 / 72_576.0) - 61.0 / 5040.0) * square + 1.0 / 24.0) * square - 1.0 / 6.0) * square + 1.0;
         let sinh = ((square * (1.0 / 5040.0) + 1.0 / 120.0) * square + 1.0 / 6.0) * square + 1.0;
@@ -110,7 +110,7 @@ fn even<S: Real>(square: S) -> [S; 3] {
     [gudermann, sinh / size, (size.cosh() - gudermann.recip()) / square]
 }
 
-impl Prox for Jenkins2dArctan {
+impl ProxView for Jenkins2dArctan {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         Coulomb2dArctan { limit: self.limit, alpha: self.alpha }.resolve(y, penalty, force, slope);
     }
@@ -124,20 +124,20 @@ impl RateLaw for Jenkins2dArctan {
     fn states(&self) -> usize {
         if self.limit > 0.0 { 2 } else { 0 } // without a limit, the spring carries no force
     }
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
         let size = force[0].hypot(force[1]);
         // Forces beyond the limit are replaced by values just below it.
-        let rho = ((size / self.limit).min(BELOW) / FRAC_2_PI).tan().asinh();
+        let rho = ((size / self.limit).min(MAX_FORCE_RATIO) / FRAC_2_PI).tan().asinh();
         let share = if size > 0.0 { rho / size } else { 0.0 };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force * share);
         true
     }
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let zero = S::from(0.0);
         let &[x, y] = z else { return [zero; 3] };
         let z = [x, y];
-        let [gudermann, sinh, difference] = even(dot(z, z));
+        let [gudermann, sinh, difference] = even_functions(dot(z, z));
         // rate of the spring's elongation: u' - s'
         let creep = [0, 1].map(|a| motion.velocity[a] - z[a] * sinh * (1.0 / self.alpha));
         // Radially, df = limit (2/π) / cosh |z| d|z|; tangentially, df = limit (2/π) G dz.
@@ -156,12 +156,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_force_decides_the_state() {
+    fn state_from_force_is_exact() {
         let law = Jenkins2dArctan { stiffness: 3.0, limit: 2.0, alpha: 5.0 };
         for force in [[0.0, 0.0], [0.5, -1.2], [1e-9, 0.0], [-1.9, 0.6]] {
             let mut z = [0.0; 2];
-            assert!(RateLaw::state_under(&law, &force, &mut z));
-            let found = law.evaluate(&Relative::along(0.0, 0.0), &z, &mut [0.0; 2]);
+            assert!(RateLaw::state_from_force(&law, &force, &mut z));
+            let found = law.evaluate(&RelativeMotion::along(0.0, 0.0), &z, &mut [0.0; 2]);
             assert!((found[0] - force[0]).abs() < 1e-12 && (found[1] - force[1]).abs() < 1e-12, "{force:?} {found:?}");
         }
     }
@@ -169,11 +169,11 @@ mod tests {
     #[test]
     fn series_join_the_closed_forms() {
         for scale in [0.999, 1.001] {
-            let square: f64 = SMALL * scale;
+            let square: f64 = SERIES_BELOW * scale;
             let rho = square.sqrt();
             let gudermann = rho.sinh().atan() / rho;
             let expected = [gudermann, rho.sinh() / rho, (rho.cosh() - 1.0 / gudermann) / square];
-            for (found, expected) in even(square).into_iter().zip(expected) {
+            for (found, expected) in even_functions(square).into_iter().zip(expected) {
                 // the last function loses digits to cancellation
                 assert!((found - expected).abs() < 1e-12, "{found} {expected}");
             }
@@ -184,11 +184,11 @@ mod tests {
     fn the_force_changes_as_the_spring_and_the_slider_say() {
         let law = Jenkins2dArctan { stiffness: 3.0, limit: 2.0, alpha: 5.0 };
         let force = |z: [f64; 2]| {
-            let f = law.evaluate(&Relative::along(0.0, 0.0), &z, &mut [0.0; 2]);
+            let f = law.evaluate(&RelativeMotion::along(0.0, 0.0), &z, &mut [0.0; 2]);
             [f[0], f[1]]
         };
         for (z, v) in [([0.4, -1.0], [0.3, 0.7]), ([2.0, 3.0], [-1.0, 0.2]), ([1e-4, 0.0], [0.1, 0.1])] {
-            let motion = Relative { displacement: [0.0; 3], velocity: [v[0], v[1], 0.0] };
+            let motion = RelativeMotion { displacement: [0.0; 3], velocity: [v[0], v[1], 0.0] };
             let mut rate = [0.0; 2];
             law.evaluate(&motion, &z, &mut rate);
             let now = force(z);

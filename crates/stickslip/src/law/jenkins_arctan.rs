@@ -5,8 +5,10 @@
 //! `f' = kt (u' - tan(π f / (2 limit)) / alpha)`, `|f| < limit`.
 //! Source: Pust, Pesek, Radolfova (2015), Sec. 3, the equation of Fig. 3.
 
-use super::describing;
-use super::{CoulombArctan, Law, LawInfo, Mean, Parameter, Piece, Prox, Rate, RateLaw, Relative};
+use super::interface::describing_function;
+use super::{
+    CoulombArctan, IdealElement, Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion, SampleMeans,
+};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -35,10 +37,10 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{JenkinsArctan, RateLaw, Relative};
+/// use stickslip::law::{JenkinsArctan, RateLaw, RelativeMotion};
 /// let law = JenkinsArctan { stiffness: 1e4, limit: 2.0, alpha: 25e3 };
 /// let mut rate = [0.0];
-/// let force = law.evaluate(&Relative::along(0.0, 1e-3), &[0.0], &mut rate);
+/// let force = law.evaluate(&RelativeMotion::along(0.0, 1e-3), &[0.0], &mut rate);
 /// assert_eq!(force[0], 0.0);
 /// assert!((rate[0] - 1e4 * std::f64::consts::PI / 4.0 * 1e-3).abs() < 1e-12);
 /// ```
@@ -62,26 +64,26 @@ impl Law for JenkinsArctan {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         Some(self)
     }
     fn is_incrementally_passive(&self) -> bool {
         true // the spring stores δf²/(2 kt), and the slider velocity grows with the force
     }
-    fn linearised(&self, amplitude: f64, _omega: f64) -> Complex64 {
+    fn describing_function(&self, amplitude: f64, _omega: f64) -> Complex64 {
         // The exact law is a sufficient initial guess for the smooth one.
-        describing::of_piece(&Piece::slider(Some(self.stiffness), self.limit), amplitude)
+        describing_function::slider_or_stop(&IdealElement::slider(Some(self.stiffness), self.limit), amplitude)
     }
 }
 
 /// Largest force that determines a state, relative to the limit.
-const BELOW: f64 = 1.0 - 1e-12;
+const MAX_FORCE_RATIO: f64 = 1.0 - 1e-12;
 
 impl JenkinsArctan {
     /// Returns the slider without its spring.
@@ -90,14 +92,14 @@ impl JenkinsArctan {
     }
 }
 
-impl Prox for JenkinsArctan {
+impl ProxView for JenkinsArctan {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         self.slider().resolve(y, penalty, force, slope);
     }
-    fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
-        self.slider().at_velocity(velocity)
+    fn force_at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
+        self.slider().force_at_velocity(velocity)
     }
-    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
+    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<SampleMeans> {
         self.slider().mean_at_velocity(velocity, e)
     }
     fn compliance(&self) -> f64 {
@@ -110,14 +112,14 @@ impl RateLaw for JenkinsArctan {
     fn states(&self) -> usize {
         usize::from(self.limit > 0.0) // without a limit, the spring carries no force
     }
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
         // Forces beyond the limit are replaced by values just below it.
-        let share = (force[0] / self.limit).clamp(-BELOW, BELOW);
+        let share = (force[0] / self.limit).clamp(-MAX_FORCE_RATIO, MAX_FORCE_RATIO);
         z.fill((share / FRAC_2_PI).tan().asinh());
         true
     }
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let zero = S::from(0.0);
         if z.is_empty() {
             return [zero, zero, zero];

@@ -12,10 +12,10 @@
 //! that does not go into the bristles' elastic energy is `|v| (g q² + s1 |v| (1 - q)) + s2 v²`
 //! with `q = s0 z sgn(v) / g`. Under this condition the bracket is never negative.
 
-use super::kink::size;
-use super::parameter::STATIC_LIMIT;
-use super::stribeck_curve::falling;
-use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use super::interface::parameter::STATIC_LIMIT;
+use super::kernels::kink::abs;
+use super::kernels::stribeck_curve::stribeck_force;
+use super::{Contact, Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -26,8 +26,9 @@ pub(super) static INFO: LawInfo = LawInfo {
     summary: "bristle friction, f = stiffness z + damping z' + viscous u', z' = u' - stiffness |u'| z/g(u')",
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "stiffness of the bristles, s0"),
-        Parameter::new("damping", Dimension::DAMPING, Range::ZeroOrMore, "damping of the bristles, s1").or(0.0),
-        Parameter::new("viscous", Dimension::DAMPING, Range::ZeroOrMore, "viscous friction, s2").or(0.0),
+        Parameter::new("damping", Dimension::DAMPING, Range::ZeroOrMore, "damping of the bristles, s1")
+            .with_default(0.0),
+        Parameter::new("viscous", Dimension::DAMPING, Range::ZeroOrMore, "viscous friction, s2").with_default(0.0),
         Parameter::limit("friction force at high velocity, Fc"),
         Parameter::new(
             STATIC_LIMIT,
@@ -55,11 +56,11 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{LuGre, RateLaw, Relative};
+/// use stickslip::law::{LuGre, RateLaw, RelativeMotion};
 /// let law = LuGre { stiffness: 1e4, damping: 10.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
 /// // steady sliding at 1 m/s: the bristles carry `limit`, plus viscous friction
 /// let mut rate = [0.0_f64];
-/// let force = law.evaluate(&Relative::along(0.0, 1.0), &[2.0 / 2.5], &mut rate);
+/// let force = law.evaluate(&RelativeMotion::along(0.0, 1.0), &[2.0 / 2.5], &mut rate);
 /// assert!((force[0] - 2.4).abs() < 1e-12 && rate[0].abs() < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,7 +82,7 @@ pub struct LuGre {
 impl LuGre {
     /// Returns the force of steady sliding without viscous friction, N.
     fn steady<S: Real>(&self, velocity: S) -> S {
-        falling(velocity, self.limit, self.static_limit, self.velocity)
+        stribeck_force(velocity, self.limit, self.static_limit, self.velocity)
     }
 }
 
@@ -96,17 +97,17 @@ impl Law for LuGre {
         true
     }
     /// The static limit. With both limits zero, viscous friction alone is unbounded.
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         if self.static_limit == 0.0 && self.viscous > 0.0 { f64::INFINITY } else { self.static_limit }
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
-        Contact::by_limit(self.steady(velocity[0]), velocity, &[force[0] - self.viscous * velocity[0]])
+    fn contact_state(&self, velocity: &[f64], force: &[f64]) -> Contact {
+        Contact::of_smooth_law(self.steady(velocity[0]), velocity, &[force[0] - self.viscous * velocity[0]])
     }
-    fn consistent(&self) -> Result<(), String> {
-        super::stribeck_curve::limits_fit(self.limit, self.static_limit)?;
+    fn check_consistency(&self) -> Result<(), String> {
+        super::kernels::stribeck_curve::check_limits(self.limit, self.static_limit)?;
         if self.limit == 0.0 && self.static_limit > 0.0 {
             return Err("`limit` is zero, but `static_limit` is positive: the law divides by the \
                  friction force, which is `limit` at high velocity; make `limit` positive"
@@ -120,17 +121,17 @@ impl RateLaw for LuGre {
     fn states(&self) -> usize {
         usize::from(self.static_limit > 0.0) // without a limit there are no bristles
     }
-    fn state_under(&self, force: &[f64], z: &mut [f64]) -> bool {
+    fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
         z.fill((force[0] / self.static_limit).clamp(-1.0, 1.0));
         true
     }
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let (zero, v) = (S::from(0.0), motion.velocity[0]);
         let viscous = v * self.viscous;
         let Some(&share) = z.first() else { return [viscous, zero, zero] };
         let bending = share * self.static_limit;
-        let deflected = v - size(v) * bending / self.steady(v); // z'
+        let deflected = v - abs(v) * bending / self.steady(v); // z'
         rate[0] = deflected * (self.stiffness / self.static_limit);
         [bending + deflected * self.damping + viscous, zero, zero]
     }

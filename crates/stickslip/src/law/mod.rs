@@ -3,7 +3,7 @@
 //! A law is an object behind [`Law`]; each law has its own file. A law offers one or more
 //! *views*. A method uses the view that it can work with:
 //!
-//! - [`Law::pieces`]: ideal sliders, springs and stops in parallel. Used by event-driven
+//! - [`Law::ideal_elements`]: ideal sliders, springs and stops in parallel. Used by event-driven
 //!   integration, harmonic balance and average acceleration.
 //! - [`Law::rate`]: `f = h(u, u', z)`, `z' = g(u, u', z)`, smooth. Used by transient, shooting
 //!   and harmonic balance.
@@ -23,51 +23,36 @@
 //! joint's first place relative to its second place. The law's force `f` acts on the first place
 //! as `-f`. A law with a normal direction has it as its last direction.
 //!
+//! The traits and views are in `interface`, formulas that several laws share in `kernels`, and
+//! properties of any law in `properties`.
+//!
 //! To add a law, write its file with its [`LawInfo`], declare the module here, and add one line
 //! to [`TABLE`]. A law from another crate or from a test needs no entry in the table: a
 //! [`crate::model::Joint`] takes any object that implements [`Law`].
 
 mod bouc_wen;
-mod check;
-mod contact;
 mod coulomb;
 mod coulomb_2d;
 mod coulomb_2d_arctan;
 mod coulomb_arctan;
 mod cubic;
 mod dahl;
-mod describing;
 mod friction_contact;
 mod gap;
+mod interface;
 mod iwan;
 mod jenkins;
 mod jenkins_2d;
 mod jenkins_2d_arctan;
 mod jenkins_arctan;
-mod kink;
+mod kernels;
 mod lugre;
-mod masing;
-mod mirror;
-mod parameter;
-mod pieces;
-mod plane;
-mod proportion;
-mod prox;
-mod rate;
-mod references;
-mod relative;
-mod sliding;
-mod slopes;
-mod springs;
-mod step;
+mod properties;
 mod stribeck;
 mod stribeck_arctan;
-mod stribeck_curve;
-mod traits;
 mod valanis;
 
 pub use bouc_wen::BoucWen;
-pub use contact::Contact;
 pub use coulomb::Coulomb;
 pub use coulomb_2d::Coulomb2d;
 pub use coulomb_2d_arctan::Coulomb2dArctan;
@@ -76,23 +61,19 @@ pub use cubic::Cubic;
 pub use dahl::Dahl;
 pub use friction_contact::FrictionContact;
 pub use gap::Gap;
+pub use interface::{
+    BuildError, Contact, DisplacementBox, IdealElement, Law, LawError, LawInfo, MAX_DIRECTIONS, MasingView, Parameter,
+    ProxView, Range, RateLaw, RatePoint, RateView, RelativeMotion, SampleMeans, SharedLaw, Slider, SlidingView,
+    StepDerivatives, StepLaw, StepPoint, StepView, TANGENTS,
+};
 pub use iwan::Iwan;
 pub use jenkins::Jenkins;
 pub use jenkins_2d::Jenkins2d;
 pub use jenkins_2d_arctan::Jenkins2dArctan;
 pub use jenkins_arctan::JenkinsArctan;
 pub use lugre::LuGre;
-pub use masing::Masing;
-pub use parameter::{BuildError, LawError, Parameter, Range, TANGENTS};
-pub use pieces::{Piece, Slider};
-pub use prox::{Mean, Prox};
-pub use rate::{Rate, RateLaw, RatePoint};
-pub use relative::{MOST_DIRECTIONS, Relative};
-pub use sliding::Sliding;
-pub use step::{Reach, Step, StepLaw, StepPoint, StepSlopes};
 pub use stribeck::Stribeck;
 pub use stribeck_arctan::StribeckArctan;
-pub use traits::{Law, LawInfo, SharedLaw};
 pub use valanis::Valanis;
 
 /// All laws, in the order of printed lists.

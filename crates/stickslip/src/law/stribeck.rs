@@ -6,10 +6,11 @@
 //! Source: Stribeck (1902); in this form Bo and Pavelescu, "The friction-speed relation and its
 //! influence on the critical velocity of stick-slip motion" (1982).
 
-use super::parameter::STATIC_LIMIT;
-use super::stribeck_curve::limits_fit;
+use super::interface::parameter::STATIC_LIMIT;
+use super::kernels::stribeck_curve::check_limits;
 use super::{
-    Contact, CoulombArctan, Law, LawInfo, Parameter, Piece, Prox, Range, SharedLaw, Slider, Sliding, StribeckArctan,
+    Contact, CoulombArctan, IdealElement, Law, LawInfo, Parameter, ProxView, Range, SharedLaw, Slider, SlidingView,
+    StribeckArctan,
 };
 use crate::dimension::Dimension;
 use std::f64::consts::E;
@@ -33,7 +34,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             Range::ZeroOrMore,
             "velocity over which friction falls, vs; 0: friction drops immediately at slip",
         )
-        .or(0.0),
+        .with_default(0.0),
     ],
     sample: &[2.0, 2.5, 0.01],
     build: |values| Arc::new(Stribeck { limit: values[0], static_limit: values[1], velocity: values[2] }),
@@ -43,7 +44,7 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{Law, Prox, Stribeck};
+/// use stickslip::law::{Law, ProxView, Stribeck};
 /// let law = Stribeck { limit: 2.0, static_limit: 2.5, velocity: 0.01 };
 /// let (mut force, mut slope) = ([0.0], [0.0]);
 /// law.resolve(&[2.4], 1e3, &mut force, &mut slope);
@@ -88,21 +89,21 @@ impl Law for Stribeck {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.static_limit
     }
     /// A slider with two limits. Available if `velocity` is zero or the limits are equal.
-    fn pieces(&self) -> Option<Vec<Piece>> {
+    fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         let slider = Slider { stiffness: None, limit: self.limit, static_limit: self.static_limit };
-        (self.velocity == 0.0 || self.is_constant()).then(|| vec![Piece::Slider(slider)])
+        (self.velocity == 0.0 || self.is_constant()).then(|| vec![IdealElement::Slider(slider)])
     }
     /// Available if `velocity` is positive or the limits are equal. Otherwise no penalty makes
     /// the resolvent single-valued.
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
     /// Available under the same condition as the resolvent.
-    fn sliding(&self) -> Option<&dyn Sliding> {
+    fn sliding(&self) -> Option<&dyn SlidingView> {
         if self.velocity > 0.0 || self.is_constant() { Some(self) } else { None }
     }
     /// Available if `velocity` is positive or the limits are equal. Otherwise no smooth law with
@@ -121,16 +122,16 @@ impl Law for Stribeck {
     fn is_incrementally_passive(&self) -> bool {
         self.is_constant()
     }
-    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
+    fn contact_state(&self, velocity: &[f64], force: &[f64]) -> Contact {
         let limit = if velocity[0] == 0.0 { self.static_limit } else { self.friction(velocity[0]).0 };
-        Contact::by_limit(limit, velocity, force)
+        Contact::of_smooth_law(limit, velocity, force)
     }
-    fn consistent(&self) -> Result<(), String> {
-        limits_fit(self.limit, self.static_limit)
+    fn check_consistency(&self) -> Result<(), String> {
+        check_limits(self.limit, self.static_limit)
     }
 }
 
-impl Sliding for Stribeck {
+impl SlidingView for Stribeck {
     fn slip_force(&self, velocity: f64) -> (f64, f64) {
         self.friction(velocity)
     }
@@ -138,9 +139,9 @@ impl Sliding for Stribeck {
 
 /// Upper bound on the iterations for the velocity. Bisection alone needs one per bit of the
 /// result.
-const SEARCHED: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 
-impl Prox for Stribeck {
+impl ProxView for Stribeck {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let target = y[0].abs();
         if target <= self.static_limit {
@@ -153,7 +154,7 @@ impl Prox for Stribeck {
         // rounding of the force, expressed as a velocity
         let rounding = f64::EPSILON * target / penalty;
         let mut v = high;
-        for _ in 0..SEARCHED {
+        for _ in 0..MAX_ITERATIONS {
             let (friction, fall) = self.friction(v);
             let excess = friction + penalty * v - target;
             if excess > 0.0 {
@@ -173,7 +174,7 @@ impl Prox for Stribeck {
         (force[0], slope[0]) = (friction.copysign(y[0]), fall / (fall + penalty));
     }
     /// The steepest slope of the friction curve, at `v = vs / √2`.
-    fn least_penalty(&self) -> f64 {
+    fn minimum_penalty(&self) -> f64 {
         if self.is_constant() {
             return 0.0;
         }
@@ -189,7 +190,7 @@ mod tests {
 
     #[test]
     fn the_resolvent_solves_its_equation_and_has_its_slope() {
-        let penalty = 1.5 * LAW.least_penalty();
+        let penalty = 1.5 * LAW.minimum_penalty();
         let resolve = |y: f64| {
             let (mut force, mut slope) = ([0.0], [0.0]);
             LAW.resolve(&[y], penalty, &mut force, &mut slope);
@@ -199,7 +200,7 @@ mod tests {
             let y = -4.0 + 0.04 * f64::from(k);
             let (force, slope) = resolve(y);
             let velocity = (y - force) / penalty;
-            let friction: f64 = super::super::stribeck_curve::falling(velocity, 2.0, 2.5, 0.01);
+            let friction: f64 = super::super::kernels::stribeck_curve::stribeck_force(velocity, 2.0, 2.5, 0.01);
             if velocity == 0.0 {
                 assert!(force.abs() <= 2.5);
             } else {
@@ -216,14 +217,14 @@ mod tests {
     #[test]
     fn the_least_penalty_is_the_steepest_fall() {
         let steepest = (1..4000).map(|k| -LAW.friction(f64::from(k) * 1e-5).1).fold(0.0, f64::max);
-        assert!((LAW.least_penalty() / steepest - 1.0).abs() < 1e-5);
+        assert!((LAW.minimum_penalty() / steepest - 1.0).abs() < 1e-5);
     }
 
     #[test]
     fn without_a_velocity_it_is_a_slider_with_two_limits() {
         let law = Stribeck { velocity: 0.0, ..LAW };
         let slider = Slider { stiffness: None, limit: 2.0, static_limit: 2.5 };
-        assert_eq!(law.pieces(), Some(vec![Piece::Slider(slider)]));
+        assert_eq!(law.ideal_elements(), Some(vec![IdealElement::Slider(slider)]));
         assert!(law.prox().is_none() && law.regularised(1e-5).is_none());
         let coulomb = Stribeck { static_limit: 2.0, ..law };
         assert!(coulomb.prox().is_some() && coulomb.regularised(1e-5).is_some() && coulomb.is_incrementally_passive());

@@ -6,9 +6,9 @@
 //! Source: the arctangent of Pust, Pesek, Radolfova (2015), Eq. (2), multiplied by the Stribeck
 //! curve.
 
-use super::parameter::STATIC_LIMIT;
-use super::stribeck_curve::{falling, limits_fit};
-use super::{Contact, Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use super::interface::parameter::STATIC_LIMIT;
+use super::kernels::stribeck_curve::{check_limits, stribeck_force};
+use super::{Contact, Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use std::f64::consts::FRAC_2_PI;
 use std::sync::Arc;
@@ -39,9 +39,9 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{RateLaw, Relative, StribeckArctan};
+/// use stickslip::law::{RateLaw, RelativeMotion, StribeckArctan};
 /// let law = StribeckArctan { limit: 2.0, static_limit: 2.5, velocity: 1.0, alpha: 1.0 };
-/// let force = law.evaluate(&Relative::along(0.0, 1.0), &[], &mut []);
+/// let force = law.evaluate(&RelativeMotion::along(0.0, 1.0), &[], &mut []);
 /// assert!((force[0] - 0.5 * (2.0 + 0.5 / std::f64::consts::E)).abs() < 1e-15);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,25 +66,29 @@ impl Law for StribeckArctan {
     fn is_odd(&self) -> bool {
         true
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         self.static_limit
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn contact(&self, velocity: &[f64], force: &[f64]) -> Contact {
-        Contact::by_limit(falling(velocity[0], self.limit, self.static_limit, self.velocity), velocity, force)
+    fn contact_state(&self, velocity: &[f64], force: &[f64]) -> Contact {
+        Contact::of_smooth_law(
+            stribeck_force(velocity[0], self.limit, self.static_limit, self.velocity),
+            velocity,
+            force,
+        )
     }
-    fn consistent(&self) -> Result<(), String> {
-        limits_fit(self.limit, self.static_limit)
+    fn check_consistency(&self) -> Result<(), String> {
+        check_limits(self.limit, self.static_limit)
     }
 }
 
 impl RateLaw for StribeckArctan {
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let (zero, v) = (S::from(0.0), motion.velocity[0]);
-        let friction = falling(v, self.limit, self.static_limit, self.velocity);
+        let friction = stribeck_force(v, self.limit, self.static_limit, self.velocity);
         [(v * self.alpha).atan() * friction * FRAC_2_PI, zero, zero]
     }
 }
@@ -94,9 +98,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn smoothing_takes_from_the_static_limit_what_the_heading_says() {
+    fn smoothing_reduces_the_static_limit_by_0_8_percent() {
         let law = StribeckArctan { limit: 0.8, static_limit: 1.0, velocity: 1.0, alpha: 1000.0 };
-        let force = |v: f64| law.evaluate(&Relative::along(0.0, v), &[], &mut [])[0];
+        let force = |v: f64| law.evaluate(&RelativeMotion::along(0.0, v), &[], &mut [])[0];
         let most = (1..10_000).map(|k| force(f64::from(k) * 1e-4)).fold(0.0, f64::max);
         assert!((0.0075..0.0085).contains(&(1.0 - most)), "{most}");
     }

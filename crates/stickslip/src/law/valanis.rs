@@ -11,8 +11,8 @@
 //! The law gives no energy in a closed motion: apart from the spring Et, the slope at a given
 //! force is never larger in loading than in unloading.
 
-use super::kink::{sign, size};
-use super::{Law, LawInfo, Parameter, Range, Rate, RateLaw, Relative};
+use super::kernels::kink::{abs, sign};
+use super::{Law, LawInfo, Parameter, Range, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
@@ -43,11 +43,11 @@ pub(super) static INFO: LawInfo = LawInfo {
 ///
 /// # Example
 /// ```
-/// use stickslip::law::{RateLaw, Relative, Valanis};
+/// use stickslip::law::{RateLaw, RelativeMotion, Valanis};
 /// let law = Valanis { stiffness: 1e4, slip_stiffness: 1e3, lambda: 5e3, kappa: 0.0 };
 /// // without kappa the slope falls linearly with the force
 /// let mut rate = [0.0_f64];
-/// law.evaluate(&Relative::along(0.0, 1.0), &[0.5], &mut rate);
+/// law.evaluate(&RelativeMotion::along(0.0, 1.0), &[0.5], &mut rate);
 /// assert!((rate[0] - 5e3 * (0.5 - 0.1)).abs() < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,17 +73,17 @@ impl Law for Valanis {
         true
     }
     /// The limit of the force beyond the spring Et in slip.
-    fn scale(&self) -> f64 {
-        self.stiffness / self.lambda * self.sliding()
+    fn force_scale(&self) -> f64 {
+        self.stiffness / self.lambda * self.slip_state()
     }
     /// Without friction, the slip stiffness remains.
-    fn springs(&self) -> Option<[Vec<f64>; 2]> {
+    fn reference_springs(&self) -> Option<[Vec<f64>; 2]> {
         Some([vec![self.slip_stiffness], vec![self.stiffness]])
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
-    fn consistent(&self) -> Result<(), String> {
+    fn check_consistency(&self) -> Result<(), String> {
         if self.slip_stiffness >= self.stiffness {
             return Err("`slip_stiffness` must be below `stiffness`; otherwise the joint does not slip".to_owned());
         }
@@ -96,7 +96,7 @@ impl Law for Valanis {
 
 impl Valanis {
     /// Returns the limit of the state in slip.
-    fn sliding(&self) -> f64 {
+    fn slip_state(&self) -> f64 {
         let (stick, slip) = (self.stiffness, self.slip_stiffness);
         (stick - slip) / (stick - self.kappa * slip)
     }
@@ -107,16 +107,16 @@ impl RateLaw for Valanis {
         1
     }
     #[inline]
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let (u, v, y) = (motion.displacement[0], motion.velocity[0], z[0]);
         let mut knee = S::from(1.0) - y * (self.kappa * sign(v.re()));
         // No motion exceeds the limit of the state, but iterations may. The pole at
         // `|y| = 1/kappa` would give them a spurious solution.
-        let least = 1.0 - self.kappa * self.sliding();
+        let least = 1.0 - self.kappa * self.slip_state();
         if knee.re() < least {
             knee = S::from(least);
         }
-        rate[0] = ((v - size(v) * y) / knee - v * (self.slip_stiffness / self.stiffness)) * self.lambda;
+        rate[0] = ((v - abs(v) * y) / knee - v * (self.slip_stiffness / self.stiffness)) * self.lambda;
         [u * self.slip_stiffness + y * (self.stiffness / self.lambda), S::from(0.0), S::from(0.0)]
     }
 }
@@ -131,7 +131,7 @@ mod tests {
         for (u, force, v) in [(0.3, 1.1, 0.5), (0.3, 1.1, -0.5), (-2.0, -5.0, 1.0), (0.0, 0.0, -3.0)] {
             let y = law.lambda / law.stiffness * (force - law.slip_stiffness * u);
             let mut rate = [0.0];
-            let found = law.evaluate(&Relative::along(u, v), &[y], &mut rate)[0];
+            let found = law.evaluate(&RelativeMotion::along(u, v), &[y], &mut rate)[0];
             // f' from the rate of the state
             let slope = law.slip_stiffness * v + rate[0] * law.stiffness / law.lambda;
             let q = law.lambda / law.stiffness * v.signum() * (law.slip_stiffness * u - force);
@@ -141,22 +141,22 @@ mod tests {
     }
 
     #[test]
-    fn a_state_beyond_slip_comes_back() {
+    fn a_state_beyond_slip_returns() {
         let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.98 };
         for y in [1.0, 1.0 / 0.98, 1.1, 2.0_f64] {
             for sign in [1.0, -1.0] {
                 let mut rate = [0.0_f64];
-                law.evaluate(&Relative::along(0.0, sign), &[sign * y], &mut rate);
+                law.evaluate(&RelativeMotion::along(0.0, sign), &[sign * y], &mut rate);
                 assert!(rate[0] * sign < 0.0 && rate[0].is_finite(), "{y} {sign}: {}", rate[0]);
             }
         }
     }
 
     #[test]
-    fn slip_goes_on_along_the_line_that_the_scale_says() {
+    fn slip_force_is_the_scale() {
         let law = Valanis { stiffness: 10.0, slip_stiffness: 2.0, lambda: 3.0, kappa: 0.7 };
         let mut rate = [1.0];
-        law.evaluate(&Relative::along(0.0, 1.0), &[law.scale() * law.lambda / law.stiffness], &mut rate);
+        law.evaluate(&RelativeMotion::along(0.0, 1.0), &[law.force_scale() * law.lambda / law.stiffness], &mut rate);
         assert!(rate[0].abs() < 1e-14);
     }
 }

@@ -102,14 +102,14 @@ fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
     };
     match &mut error {
         // `transient` is the last resort; the method that failed is not named again
-        OrbitError::Truncation { method, instead, .. } | OrbitError::NotConverged { method, instead, .. }
-            if instead.is_empty() =>
+        OrbitError::Truncation { method, advice, .. } | OrbitError::NotConverged { method, advice, .. }
+            if advice.is_empty() =>
         {
-            *instead = words(&|name| ![*method, transient::INFO.name].contains(&name));
+            *advice = words(&|name| ![*method, transient::INFO.name].contains(&name));
         }
-        OrbitError::Unsettled { method, instead, repeats: None, .. } => *instead = words(&|name| name != *method),
-        OrbitError::Drift { method, instead, .. } if *method != event_driven::INFO.name => {
-            *instead = words(&|name| name == event_driven::INFO.name);
+        OrbitError::Unsettled { method, advice, repeats: None, .. } => *advice = words(&|name| name != *method),
+        OrbitError::Drift { method, advice, .. } if *method != event_driven::INFO.name => {
+            *advice = words(&|name| name == event_driven::INFO.name);
         }
         _ => {}
     }

@@ -2,7 +2,7 @@
 //! with the indices of their axes and states.
 
 use super::drive::Drive;
-use super::{Breakdown, MethodError};
+use super::{IntegrationError, MethodError};
 use crate::law::SharedLaw;
 use crate::model::{Axis, System};
 use crate::structure::Matrices;
@@ -62,8 +62,8 @@ impl PlacedLaw {
         0.5 * h * slopes[after + e] + slopes[after + self.directions + e]
     }
     /// Returns the error that the law answers with NaN or infinity.
-    pub fn no_number(&self, time: f64) -> Breakdown {
-        Breakdown::NoNumber { time, joint: self.joint.clone(), law: self.law.name() }
+    pub fn no_number(&self, time: f64) -> IntegrationError {
+        IntegrationError::NotFinite { time, joint: self.joint.clone(), law: self.law.name() }
     }
 }
 
@@ -90,7 +90,7 @@ impl Assembly {
         if let Some(error) = MethodError::too_large(method, system) {
             return Err(error);
         }
-        if let Some(i) = (0..n).find(|&i| structure.own_mass(i) <= 0.0) {
+        if let Some(i) = (0..n).find(|&i| structure.diagonal_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(method, system, i));
         }
         let inverse_mass =
@@ -121,7 +121,7 @@ impl Assembly {
             directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
             internal,
-            seen: system.places().iter().cloned().zip(system.seen().iter().cloned()).collect(),
+            seen: system.places().iter().cloned().zip(system.place_axes().iter().cloned()).collect(),
         })
     }
 
@@ -132,7 +132,7 @@ impl Assembly {
 
     /// Returns the place with the largest displacement.
     pub fn farthest(&self, state: &[f64]) -> Option<String> {
-        let far = |axis: &Axis| axis.along(&state[..self.n]).abs();
+        let far = |axis: &Axis| axis.component(&state[..self.n]).abs();
         let farthest = self.seen.iter().max_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
         farthest.map(|(place, _)| place.clone())
     }
@@ -141,7 +141,7 @@ impl Assembly {
     pub fn relative(&self, axis: usize, state: &[f64], drive: &Drive, time: f64) -> (f64, f64) {
         let (g, speed) = drive.relative_at(axis, time);
         let (x, v) = state.split_at(self.n);
-        (self.axes[axis].along(x) + g, self.axes[axis].along(v) + speed)
+        (self.axes[axis].component(x) + g, self.axes[axis].component(v) + speed)
     }
 
     /// Computes the acceleration (length n) of a state under loads and joint forces. `left`
@@ -224,5 +224,5 @@ pub(crate) const NEAR_REST: f64 = 1e-3;
 /// Returns true if a law carries no force: it is free, or it consists only of sliders with zero
 /// limit.
 pub(crate) fn carries_nothing(law: &SharedLaw) -> bool {
-    law.is_free() || law.sliders().is_some_and(|sliders| sliders.is_empty())
+    law.carries_no_force() || law.sliders().is_some_and(|sliders| sliders.is_empty())
 }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::law::Law;
 use crate::model::System;
-use crate::orbit::{Course, Orbit, OrbitError};
+use crate::orbit::{ObservedMotion, Orbit, OrbitError};
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -77,7 +77,7 @@ impl Auto {
     fn by_laws(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints().len();
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
-        let massless = (0..system.dofs()).any(|dof| system.structure().own_mass(dof) <= 0.0);
+        let massless = (0..system.dofs()).any(|dof| system.structure().diagonal_mass(dof) <= 0.0);
         let events = event_driven::orbit_work(system).map(|work| APART * work);
         let balance =
             |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };
@@ -190,9 +190,9 @@ impl<'a> WithSecond<'a> {
         let near = start.filter(|start| self.last.as_deref() == Some(*start)).or(error.candidate());
         let found = by(&mut **second, near);
         self.effort += second.effort();
-        let mut orbit = found.map_err(|_| error.after(name))?;
-        orbit.evidence.instead_of = Some(self.chosen);
-        self.last = Some(orbit.start.clone());
+        let mut orbit = found.map_err(|_| error.with_failed_alternative(name))?;
+        orbit.evidence.fallback_from = Some(self.chosen);
+        self.last = Some(orbit.initial_state.clone());
         Ok(orbit)
     }
 }
@@ -210,7 +210,7 @@ fn misses(error: &OrbitError) -> bool {
             | OrbitError::Breakdown { .. }
             | OrbitError::Evidence { .. }
             | OrbitError::Truncation { .. }
-            | OrbitError::NoOrbit { course: Course::Settles | Course::Settling { .. }, .. }
+            | OrbitError::NoOrbit { observed: ObservedMotion::Settles | ObservedMotion::Settling { .. }, .. }
     )
 }
 
@@ -317,9 +317,9 @@ mod tests {
             let first = Box::new(Nothing);
             let mut solver = WithSecond { first, chosen, system: &system, second: None, last: None, effort: 0.0 };
             let orbit = solver.orbit(TAU * 121.0, None).unwrap();
-            let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.start)).unwrap();
+            let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.initial_state)).unwrap();
             assert_eq!((orbit.method, neighbour.method), (next, next));
-            assert_eq!(orbit.evidence.instead_of, Some(chosen));
+            assert_eq!(orbit.evidence.fallback_from, Some(chosen));
         }
     }
 

@@ -8,7 +8,7 @@ use super::followed::Kind;
 use super::incremental::flow::IncrementalFlow;
 use crate::law::Contact;
 use crate::model::{Axis, System};
-use crate::orbit::{Course, Path, Sample, Symmetry};
+use crate::orbit::{ObservedMotion, Path, Sample, Symmetry};
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -43,7 +43,7 @@ const MOVED: f64 = 2.0;
 const INSTANTS: usize = 128;
 
 /// A motion that was integrated: its behaviour, its last period, and its state at the end.
-type Followed = (Course, Arc<dyn Path>, Vec<f64>);
+type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
 
 /// Classifies the motion from a state and returns it with its last period and its last state.
 ///
@@ -79,7 +79,7 @@ pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option
         let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
         let samples: Vec<_> = (0..INSTANTS).map(|i| path.sample(period * i as f64 / INSTANTS as f64)).collect();
         let course = classified(system, omega, (count, returns.make_contiguous()), &samples);
-        let may_settle = matches!(course, Course::Settling { .. } | Course::Wanders { .. });
+        let may_settle = matches!(course, ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. });
         if !may_settle || 2 * next > MOST_PERIODS {
             return Some((course, path, state));
         }
@@ -87,7 +87,12 @@ pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option
     }
 }
 
-fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64>]), samples: &[Sample]) -> Course {
+fn classified(
+    system: &System,
+    omega: f64,
+    (periods, returns): (usize, &[Vec<f64>]),
+    samples: &[Sample],
+) -> ObservedMotion {
     let n = system.dofs();
     // displacements, and velocities over Ω
     let unit = |i: usize| if i < n { 1.0 } else { omega };
@@ -101,10 +106,10 @@ fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64
     };
     let apart = |p: usize| apart_at(last, p);
     if let Some(periods) = (1..=REPEATS).find(|p| apart(*p) <= SAME * swing) {
-        return if periods == 1 { Course::Settles } else { Course::Repeats { periods } };
+        return if periods == 1 { ObservedMotion::Settles } else { ObservedMotion::Repeats { periods } };
     }
     if apart(1) <= CALMS * apart_at(last / 2, 1) && apart_at(last / 2, 1) <= CALMS * apart_at(REPEATS + 1, 1) {
-        return Course::Settling { periods };
+        return ObservedMotion::Settling { periods };
     }
     let open = |j: usize| {
         samples.iter().filter(|now| now.joints[j].contact == Contact::Open).count() as f64 / samples.len() as f64
@@ -113,8 +118,9 @@ fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64
     let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
     let share = widest.1;
     // a drift has the same direction in both halves of the window
-    let moved = |axis: &Axis, from: usize, to: usize| axis.along(&returns[to][..n]) - axis.along(&returns[from][..n]);
-    let displacements = system.seen().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
+    let moved =
+        |axis: &Axis, from: usize, to: usize| axis.component(&returns[to][..n]) - axis.component(&returns[from][..n]);
+    let displacements = system.place_axes().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
     let farthest = displacements.map(|(axis, place)| {
         let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
         let steady =
@@ -124,9 +130,9 @@ fn classified(system: &System, omega: f64, (periods, returns): (usize, &[Vec<f64
     let farthest = farthest.fold((0.0, ""), |a, (way, place)| if way > a.0 { (way, place.as_str()) } else { a });
     if farthest.0 > MOVED * swing {
         let (way, place) = (farthest.0, farthest.1.to_owned());
-        return Course::MovesOn { place, way, periods: last, joint, share };
+        return ObservedMotion::Drifts { place, drift: way, periods: last, joint, open_fraction: share };
     }
-    Course::Wanders { periods, joint, share }
+    ObservedMotion::Irregular { periods, joint, open_fraction: share }
 }
 
 #[cfg(test)]
@@ -160,14 +166,16 @@ mod tests {
     /// the excess load.
     #[test]
     fn a_block_stays_slides_or_leaves() {
-        assert_eq!(course(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, Course::Settles);
+        assert_eq!(course(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
             let (course, ..) = course(&block(load), OMEGA, Vec::new()).unwrap();
-            let Course::MovesOn { ref place, way, periods, share, .. } = course else { panic!("{course}") };
+            let ObservedMotion::Drifts { ref place, drift, periods, open_fraction, .. } = course else {
+                panic!("{course}")
+            };
             assert_eq!(place, along);
             let expected = speed * periods as f64 * TAU / OMEGA;
-            assert!((way / expected - 1.0).abs() < 1e-3, "{way} {expected}");
-            assert_eq!(share, if along == "z" { 1.0 } else { 0.0 });
+            assert!((drift / expected - 1.0).abs() < 1e-3, "{drift} {expected}");
+            assert_eq!(open_fraction, if along == "z" { 1.0 } else { 0.0 });
             assert!(course.to_string().contains(&format!("`{along}`")), "{course}");
         }
     }
@@ -181,10 +189,10 @@ mod tests {
         let path = course(&system, OMEGA, Vec::new()).unwrap().1;
         let samples = [path.sample(0.0)];
         let third = classified(&system, OMEGA, (PERIODS, &returns(&|k| (k % 3) as f64)), &samples);
-        assert_eq!(third, Course::Repeats { periods: 3 });
+        assert_eq!(third, ObservedMotion::Repeats { periods: 3 });
         let slow = classified(&system, OMEGA, (PERIODS, &returns(&|k| (-0.02 * k as f64).exp())), &samples);
-        assert_eq!(slow, Course::Settling { periods: PERIODS });
+        assert_eq!(slow, ObservedMotion::Settling { periods: PERIODS });
         let none = classified(&system, OMEGA, (PERIODS, &returns(&|k| ((k * k) as f64).sin())), &samples);
-        assert!(matches!(none, Course::Wanders { periods: PERIODS, .. }), "{none}");
+        assert!(matches!(none, ObservedMotion::Irregular { periods: PERIODS, .. }), "{none}");
     }
 }

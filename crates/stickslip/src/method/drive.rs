@@ -30,7 +30,7 @@ impl Drive {
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
         harmonics.extend(system.axes().flat_map(|(_, axis)| axis.imposed()).map(|(h, _)| *h));
-        harmonics.extend(system.moved().iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
+        harmonics.extend(system.moved_places().iter().flat_map(|place| place.motion.iter().map(|(h, _)| *h)));
         harmonics.sort_unstable();
         harmonics.dedup();
         harmonics.retain(|&h| h > 0);

@@ -2,7 +2,7 @@
 
 use super::Ways;
 use crate::model::{System, SystemJoint};
-use crate::structure::MOST_IN_FULL;
+use crate::structure::MAX_FULL_DOFS;
 
 /// Error of a method that cannot take a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -114,7 +114,7 @@ impl MethodError {
     /// Returns the error that `method` needs more than joints at a place, if the system has a
     /// place with joints alone.
     pub(crate) fn empty(method: &'static str, system: &System) -> Option<Self> {
-        let mut empty: Vec<bool> = (0..system.dofs()).map(|row| system.structure().own_mass(row) == 0.0).collect();
+        let mut empty: Vec<bool> = (0..system.dofs()).map(|row| system.structure().diagonal_mass(row) == 0.0).collect();
         if !empty.contains(&true) {
             return None; // every place has mass
         }
@@ -126,7 +126,7 @@ impl MethodError {
     /// Returns the error that the full matrices of a system are too large for `method`, if they
     /// are.
     pub(crate) fn too_large(method: &'static str, system: &System) -> Option<Self> {
-        let (dofs, most) = (system.dofs(), MOST_IN_FULL);
+        let (dofs, most) = (system.dofs(), MAX_FULL_DOFS);
         (dofs > most).then(|| Refusal::TooLarge { method, dofs, most }.into())
     }
 

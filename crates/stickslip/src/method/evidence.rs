@@ -5,7 +5,7 @@
 //! therefore integrates the motion from the orbit's state at t = 0 over one return. Exact laws
 //! are integrated exactly, other laws implicitly. The return defect is the distance between the
 //! start and the end. The derivative of the return gives the stability where no theorem
-//! ([`System::contracts`]) proves it.
+//! ([`System::is_incrementally_stable`]) proves it.
 //!
 //! A travelling wave on a ring returns, rotated by some sectors, after a fraction of the
 //! period.
@@ -16,7 +16,7 @@ use super::followed::{self, Kind};
 use super::incremental::flow::IncrementalFlow;
 use super::periodic::{newton_step, norm};
 use super::vibration;
-use crate::model::{Cyclic, System};
+use crate::model::{CyclicSymmetry, System};
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -87,7 +87,7 @@ pub(crate) struct Judged {
 
 impl Judge {
     pub fn new(system: &System) -> Self {
-        let proven = system.contracts();
+        let proven = system.is_incrementally_stable();
         if system.dofs() > LARGEST || (proven && system.joints().len() > JOINTS) {
             return Judge { flow: None, proven };
         }
@@ -246,7 +246,7 @@ impl Return {
         let whole = Return { part: 1.0, share: 1.0, sign: 1.0, sectors: 1, turned: 0, times: 1 };
         match (symmetry, system.cyclic()) {
             (Symmetry::HalfPeriod, _) => Return { part: 0.5, sign: -1.0, ..whole },
-            (Symmetry::FullPeriod, Some(Cyclic { sectors, order })) if order > 0 => {
+            (Symmetry::FullPeriod, Some(CyclicSymmetry { sectors, order })) if order > 0 => {
                 // each sector repeats the motion of the first, `order/sectors` of a period
                 // earlier per sector
                 let (mut a, mut b) = (sectors, order);
@@ -419,13 +419,13 @@ mod tests {
             builder = builder.force(at(node, 0), 1, Complex64::from_polar(20.0, phase));
         }
         let whole = builder.build().unwrap();
-        let wave = whole.clone().travelling(Cyclic { sectors: nodes, order: waves }).unwrap();
+        let wave = whole.clone().with_cyclic_symmetry(CyclicSymmetry { sectors: nodes, order: waves }).unwrap();
         let omega = TAU * 55.0;
         let method = HarmonicBalance { harmonics: Some(15), samples: Some(1024), tolerance: Some(0.9) };
         let orbit = method.solver(&wave).unwrap().orbit(omega, None).unwrap();
         let judged = |system: &System| {
             let path = (orbit.path.as_ref(), Symmetry::FullPeriod);
-            Judge::new(system).judge(system, omega, path, &orbit.start, &[])
+            Judge::new(system).judge(system, omega, path, &orbit.initial_state, &[])
         };
         let (part, all) = (judged(&wave), judged(&whole));
         let largest = |judged: &Judged| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
@@ -454,10 +454,10 @@ mod tests {
         assert!(judge.proves());
         let mut defect =
             |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;
-        assert!(defect(&orbit.start).unwrap() < 1e-11);
-        let wrong: Vec<f64> = orbit.start.iter().map(|z| 1.5 * z).collect();
+        assert!(defect(&orbit.initial_state).unwrap() < 1e-11);
+        let wrong: Vec<f64> = orbit.initial_state.iter().map(|z| 1.5 * z).collect();
         // a transient decays by 1 % per return at a Q of some hundreds; friction adds to that
         assert!(defect(&wrong).unwrap() > 1e-3, "{:?}", defect(&wrong));
-        assert_eq!(defect(&orbit.start[..4]), None);
+        assert_eq!(defect(&orbit.initial_state[..4]), None);
     }
 }

@@ -1,6 +1,6 @@
 //! Event-driven motion as a [`Flow`].
 
-use super::Breakdown;
+use super::IntegrationError;
 use super::drive::Drive;
 use super::event_driven::{ExactPath, Mechanics, SegmentedMotion};
 use super::flow::Flow;
@@ -39,7 +39,7 @@ impl Flow for ExactFlow {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         self.segments.run(state, 0.0, duration, sensitivity)
     }
     fn strengthen(&mut self, joints: &[usize], factor: f64) {

@@ -3,7 +3,7 @@
 //!
 //! [`super::followed`] chooses the integration by the laws of a system.
 
-use super::Breakdown;
+use super::IntegrationError;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -32,10 +32,10 @@ pub(crate) trait Flow: Send {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown>;
+    ) -> Result<(), IntegrationError>;
     /// Integrates with an error that the flow controls, for a motion that is not closed to an
     /// orbit.
-    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), Breakdown> {
+    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
         self.run(state, duration, None)
     }
     /// Multiplies the slip limits of these joints by a factor, until a call with the inverse

@@ -87,7 +87,8 @@ mod tests {
     use super::*;
     use crate::dimension::Dimension;
     use crate::law::{
-        Coulomb, FrictionContact, Gap, Jenkins, Jenkins2d, Law, LawInfo, Parameter, Rate, RateLaw, Relative, StepLaw,
+        Coulomb, FrictionContact, Gap, Jenkins, Jenkins2d, Law, LawInfo, Parameter, RateLaw, RateView, RelativeMotion,
+        StepLaw,
     };
     use crate::method::harmonic_balance::{self, HarmonicBalance};
     use crate::method::shooting::Shooting;
@@ -141,13 +142,13 @@ mod tests {
         fn directions(&self) -> usize {
             if matches!(self, Sample::Relaxing) { 1 } else { 2 }
         }
-        fn scale(&self) -> f64 {
+        fn force_scale(&self) -> f64 {
             if matches!(self, Sample::Sliding) { SLIDING.1 } else { f64::INFINITY }
         }
-        fn rate(&self) -> Option<&dyn Rate> {
+        fn rate(&self) -> Option<&dyn RateView> {
             if matches!(self, Sample::Sliding) { None } else { Some(self) }
         }
-        fn step(&self) -> Option<&dyn crate::law::Step> {
+        fn step(&self) -> Option<&dyn crate::law::StepView> {
             if matches!(self, Sample::Sliding) { Some(self) } else { None }
         }
     }
@@ -156,7 +157,7 @@ mod tests {
         fn states(&self) -> usize {
             if matches!(self, Sample::Plane) { 0 } else { 2 }
         }
-        fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+        fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
             let ([u, w, _], [v, q, _], zero) = (motion.displacement, motion.velocity, S::from(0.0));
             match self {
                 Sample::Plane | Sample::Sliding => [u * 3.0 + v * 0.2, w * 3.0 + q * 0.2, zero],
@@ -313,9 +314,9 @@ mod tests {
         // loss in the joints: `π ω c |u|²` along each axis; the relaxing joints lose by their
         // loss stiffness
         let x = linear(omega, &parts);
-        let loss: f64 = parts.iter().map(|(k, axis)| TAU / 2.0 * k.im * axis.along_complex(&x).norm_sqr()).sum();
+        let loss: f64 = parts.iter().map(|(k, axis)| TAU / 2.0 * k.im * axis.complex_component(&x).norm_sqr()).sum();
         near(orbit.energy.friction, loss, 1e-7);
-        near(orbit.joints[0].displacement[1].1, axes[1].along_complex(&x).norm(), 1e-7);
+        near(orbit.joints[0].displacement[1].1, axes[1].complex_component(&x).norm(), 1e-7);
         // a slider behind a spring that never slips requires equal steps
         let held = Axis::new(vec![(0, 1.0)]);
         joints.push((Arc::new(Jenkins { stiffness: 4.0, limit: 100.0 }), vec![held.clone()]));
@@ -324,7 +325,7 @@ mod tests {
         assert_eq!(Kind::of(&mixed, None), Kind::Incremental);
         let orbit = shoot(&mixed, omega);
         let x = linear(omega, &parts);
-        let estimate = orbit.evidence.truncation.unwrap();
+        let estimate = orbit.evidence.error_estimate.unwrap();
         assert!(estimate <= 1e-5, "{estimate}");
         for (place, x) in orbit.places.iter().zip(x.iter()) {
             assert!(
@@ -340,7 +341,8 @@ mod tests {
     #[test]
     fn a_slider_led_round_a_circle_loses_what_it_must() {
         let a = 0.3;
-        let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| Axis::new(Vec::new()).moved([(1, g)]));
+        let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)]
+            .map(|g| Axis::new(Vec::new()).with_imposed_motion([(1, g)]));
         let nothing = DMatrix::zeros(0, 0);
         let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
         let system = System::builder(empty).joint("led", Arc::new(Sample::Sliding), circle.to_vec()).build().unwrap();
@@ -369,7 +371,8 @@ mod tests {
         for (law, (part, slips)) in laws.iter().flat_map(|law| [(0.99, 0.0), (1.01, 1.0)].map(|case| (law, case))) {
             let a = part * limit / stiffness;
             let still = Axis::new(Vec::new());
-            let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| still.clone().moved([(1, g)]));
+            let circle =
+                [Complex64::new(a, 0.0), Complex64::new(0.0, -a)].map(|g| still.clone().with_imposed_motion([(1, g)]));
             let axes = circle.into_iter().chain([still]).take(law.directions()).collect();
             let nothing = DMatrix::zeros(0, 0);
             let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
@@ -392,7 +395,7 @@ mod tests {
         // a law that carries no force and does not consist of sliders
         let idle: SharedLaw = Arc::new(Gap { gap: 1e3, stiffness: 1.0 });
         let orbit = shoot(&system(&[(jenkins, along(0)), (idle, along(1))]), 1.3);
-        let estimate = orbit.evidence.truncation.unwrap();
+        let estimate = orbit.evidence.error_estimate.unwrap();
         assert!(estimate > 0.0 && estimate <= 1e-5);
         for (a, b) in orbit.places.iter().zip(&exact.places) {
             near(a.amplitude(), b.amplitude(), 3.0 * estimate);
@@ -431,7 +434,7 @@ mod tests {
             let orbit = shoot(&system, omega);
             let expected = 1.0 / (1.5e4 - omega * omega).hypot(2.0 * omega);
             let error = (orbit.places[0].amplitude() / expected - 1.0).abs();
-            let estimate = orbit.evidence.truncation.unwrap();
+            let estimate = orbit.evidence.error_estimate.unwrap();
             assert!(error <= estimate && estimate <= 1e-5, "{frequency}: {error:e} {estimate:e}");
         }
     }
@@ -570,9 +573,9 @@ mod tests {
         for method in [&shooting as &dyn Method, &exact, &series] {
             let mut solver = method.solver(&system).unwrap();
             let first = solver.orbit(3.9, None).unwrap();
-            assert_eq!((first.repeats(), first.is_stable()), (1, Some(true)), "{}", method.name());
-            let orbit = solver.orbit(3.5, Some(&first.start)).unwrap();
-            assert_eq!((orbit.repeats(), orbit.is_stable()), (2, Some(true)), "{}", method.name());
+            assert_eq!((first.minimal_periods(), first.is_stable()), (1, Some(true)), "{}", method.name());
+            let orbit = solver.orbit(3.5, Some(&first.initial_state)).unwrap();
+            assert_eq!((orbit.minimal_periods(), orbit.is_stable()), (2, Some(true)), "{}", method.name());
             amplitudes.push(orbit.places[0].amplitude());
         }
         near(amplitudes[1], amplitudes[0], 1e-6);

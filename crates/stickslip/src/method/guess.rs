@@ -4,7 +4,7 @@
 //! A law of several directions uses its small-motion stiffness. Rigid friction in several
 //! directions uses the same complex stiffness along all of them.
 
-use crate::law::{Law, MOST_DIRECTIONS, RatePoint, Relative, StepPoint};
+use crate::law::{Law, MAX_DIRECTIONS, RatePoint, RelativeMotion, StepPoint};
 use crate::model::System;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -27,10 +27,10 @@ pub(crate) struct Guess {
 fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
     let d = law.directions();
     let along = match law.prox() {
-        _ if d == 1 => law.linearised(a, omega),
+        _ if d == 1 => law.describing_function(a, omega),
         None => return at_rest(law, omega),
         Some(prox) => {
-            let rigid = Complex64::new(0.0, 4.0 * law.scale() / (PI * a));
+            let rigid = Complex64::new(0.0, 4.0 * law.force_scale() / (PI * a));
             rigid / (1.0 + rigid * prox.compliance())
         }
     };
@@ -44,15 +44,20 @@ pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
     let zero = Complex64::new(0.0, 0.0);
     if let Some(step) = law.step() {
         let mut point = StepPoint::new(d, step.states());
-        let rest = [0.0; MOST_DIRECTIONS];
-        step.linearise(d, &rest, &rest, &vec![0.0; step.states()], &mut point);
+        let rest = [0.0; MAX_DIRECTIONS];
+        step.advance_with_derivatives(d, &rest, &rest, &vec![0.0; step.states()], &mut point);
         return DMatrix::from_fn(d, d, |a, b| Complex64::new(point.force_slope(a)[d + b], 0.0));
     }
     let Some(rate) = law.rate() else { return DMatrix::from_element(d, d, zero) };
     let states = rate.states();
     let mut point = RatePoint::new(d, states);
-    let rest = [0.0; MOST_DIRECTIONS];
-    rate.linearise(d, &Relative { displacement: rest, velocity: rest }, &vec![0.0; states], &mut point);
+    let rest = [0.0; MAX_DIRECTIONS];
+    rate.evaluate_with_derivatives(
+        d,
+        &RelativeMotion { displacement: rest, velocity: rest },
+        &vec![0.0; states],
+        &mut point,
+    );
     let s = Complex64::new(0.0, omega);
     let by_motion = |slope: &[f64], b: usize| s * slope[d + b] + slope[b];
     // `s z = g_u u + g_v s u + g_z z`
@@ -106,7 +111,7 @@ impl Guess {
                     .zip(&guess.harmonics)
                     .filter(|(h, _)| **h > 0)
                     .map(|(h, (_, x))| {
-                        let along = joint.axes().iter().map(|axis| axis.along_complex(x) + axis.imposed_at(*h));
+                        let along = joint.axes().iter().map(|axis| axis.complex_component(x) + axis.imposed_at(*h));
                         along.map(|u| u.norm_sqr()).sum::<f64>().sqrt()
                     })
                     .sum();
@@ -160,7 +165,7 @@ impl Guess {
         (h, x): (u32, &DVector<Complex64>),
     ) -> Complex64 {
         let axes = system.joints()[joint].axes().iter().enumerate();
-        axes.map(|(b, along)| self.joints[joint][(axis, b)] * (along.along_complex(x) + along.imposed_at(h))).sum()
+        axes.map(|(b, along)| self.joints[joint][(axis, b)] * (along.complex_component(x) + along.imposed_at(h))).sum()
     }
 
     /// Returns displacements and velocities at t = 0, length 2n.

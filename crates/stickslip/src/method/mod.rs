@@ -37,7 +37,7 @@ pub mod transient;
 mod vibration;
 mod ways;
 
-pub use crate::orbit::{Breakdown, OrbitError};
+pub use crate::orbit::{IntegrationError, OrbitError};
 pub use advice::{advised, ways};
 pub use error::{MethodError, Refusal};
 pub use evidence::evidence_steps;

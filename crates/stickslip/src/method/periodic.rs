@@ -6,7 +6,7 @@
 //! of the map a Newton step may fail. The solver then iterates the map itself, which lets the
 //! transient decay, and starts Newton's method again.
 
-use super::{Breakdown, OrbitError};
+use super::{IntegrationError, OrbitError};
 use crate::model::System;
 use crate::orbit::Symmetry;
 use nalgebra::{DMatrix, DVector};
@@ -17,7 +17,7 @@ use stickslip_numerics::eigen;
 pub(crate) trait ReturnMap {
     /// Replaces `state` by its return, and `derivative` by the derivative of the return by the
     /// state.
-    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown>;
+    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError>;
     /// Returns the weights of the energy norm, one per state.
     fn weights(&self) -> &[f64];
     /// Reports the relative change of the state in the last return; infinite before the first.
@@ -177,14 +177,14 @@ fn settle(
         map.returned(&mut state, None).map_err(broke)?;
         state.iter_mut().for_each(|z| *z *= aim.sign);
         if state.iter().any(|z| !z.is_finite()) {
-            return Err(broke(Breakdown::Unbounded { time: f64::INFINITY, place: None }));
+            return Err(broke(IntegrationError::Unbounded { time: f64::INFINITY, place: None }));
         }
         let change: Vec<f64> = state.iter().zip(&before).map(|(a, b)| a - b).collect();
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
         let residual = norm(map.weights(), &change) / size;
         if residual.is_nan() {
             // later returns have no size either
-            return Err(broke(Breakdown::OutOfRange { time: 0.0 }));
+            return Err(broke(IntegrationError::OutOfRange { time: 0.0 }));
         }
         if too_large(size, aim) {
             return Err(OrbitError::not_converged(aim.method, aim.omega, count, 1.0));
@@ -213,7 +213,7 @@ fn settle(
                     change: residual,
                     repeats,
                     needed: Some(count as f64 + needed).filter(|needed| needed.is_finite()),
-                    instead: String::new(),
+                    advice: String::new(),
                 });
             }
         }
@@ -326,7 +326,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
             map.returned(&mut state, None).map_err(broke)?;
             state.iter_mut().for_each(|z| *z *= aim.sign);
             if state.iter().any(|z| !z.is_finite()) {
-                return Err(broke(Breakdown::Unbounded { time: f64::INFINITY, place: None }));
+                return Err(broke(IntegrationError::Unbounded { time: f64::INFINITY, place: None }));
             }
         }
         returns = returns * 3 / 2;
@@ -419,7 +419,7 @@ pub(crate) fn descended(
         let before = norm(map.weights(), gap.as_slice());
         let residual = before / size;
         if residual.is_nan() {
-            return Err(broke(Breakdown::OutOfRange { time: 0.0 }));
+            return Err(broke(IntegrationError::OutOfRange { time: 0.0 }));
         }
         if too_large(size, aim) {
             return Err(OrbitError::not_converged(aim.method, aim.omega, *iterations, 1.0));
@@ -479,11 +479,11 @@ fn evaluate(
     state: &[f64],
     aim: Aim,
     derivative: &mut DMatrix<f64>,
-) -> Result<DVector<f64>, Breakdown> {
+) -> Result<DVector<f64>, IntegrationError> {
     let mut end = state.to_vec();
     map.returned(&mut end, Some(derivative))?;
     if end.iter().any(|z| !z.is_finite()) {
-        return Err(Breakdown::Unbounded { time: f64::INFINITY, place: None });
+        return Err(IntegrationError::Unbounded { time: f64::INFINITY, place: None });
     }
     Ok(DVector::from_iterator(state.len(), state.iter().zip(&end).map(|(z, e)| z - aim.sign * e)))
 }

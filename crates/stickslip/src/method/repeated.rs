@@ -19,7 +19,8 @@ impl<S: Solver> Solver for Afresh<S> {
         }
         // prefer, of two unstable orbits, the one of more periods; the motion is known to leave
         // the other
-        let better = |afresh: &Orbit| afresh.is_stable() == Some(true) || afresh.repeats() > near.repeats();
+        let better =
+            |afresh: &Orbit| afresh.is_stable() == Some(true) || afresh.minimal_periods() > near.minimal_periods();
         Ok(self.0.orbit(omega, None).ok().filter(better).unwrap_or(near))
     }
 

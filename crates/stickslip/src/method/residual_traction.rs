@@ -16,7 +16,7 @@ use super::OrbitError;
 use super::periodic::{Aim, Closed, ReturnMap, close};
 use super::static_equilibrium::StaticEquilibrium;
 use crate::model::System;
-use crate::orbit::{Breakdown, Orbit, Symmetry};
+use crate::orbit::{IntegrationError, Orbit, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::eigen;
 
@@ -73,7 +73,11 @@ struct Pinned<'m> {
 }
 
 impl ReturnMap for Pinned<'_> {
-    fn returned(&mut self, state: &mut [f64], mut derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
+    fn returned(
+        &mut self,
+        state: &mut [f64],
+        mut derivative: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), IntegrationError> {
         let forces: Vec<f64> = self.pins.iter().map(|pin| pin.force(state)).collect();
         self.map.returned(state, derivative.as_deref_mut())?;
         if let Some(derivative) = derivative.as_deref() {
@@ -117,7 +121,7 @@ pub(super) fn as_in_equilibrium(
     first: Orbit,
     aim: Aim,
 ) -> Orbit {
-    if first.symmetry == Symmetry::HalfPeriod || first.evidence.history.is_empty() {
+    if first.symmetry == Symmetry::HalfPeriod || first.evidence.history_dependent.is_empty() {
         return first;
     }
     let springs = map.springs();
@@ -146,12 +150,13 @@ fn iterate(
             .zip(&places)
             .map(|(slider, place)| {
                 let direction = system.joints()[slider.spring.joint].axes()[0].dense(system.dofs());
-                let imposed = slider.begin - direction.iter().zip(&orbit.start).map(|(w, x)| w * x).sum::<f64>();
+                let imposed =
+                    slider.begin - direction.iter().zip(&orbit.initial_state).map(|(w, x)| w * x).sum::<f64>();
                 Pin { spring: slider.spring, direction, place: place - imposed }
             })
             .collect();
-        let mut state = orbit.start.clone();
-        pins.iter().for_each(|pin| state[pin.spring.state] = pin.force(&orbit.start));
+        let mut state = orbit.initial_state.clone();
+        pins.iter().for_each(|pin| state[pin.spring.state] = pin.force(&orbit.initial_state));
         let mut limits = springs.to_vec();
         for spring in &mut limits {
             if pins.iter().any(|pin| pin.spring.state == spring.state) {
@@ -164,7 +169,7 @@ fn iterate(
         let closed = close(&mut pinned, &state, aim).ok()?;
         let derivative = pinned.own;
         let iterations = orbit.evidence.iterations + closed.iterations;
-        let missing = orbit.evidence.truncation;
+        let missing = orbit.evidence.error_estimate;
         orbit = map.finish(Closed { iterations, missing, derivative, ..closed }).ok()?;
     }
     None
@@ -190,7 +195,7 @@ impl Held {
 fn place(system: &System, equilibrium: Option<&StaticEquilibrium>, spring: &ElasticSlider) -> f64 {
     let Some(known) = equilibrium else { return 0.0 };
     let axis = &system.joints()[spring.joint].axes()[0];
-    let displacement = axis.along(known.displacement()) + axis.imposed_at(0).re;
+    let displacement = axis.component(known.displacement()) + axis.imposed_at(0).re;
     let force = known.joint_states().get(spring.state - 2 * system.dofs()).copied().unwrap_or(0.0);
     displacement - force / spring.stiffness
 }
@@ -209,7 +214,7 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<He
             // rounding makes a slider slip that is exactly at its limit
             let reach = (reach * (1.0 - 2.0 * RELAXED)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
-            let is = begin - orbit.start[spring.state] / spring.stiffness;
+            let is = begin - orbit.initial_state[spring.state] / spring.stiffness;
             Some(Held { spring, begin, is, ought: place.max(high - reach).min(low + reach) })
         })
         .collect()

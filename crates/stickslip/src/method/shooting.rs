@@ -19,11 +19,11 @@ use super::smooth::flow::{Lengths, SmoothFlow};
 use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::stepped::SteppedPath;
 use super::switched::flow::SwitchedFlow;
-use super::{Breakdown, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
+use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
 use crate::dimension::Dimension;
 use crate::model::System;
-use crate::orbit::measure::{NO_WORK, measure};
-use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history};
+use crate::orbit::postprocess::{CONSERVATIVE_WORK, results};
+use crate::orbit::{Accuracy, Evidence, Orbit, Path, Symmetry, history_dependent_joints};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -201,7 +201,7 @@ pub(super) struct Shooter<'a> {
 }
 
 impl ReturnMap for Shooter<'_> {
-    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
+    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         let duration = self.duration;
         self.stepping.flow().run(state, duration, derivative)
     }
@@ -263,7 +263,7 @@ impl<'a> Shooter<'a> {
             duration: 0.0,
             rest: 0.0,
             // the smoothed laws are passive if the exact laws are
-            contracts: system.contracts(),
+            contracts: system.is_incrementally_stable(),
             equilibrium: StaticEquilibrium::under_load(system),
         })
     }
@@ -290,10 +290,15 @@ impl<'a> Shooter<'a> {
     /// Returns the size of the vibration over the size of the state at t = 0; both are at least
     /// `rest` (√J).
     fn share_in(&self, orbit: &Orbit, rest: f64) -> f64 {
-        vibration::share(orbit.path.as_ref(), (orbit.symmetry, orbit.period()), &orbit.start, (&self.weights, rest))
+        vibration::share(
+            orbit.path.as_ref(),
+            (orbit.symmetry, orbit.period()),
+            &orbit.initial_state,
+            (&self.weights, rest),
+        )
     }
 
-    fn broke(&self, omega: f64) -> impl Fn(Breakdown) -> OrbitError {
+    fn broke(&self, omega: f64) -> impl Fn(IntegrationError) -> OrbitError {
         let method = self.name;
         move |cause| OrbitError::Breakdown { method, omega, cause }
     }
@@ -301,7 +306,7 @@ impl<'a> Shooter<'a> {
     /// Returns the error that the vibration is too small a fraction of its state to have
     /// accurate digits.
     fn lost(&self, omega: f64, share: f64) -> OrbitError {
-        self.broke(omega)(Breakdown::Offset { share })
+        self.broke(omega)(IntegrationError::Offset { share })
     }
 
     /// Finds the orbit of the stiff integration: a search, steps with the derivative of the
@@ -478,7 +483,8 @@ impl<'a> Shooter<'a> {
         let mut coarse = loop {
             match search.find(self, start, |shooter| shooter.first_state(aim.omega), aim) {
                 Err(OrbitError::Breakdown {
-                    cause: Breakdown::Stalled { .. } | Breakdown::NoNumber { .. }, ..
+                    cause: IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. },
+                    ..
                 }) if count < MOST => {
                     count *= 2;
                     self.set_count(count);
@@ -505,7 +511,7 @@ impl<'a> Shooter<'a> {
                 return Ok(Closed { iterations, missing, ..fine });
             }
             if count >= MOST {
-                let cause = Breakdown::Unresolved { steps: count, estimate: error, tolerance };
+                let cause = IntegrationError::Unresolved { steps: count, estimate: error, tolerance };
                 return Err(OrbitError::Breakdown { method: self.name, omega: aim.omega, cause });
             }
             (earlier, motion, coarse) = (Some(last), finer, Closed { iterations, ..fine });
@@ -548,7 +554,7 @@ impl<'a> Shooter<'a> {
     fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
-        let Ok(measured) = measure(self.system, &path, omega, (symmetry, period));
+        let Ok(measured) = results(self.system, &path, omega, (symmetry, period));
         let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
         // a joint may stick right up to its limit. Its derivative is then that of an instant of
         // slip, which does not hold for nearby motions that stick
@@ -556,27 +562,27 @@ impl<'a> Shooter<'a> {
             measured.joints.iter().any(|joint| joint.slip_fraction > 0.0 && measured.stuck.contains(&joint.name));
         // the residual of the closed state may do work on a vibration as small as rest
         let left = CLOSED * norm(&self.weights, &closed.state) * self.rest;
-        let least = f64::max(NO_WORK * self.rest * self.rest, left / ENERGY_GAP);
+        let least = f64::max(CONSERVATIVE_WORK * self.rest * self.rest, left / ENERGY_GAP);
         Orbit {
             method: self.name,
             omega,
             periods: self.periods,
             symmetry,
-            start: closed.state,
+            initial_state: closed.state,
             evidence: Evidence {
                 residual: closed.residual,
                 energy_gap: measured.energy_gap(least),
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
                 harmonics: None,
-                truncation: closed.missing,
+                error_estimate: closed.missing,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),
-                history: history(laws, &measured.joints, &measured.stuck, symmetry),
+                history_dependent: history_dependent_joints(laws, &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
                 history_spread: None,
                 found_by: self.name,
-                instead_of: None,
+                fallback_from: None,
             },
             places: measured.places,
             joints: measured.joints,
@@ -629,7 +635,7 @@ impl Solver for Shooter<'_> {
         while let Some(share) = vibration::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))? {
             self.set_share(share);
             // an orbit accurate as a state but not as a vibration has too few digits
-            orbit = self.found(Some(&orbit.start), symmetry, aim).map_err(|_| self.lost(omega, share))?;
+            orbit = self.found(Some(&orbit.initial_state), symmetry, aim).map_err(|_| self.lost(omega, share))?;
         }
         if self.search == Search::Newton {
             let system = self.system;
@@ -639,7 +645,7 @@ impl Solver for Shooter<'_> {
         }
         let share = self.share_in(&orbit, rest);
         vibration::relate(&mut orbit.evidence, share);
-        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
+        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             if share < vibration::SMALL {
                 return Err(self.lost(omega, share));

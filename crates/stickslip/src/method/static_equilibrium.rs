@@ -10,7 +10,7 @@
 
 use super::harmonic_balance;
 use super::incremental::law;
-use crate::law::{Law, MOST_DIRECTIONS, Piece, Relative};
+use crate::law::{IdealElement, Law, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
@@ -62,33 +62,34 @@ impl StaticEquilibrium {
 
     /// Returns the displacements of all degrees of freedom, m.
     pub fn displacement(&self) -> &[f64] {
-        &self.orbit.start[..self.dofs]
+        &self.orbit.initial_state[..self.dofs]
     }
 
     /// Returns the forces of each joint along its directions, N.
-    pub fn forces(&self) -> Vec<[f64; MOST_DIRECTIONS]> {
+    pub fn forces(&self) -> Vec<[f64; MAX_DIRECTIONS]> {
         self.orbit.sample(0.0).joints.iter().map(|joint| joint.force).collect()
     }
 
     /// Returns the internal states of all joints, in the order of the joints.
     pub fn joint_states(&self) -> &[f64] {
-        &self.orbit.start[2 * self.dofs..]
+        &self.orbit.initial_state[2 * self.dofs..]
     }
 }
 
 /// Returns true if a law has a force before its joint moves.
 fn is_preloaded(law: &dyn Law) -> bool {
-    let rest = [0.0; MOST_DIRECTIONS];
+    let rest = [0.0; MAX_DIRECTIONS];
     let force = match (law.step(), law.rate()) {
-        (Some(step), _) => step.value(&rest, &rest, &mut vec![0.0; step.states()]),
+        (Some(step), _) => step.advance_values(&rest, &rest, &mut vec![0.0; step.states()]),
         (None, Some(rate)) => {
             let mut z = vec![0.0; rate.states()];
-            rate.value(&Relative { displacement: rest, velocity: rest }, &z.clone(), &mut z)
+            rate.evaluate_values(&RelativeMotion { displacement: rest, velocity: rest }, &z.clone(), &mut z)
         }
         (None, None) => rest,
     };
-    let pressed = |piece: &Piece| matches!(piece, Piece::Stop { gap, stiffness } if *gap < 0.0 && *stiffness > 0.0);
-    force != rest || law.pieces().is_some_and(|pieces| pieces.iter().any(pressed))
+    let pressed =
+        |piece: &IdealElement| matches!(piece, IdealElement::Stop { gap, stiffness } if *gap < 0.0 && *stiffness > 0.0);
+    force != rest || law.ideal_elements().is_some_and(|pieces| pieces.iter().any(pressed))
 }
 
 /// Returns the internal states of all joints at other displacements (m), after a straight and
@@ -109,11 +110,11 @@ pub(crate) fn states_at(
     for joint in system.joints() {
         let axes = joint.axes();
         let Some((own, scale)) = law::states(joint.law()) else { continue };
-        let along = |x: &[f64], vibrates: bool| -> [f64; MOST_DIRECTIONS] {
+        let along = |x: &[f64], vibrates: bool| -> [f64; MAX_DIRECTIONS] {
             std::array::from_fn(|a| {
                 let Some(axis) = axes.get(a) else { return 0.0 };
                 let imposed = axis.imposed().iter().filter(|(h, _)| vibrates || *h == 0).map(|(_, g)| g.re);
-                axis.along(x) + imposed.sum::<f64>()
+                axis.component(x) + imposed.sum::<f64>()
             })
         };
         let from = along(equilibrium.displacement(), false);

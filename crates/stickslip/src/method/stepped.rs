@@ -3,9 +3,9 @@
 use super::assembly::{Assembly, PlacedLaw};
 use super::drive::Drive;
 use super::steps::{Instant, Steps};
-use crate::law::{Contact, MOST_DIRECTIONS, Relative};
+use crate::law::{Contact, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::{Axis, System};
-use crate::orbit::measure::{Faces, Shares, Signals, extremes, sticks};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -59,8 +59,8 @@ impl SteppedPath {
         let end = |instant: Instant, time: f64| {
             let (g, speed) = self.drive.relative_at(axis, time);
             let along = &self.assembly.axes[axis];
-            let acceleration = along.along(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
-            [along.along(instant.displacement) + g, along.along(instant.velocity) + speed, acceleration]
+            let acceleration = along.component(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
+            [along.component(instant.displacement) + g, along.component(instant.velocity) + speed, acceleration]
         };
         let [from, to] = self.steps.ends(step);
         [end(from, start), end(to, start + length)]
@@ -97,14 +97,19 @@ impl SteppedPath {
     }
 
     /// Returns the forces of a joint at `s` in [0, 1] of a step with the given relative motion.
-    fn forces(&self, joint: &PlacedLaw, (step, s): (usize, f64), motion: &Relative<f64>) -> [f64; MOST_DIRECTIONS] {
+    fn forces(
+        &self,
+        joint: &PlacedLaw,
+        (step, s): (usize, f64),
+        motion: &RelativeMotion<f64>,
+    ) -> [f64; MAX_DIRECTIONS] {
         if let Some(rate) = joint.law.rate().filter(|_| joint.states == 0 && self.steps.nodes.len() > 1) {
-            return rate.value(motion, &[], &mut []);
+            return rate.evaluate_values(motion, &[], &mut []);
         }
-        let mut force = [0.0; MOST_DIRECTIONS];
+        let mut force = [0.0; MAX_DIRECTIONS];
         // a limit bounds the force along one direction; along several it bounds at most their
         // norm
-        let scale = if joint.directions == 1 { joint.law.scale() } else { f64::INFINITY };
+        let scale = if joint.directions == 1 { joint.law.force_scale() } else { f64::INFINITY };
         joint.axes().enumerate().for_each(|(d, axis)| force[d] = self.force_between(step, axis, s, scale));
         force
     }
@@ -115,13 +120,13 @@ impl SteppedPath {
             return self.steps.contact_at_end(step)[joint];
         }
         let (joint, length) = (&self.assembly.joints[joint], self.steps.spans[step].1);
-        let mut motion = Relative::along(0.0, 0.0);
+        let mut motion = RelativeMotion::along(0.0, 0.0);
         for (d, axis) in joint.axes().enumerate() {
             let [from, to] = self.relative_ends(step, axis);
             (motion.displacement[d], motion.velocity[d], _) = quintic(s, length, from, to);
         }
         let force = self.forces(joint, (step, s), &motion);
-        joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
+        joint.law.contact_state(&motion.velocity[..joint.directions], &force[..joint.directions])
     }
 
     /// Returns the first `s` in [0, 1], at most `to`, at which a joint leaves the contact state
@@ -154,7 +159,7 @@ impl SteppedPath {
     fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
         let sample = |(q, joint): (usize, &PlacedLaw)| {
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
@@ -163,7 +168,7 @@ impl SteppedPath {
                 values.iter_mut().for_each(|value| *value *= sign);
             }
             let contact = if count > 1 && !self.steps.jumps {
-                joint.law.contact(&motion.velocity[..joint.directions], &force[..joint.directions])
+                joint.law.contact_state(&motion.velocity[..joint.directions], &force[..joint.directions])
             } else {
                 let contact = self.steps.contact_at_end(step)[q];
                 if sign < 0.0 { contact.mirrored() } else { contact }
@@ -205,11 +210,11 @@ impl Path for SteppedPath {
             velocity: signed(v),
             acceleration: signed(&acceleration),
             joints,
-            moved: moved.into_iter().map(|(motion, force)| (sign * motion, sign * force)).collect(),
+            imposed: moved.into_iter().map(|(motion, force)| (sign * motion, sign * force)).collect(),
         }
     }
 
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         let mut times: Vec<f64> = (1..self.steps.spans.len())
             .filter(|&step| self.steps.contact_at_end(step - 1) != self.steps.contact_at_end(step))
             .map(|step| self.steps.spans[step].0)
@@ -225,7 +230,7 @@ impl Path for SteppedPath {
 /// Returns the displacements of the moved places at one instant and the forces that move them.
 fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64]; 4]) -> Vec<(f64, f64)> {
     let motion: Vec<[f64; 3]> = system
-        .moved()
+        .moved_places()
         .iter()
         .map(|place| {
             place.motion.iter().fold([0.0; 3], |sum, &(h, amplitude)| {
@@ -248,11 +253,11 @@ fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64];
         }
         (motion[m][0], force + place.joints.iter().zip(forces).map(|(sign, f)| sign * f).sum::<f64>())
     };
-    system.moved().iter().enumerate().map(reaction).collect()
+    system.moved_places().iter().enumerate().map(reaction).collect()
 }
 
 /// A signal is the list of its values at the nodes.
-impl Signals for SteppedPath {
+impl PathSignals for SteppedPath {
     type Signal = Vec<f64>;
     type Error = Infallible;
 
@@ -286,17 +291,17 @@ impl Signals for SteppedPath {
         signal.iter().enumerate().map(term).sum()
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(|step| self.ends(step, |values| place.along(values))))
+        Ok(self.range_of(|step| self.ends(step, |values| place.component(values))))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(|step| self.relative_ends(step, axis)))
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let shares = if self.steps.nodes.len() > 1 {
-            Shares::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
+            ContactFractions::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
         } else {
             let nodes = self.steps.each().enumerate();
-            Shares::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.time(i).1)))
+            ContactFractions::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.time(i).1)))
         };
         let at_end = |step: usize| self.steps.contact_at_end(step)[joint];
         let steps = self.steps.spans.len();
@@ -306,6 +311,10 @@ impl Signals for SteppedPath {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        Faces { shares, switches, rests: sticks(self.steps.each().map(|node| node.contact[joint])) }
+        ContactSummary {
+            shares,
+            switches,
+            sticks_throughout: sticks(self.steps.each().map(|node| node.contact[joint])),
+        }
     }
 }

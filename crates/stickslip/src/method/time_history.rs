@@ -6,7 +6,7 @@
 //! in a stepped-sine test.
 
 use super::flow::Flow;
-use super::{Breakdown, MethodError, followed, ways};
+use super::{IntegrationError, MethodError, followed, ways};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;
@@ -70,7 +70,7 @@ pub enum TimeHistoryError {
         /// Time of the last valid sample, s; `None` if the motion breaks down before the first.
         last: Option<f64>,
         /// The cause, with its time.
-        cause: Breakdown,
+        cause: IntegrationError,
     },
 }
 
@@ -200,7 +200,7 @@ impl TimeHistory {
             }
             followed.map_err(|cause| TimeHistoryError::Breakdown {
                 last: next.checked_sub(1).map(|last| last as f64 * self.step),
-                cause: cause.later(begin),
+                cause: cause.shifted(begin),
             })?;
             begin = end;
         }
@@ -216,7 +216,7 @@ impl TimeHistory {
         system: &Arc<System>,
         start: &[f64],
         (begin, first, mut last): (f64, usize, usize),
-        cause: &Breakdown,
+        cause: &IntegrationError,
     ) -> Option<Stretch> {
         let since = |sample: usize| sample as f64 * self.step - begin;
         let mut cause = cause.clone();
@@ -357,7 +357,8 @@ mod tests {
             count += 1;
             true
         });
-        let Err(TimeHistoryError::Breakdown { last: Some(last), cause: Breakdown::Unbounded { time, place } }) = run
+        let Err(TimeHistoryError::Breakdown { last: Some(last), cause: IntegrationError::Unbounded { time, place } }) =
+            run
         else {
             panic!("{run:?}")
         };
@@ -410,7 +411,8 @@ mod tests {
             (run, samples)
         };
         let (run, found) = samples(&motion);
-        let Err(TimeHistoryError::Breakdown { last: Some(last), cause: Breakdown::Redundant { time, .. } }) = run
+        let Err(TimeHistoryError::Breakdown { last: Some(last), cause: IntegrationError::Redundant { time, .. } }) =
+            run
         else {
             panic!("{run:?}")
         };

@@ -5,7 +5,7 @@
 //! Tolerances and reported errors are relative to the vibration. A search on states receives
 //! tolerances multiplied by this fraction.
 
-use super::Breakdown;
+use super::IntegrationError;
 use super::periodic::norm;
 use crate::orbit::{Evidence, Path, Symmetry};
 
@@ -54,10 +54,10 @@ pub(super) fn share(
 ///
 /// # Errors
 /// Fails if the vibration has too few digits of its state.
-pub(super) fn next(taken: f64, found: f64) -> Result<Option<f64>, Breakdown> {
+pub(super) fn next(taken: f64, found: f64) -> Result<Option<f64>, IntegrationError> {
     match taken <= NEARLY * found {
         true => Ok(None),
-        false if found < LEAST => Err(Breakdown::Offset { share: found }),
+        false if found < LEAST => Err(IntegrationError::Offset { share: found }),
         false => Ok(Some(found)),
     }
 }
@@ -65,7 +65,7 @@ pub(super) fn next(taken: f64, found: f64) -> Result<Option<f64>, Breakdown> {
 /// Converts evidence relative to the state into evidence relative to the vibration.
 pub(super) fn relate(evidence: &mut Evidence, share: f64) {
     evidence.residual /= share;
-    for relative in [&mut evidence.truncation, &mut evidence.return_defect] {
+    for relative in [&mut evidence.error_estimate, &mut evidence.return_defect] {
         *relative = relative.map(|of_state| of_state / share);
     }
 }
@@ -130,7 +130,7 @@ mod tests {
             let amplitude = |method: &dyn Method, system: &System| {
                 let orbit = method.solver(system).unwrap().orbit(omega, None).unwrap();
                 assert!(orbit.evidence.residual < 1e-6, "{:?}", orbit.evidence);
-                assert!(orbit.evidence.truncation.unwrap_or(0.0) < 2e-5, "{:?}", orbit.evidence);
+                assert!(orbit.evidence.error_estimate.unwrap_or(0.0) < 2e-5, "{:?}", orbit.evidence);
                 assert!(orbit.evidence.return_defect.unwrap() < 1e-6, "{:?}", orbit.evidence);
                 orbit.places[0].amplitude()
             };

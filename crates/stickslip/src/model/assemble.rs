@@ -1,14 +1,14 @@
 //! Assembles a system from a model: checks, and the matrices of
 //! `M x'' + C x' + K x + Σ W f = F(t)`.
 
-use super::coordinates::{Coordinates, combined};
+use super::coordinates::{Coordinates, merge_duplicates};
 use super::error::{Element, ModelError};
+use super::name_resolution::{PlaceSource, PlaceTarget, Places};
 use super::place::places_of;
-use super::places::{End, Of, Places};
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::reduction::Row;
-use crate::structure::{DampedModes, Structure};
+use crate::structure::{ModalDamping, Structure};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
@@ -81,23 +81,24 @@ impl Model {
         let matrices = assembler.matrices()?;
         let motions = assembler.motions()?;
         let builder = System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
-        let builder = builder.earlier(self.substructure.as_ref().and_then(|substructure| substructure.earlier));
-        let (builder, forces) = assembler.forces(assembler.seen(builder))?;
+        let builder =
+            builder.earlier(self.substructure.as_ref().and_then(|substructure| substructure.earlier_reduction));
+        let (builder, forces) = assembler.forces(assembler.add_places(builder))?;
         let builder = assembler.loads_of_motions(builder, &matrices, &motions);
         let (builder, signs) = assembler.joints(builder, &motions)?;
         let builder = assembler.moved(builder, &matrices, (&motions, &forces), &signs);
-        let system = builder.build().map_err(|error| whole(&error))?;
+        let system = builder.build().map_err(|error| model_error(&error))?;
         // a ring that was edited after its creation can lack the symmetry; then the whole ring
         // is solved
         Ok(match self.ring.and_then(Ring::wave) {
-            Some(wave) => system.clone().travelling(wave).unwrap_or(system),
+            Some(wave) => system.clone().with_cyclic_symmetry(wave).unwrap_or(system),
             None => system,
         })
     }
 }
 
 /// Converts an error of the whole structure.
-pub(super) fn whole(error: &dyn fmt::Display) -> ModelError {
+pub(super) fn model_error(error: &dyn fmt::Display) -> ModelError {
     ModelError::new(Element::Whole, "mass", error.to_string())
 }
 
@@ -109,15 +110,15 @@ struct Assembler<'a> {
 }
 
 /// Matrices over the free coordinates, followed by the moved coordinates.
-struct Matrices {
+struct AssembledMatrices {
     mass: SparseMatrix,
     damping: SparseMatrix,
     /// Damped modes, in addition to `damping`.
-    modes: Option<DampedModes>,
+    modes: Option<ModalDamping>,
     stiffness: SparseMatrix,
 }
 
-impl Matrices {
+impl AssembledMatrices {
     /// Returns an entry of the total damping.
     fn damping(&self, row: usize, column: usize) -> f64 {
         self.damping.get(row, column) + self.modes.as_ref().map_or(0.0, |modes| modes.get(row, column))
@@ -125,26 +126,31 @@ impl Matrices {
 }
 
 /// Amplitudes of an imposed motion by harmonic.
-type Harmonics = BTreeMap<u32, Complex64>;
+type HarmonicAmplitudes = BTreeMap<u32, Complex64>;
 
 impl Assembler<'_> {
     /// Returns the sum of places with the given signs, as weights of the free and then the
     /// moved coordinates.
-    fn along(&self, ends: &[(End, f64)]) -> Row {
+    fn row_of(&self, ends: &[(PlaceTarget, f64)]) -> Row {
         let parts = ends.iter().flat_map(|(end, sign)| {
             let row: &[(usize, f64)] = match end {
-                End::Ground => &[],
-                End::At(place) => &self.coordinates.places[*place],
+                PlaceTarget::Ground => &[],
+                PlaceTarget::At(place) => &self.coordinates.places[*place],
             };
             row.iter().map(move |(at, weight)| (*at, weight * sign))
         });
-        combined(parts.collect())
+        merge_duplicates(parts.collect())
     }
 
     /// Checks that a spring connects two rotations or two displacements.
-    fn alike(&self, between: &[String; 2], ends: [End; 2], element: Element) -> Result<(), ModelError> {
+    fn check_same_kind(
+        &self,
+        between: &[String; 2],
+        ends: [PlaceTarget; 2],
+        element: Element,
+    ) -> Result<(), ModelError> {
         let turns = ends.map(|end| self.places.is_rotation(end));
-        if turns[0] == turns[1] || ends.contains(&End::Ground) {
+        if turns[0] == turns[1] || ends.contains(&PlaceTarget::Ground) {
             return Ok(());
         }
         let (angle, other) = if turns[0] { (&between[0], &between[1]) } else { (&between[1], &between[0]) };
@@ -155,14 +161,14 @@ impl Assembler<'_> {
         Err(ModelError::new(element, "between", message))
     }
 
-    fn matrices(&self) -> Result<Matrices, ModelError> {
+    fn matrices(&self) -> Result<AssembledMatrices, ModelError> {
         let total = self.coordinates.free + self.coordinates.moved;
         for (i, mass) in self.model.masses.iter().enumerate() {
             finite_at_least_zero(mass.mass, Element::Mass(i), "mass", "kg")?;
         }
         let [mut mass, mut damping, mut stiffness] = self.coordinates.entries.clone();
         for (place, row) in self.places.stated.iter().zip(&self.coordinates.places) {
-            if let Of::Own(own) = place.of {
+            if let PlaceSource::Own(own) = place.of {
                 add_along(&mut mass, row, own);
             }
         }
@@ -175,48 +181,50 @@ impl Assembler<'_> {
             }
             let a = self.places.find(&spring.between[0], element, "between")?;
             let b = self.places.find(&spring.between[1], element, "between")?;
-            differ(&spring.between, element)?;
-            self.alike(&spring.between, [a, b], element)?;
-            let along = self.along(&[(a, 1.0), (b, -1.0)]);
+            check_distinct(&spring.between, element)?;
+            self.check_same_kind(&spring.between, [a, b], element)?;
+            let along = self.row_of(&[(a, 1.0), (b, -1.0)]);
             add_along(&mut stiffness, &along, spring.stiffness);
             add_along(&mut damping, &along, spring.damping);
         }
-        let sum = |entries| SparseMatrix::from_triplets(total, entries).map_err(|error| whole(&error));
+        let sum = |entries| SparseMatrix::from_triplets(total, entries).map_err(|error| model_error(&error));
         let modes = self.coordinates.modes.clone();
-        Ok(Matrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
+        Ok(AssembledMatrices { mass: sum(mass)?, damping: sum(damping)?, modes, stiffness: sum(stiffness)? })
     }
 
     /// Returns the structure of the free coordinates.
-    fn structure(&self, matrices: &Matrices) -> Result<Structure, ModelError> {
+    fn structure(&self, matrices: &AssembledMatrices) -> Result<Structure, ModelError> {
         let Coordinates { free: n, moved, names, .. } = &self.coordinates;
         let block = |matrix: &SparseMatrix| {
             if *moved == 0 {
                 return Ok(matrix.clone());
             }
             let free = matrix.entries().filter(|(row, column, _)| row < n && column < n);
-            SparseMatrix::from_triplets(*n, free).map_err(|error| whole(&error))
+            SparseMatrix::from_triplets(*n, free).map_err(|error| model_error(&error))
         };
         let (mass, damping) = (block(&matrices.mass)?, block(&matrices.damping)?);
         let structure = Structure::sparse(names.clone(), mass, damping, block(&matrices.stiffness)?);
-        let structure = structure.map_err(|error| whole(&error))?;
+        let structure = structure.map_err(|error| model_error(&error))?;
         Ok(match &matrices.modes {
             None => structure,
             Some(modes) if *moved == 0 => structure.with_damped_modes(modes),
             Some(modes) => {
                 let free: Vec<f64> = modes.iter().flat_map(|column| &column[..*n]).copied().collect();
-                structure.with_damped_modes(&DampedModes::new(*n, Arc::new(free)))
+                structure.with_damped_modes(&ModalDamping::new(*n, Arc::new(free)))
             }
         })
     }
 
     /// Adds the places of results: those without imposed motion.
-    fn seen(&self, mut builder: SystemBuilder) -> SystemBuilder {
-        let unseen = &self.coordinates.unseen;
-        for ((place, row), unseen) in self.places.stated.iter().zip(&self.coordinates.places).zip(unseen) {
-            if !place.moved && !unseen {
+    fn add_places(&self, mut builder: SystemBuilder) -> SystemBuilder {
+        let without_results = &self.coordinates.without_results;
+        for ((place, row), without_results) in
+            self.places.stated.iter().zip(&self.coordinates.places).zip(without_results)
+        {
+            if !place.moved && !without_results {
                 let axis = self.axis(row).0;
                 let axis = match place.radius {
-                    Some(radius) => axis.rotation(radius),
+                    Some(radius) => axis.as_rotation(radius),
                     None => axis,
                 };
                 builder = builder.place(place.name.clone(), axis);
@@ -234,12 +242,12 @@ impl Assembler<'_> {
     }
 
     /// Returns the motion of every moved place.
-    fn motions(&self) -> Result<Vec<Harmonics>, ModelError> {
-        let mut motions = vec![Harmonics::new(); self.coordinates.moved];
+    fn motions(&self) -> Result<Vec<HarmonicAmplitudes>, ModelError> {
+        let mut motions = vec![HarmonicAmplitudes::new(); self.coordinates.moved];
         for (i, motion) in self.model.motions.iter().enumerate() {
             let element = Element::Motion(i);
             let value = harmonic_amplitude(motion.amplitude, motion.phase, element)?;
-            if let End::At(place) = self.places.find(&motion.on, element, "on")?
+            if let PlaceTarget::At(place) = self.places.find(&motion.on, element, "on")?
                 && let Some(k) = self.coordinates.moved_number(&self.places, place)
             {
                 *motions[k].entry(motion.harmonic).or_default() += value;
@@ -249,12 +257,12 @@ impl Assembler<'_> {
     }
 
     /// Adds the forces on free coordinates and returns those on moved coordinates.
-    fn forces(&self, mut builder: SystemBuilder) -> Result<(SystemBuilder, Vec<Harmonics>), ModelError> {
-        let mut on_moved = vec![Harmonics::new(); self.coordinates.moved];
+    fn forces(&self, mut builder: SystemBuilder) -> Result<(SystemBuilder, Vec<HarmonicAmplitudes>), ModelError> {
+        let mut on_moved = vec![HarmonicAmplitudes::new(); self.coordinates.moved];
         for (i, force) in self.model.forces.iter().enumerate() {
             let element = Element::Force(i);
             let value = harmonic_amplitude(force.amplitude, force.phase, element)?;
-            let End::At(place) = self.places.find(&force.on, element, "on")? else {
+            let PlaceTarget::At(place) = self.places.find(&force.on, element, "on")? else {
                 return Err(ModelError::new(
                     element,
                     "on",
@@ -284,8 +292,8 @@ impl Assembler<'_> {
     fn loads_of_motions(
         &self,
         mut builder: SystemBuilder,
-        matrices: &Matrices,
-        motions: &[Harmonics],
+        matrices: &AssembledMatrices,
+        motions: &[HarmonicAmplitudes],
     ) -> SystemBuilder {
         let (n, zero) = (self.coordinates.free, Complex64::new(0.0, 0.0));
         for (k, motion) in motions.iter().enumerate() {
@@ -309,18 +317,18 @@ impl Assembler<'_> {
     fn joints(
         &self,
         mut builder: SystemBuilder,
-        motions: &[Harmonics],
+        motions: &[HarmonicAmplitudes],
     ) -> Result<(SystemBuilder, Vec<Vec<f64>>), ModelError> {
         let mut signs = vec![Vec::new(); self.coordinates.moved];
         for (j, joint) in self.model.joints.iter().enumerate() {
             let element = Element::Joint(j);
             joint.law.check().map_err(|error| ModelError::new(element, "law", error.to_string()))?;
-            differ(&joint.between, element)?;
+            check_distinct(&joint.between, element)?;
             let mut axes = Vec::new();
-            let faces = (joint.law.directions(), joint.law.normal());
-            for (along, [a, b]) in self.places.axes(&joint.between, faces, element)? {
+            let (directions, normal) = (joint.law.directions(), joint.law.normal());
+            for (along, [a, b]) in self.places.axes(&joint.between, directions, normal, element)? {
                 signs.iter_mut().for_each(|signs| signs.push(0.0));
-                let (axis, moved) = self.axis(&self.along(&[(a, 1.0), (b, -1.0)]));
+                let (axis, moved) = self.axis(&self.row_of(&[(a, 1.0), (b, -1.0)]));
                 let mut imposed = Vec::new();
                 for (k, sign) in moved {
                     if let Some(last) = signs[k].last_mut() {
@@ -328,7 +336,7 @@ impl Assembler<'_> {
                     }
                     imposed.extend(motions[k].iter().map(|(&harmonic, &amplitude)| (harmonic, amplitude * sign)));
                 }
-                let axis = axis.moved(imposed);
+                let axis = axis.with_imposed_motion(imposed);
                 axes.push(if let Some(along) = along { axis.named(along) } else { axis });
             }
             builder = builder.joint(joint.name.clone(), joint.law.clone(), axes);
@@ -340,8 +348,8 @@ impl Assembler<'_> {
     fn moved(
         &self,
         mut builder: SystemBuilder,
-        matrices: &Matrices,
-        (motions, forces): (&[Harmonics], &[Harmonics]),
+        matrices: &AssembledMatrices,
+        (motions, forces): (&[HarmonicAmplitudes], &[HarmonicAmplitudes]),
         signs: &[Vec<f64>],
     ) -> SystemBuilder {
         let Coordinates { free: n, moved, .. } = self.coordinates;
@@ -350,7 +358,7 @@ impl Assembler<'_> {
             let row = |entry: &dyn Fn(usize, usize) -> f64| {
                 (DVector::from_fn(n, |i, _| entry(n + k, i)), (0..moved).map(|i| entry(n + k, n + i)).collect())
             };
-            let list = |harmonics: &Harmonics| harmonics.iter().map(|(h, a)| (*h, *a)).collect();
+            let list = |harmonics: &HarmonicAmplitudes| harmonics.iter().map(|(h, a)| (*h, *a)).collect();
             builder = builder.moved(MovedPlace {
                 name: name.clone(),
                 motion: list(&motions[k]),
@@ -365,7 +373,7 @@ impl Assembler<'_> {
     }
 }
 
-fn differ(between: &[String; 2], element: Element) -> Result<(), ModelError> {
+fn check_distinct(between: &[String; 2], element: Element) -> Result<(), ModelError> {
     if between[0] == between[1] {
         let message = format!("both ends are `{}`; name two different places", between[0]);
         return Err(ModelError::new(element, "between", message));
@@ -382,7 +390,7 @@ fn finite_at_least_zero(value: f64, element: Element, key: &'static str, unit: &
 
 /// Amplitudes (N, m) for which energies neither underflow nor overflow after division by
 /// stiffness or damping.
-const SIZES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
+const AMPLITUDE_RANGE: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
 fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Complex64, ModelError> {
     for (value, key) in [(amplitude, "amplitude"), (phase, "phase")] {
@@ -390,7 +398,7 @@ fn harmonic_amplitude(amplitude: f64, phase: f64, element: Element) -> Result<Co
             return Err(ModelError::new(element, key, format!("must be a finite number, found {value}")));
         }
     }
-    if amplitude != 0.0 && !SIZES.contains(&amplitude.abs()) {
+    if amplitude != 0.0 && !AMPLITUDE_RANGE.contains(&amplitude.abs()) {
         let message = format!("{amplitude:e} in SI units is out of range (1e-140 to 1e140); check its unit");
         return Err(ModelError::new(element, "amplitude", message));
     }

@@ -54,7 +54,7 @@ pub struct Body {
 }
 
 /// A fault of a body: the key and the message.
-type Wrong = (&'static str, String);
+type BodyFault = (&'static str, String);
 
 impl Body {
     /// Creates a body that moves along two of x, y, z and rotates about the third axis.
@@ -80,7 +80,7 @@ impl Body {
         let axes = self.axes();
         let rows = axes.iter().map(|axis| self.row(offset, unit(*axis))).collect();
         let names: Vec<&str> = axes.iter().map(|axis| TRANSLATIONS[*axis]).collect();
-        Place::node(name, &names, rows).of_node(self.name.as_str())
+        Place::node(name, &names, rows).as_view_of(self.name.as_str())
     }
 
     /// Returns the axes x, y, z, by index, along which points of the body can move. A body in a
@@ -122,13 +122,13 @@ impl Body {
     }
 
     /// Returns whether its directions, mass and inertia are valid.
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         self.check().is_ok()
     }
 
     /// Checks directions, mass and inertia. Duplicate directions are detected together with
     /// those of all nodes.
-    pub(super) fn check(&self) -> Result<(), Wrong> {
+    pub(super) fn check(&self) -> Result<(), BodyFault> {
         let known = |name: &String| TRANSLATIONS.iter().chain(&ROTATIONS).any(|known| known == name);
         if let Some(other) = self.directions.iter().find(|name| !known(name)) {
             let message = format!(
@@ -187,18 +187,20 @@ impl Body {
     }
 
     /// Returns the principal axes of its inertia, within the axes of its rotations.
-    pub(super) fn principal(&self) -> Vec<Principal> {
+    pub(super) fn principal(&self) -> Vec<PrincipalAxis> {
         let about = self.rotations();
         let matrix = DMatrix::from_fn(about.len(), about.len(), |i, k| self.inertia[about[i]][about[k]]);
         let diagonal = (0..about.len()).all(|i| (0..i).all(|k| matrix[(i, k)] == 0.0));
         let mut found = Vec::with_capacity(about.len());
         if diagonal {
-            found.extend(about.iter().map(|axis| Principal { moment: self.inertia[*axis][*axis], axis: unit(*axis) }));
+            found.extend(
+                about.iter().map(|axis| PrincipalAxis { moment: self.inertia[*axis][*axis], axis: unit(*axis) }),
+            );
         } else if let Some(eigen) = eigen::symmetric(matrix) {
             for (moment, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
                 let mut axis = [0.0; 3];
                 about.iter().zip(vector.iter()).for_each(|(at, share)| axis[*at] = *share);
-                found.push(Principal { moment: *moment, axis });
+                found.push(PrincipalAxis { moment: *moment, axis });
             }
         }
         found
@@ -213,14 +215,14 @@ impl Body {
         }
         let Some(axis) = ROTATIONS.iter().position(|name| *name == direction) else { return Row::new() };
         let first = first + displacements().count();
-        let weight = |principal: Principal| principal.axis[axis] / (principal.moment / self.mass).sqrt();
+        let weight = |principal: PrincipalAxis| principal.axis[axis] / (principal.moment / self.mass).sqrt();
         let weights = self.principal().into_iter().map(weight).enumerate();
         weights.filter(|(_, weight)| *weight != 0.0).map(|(at, weight)| (first + at, weight)).collect()
     }
 }
 
 /// A principal axis of the inertia, of unit length, and its moment, kg m².
-pub(super) struct Principal {
+pub(super) struct PrincipalAxis {
     pub moment: f64,
     pub axis: [f64; 3],
 }
@@ -337,7 +339,7 @@ mod tests {
     /// Returns the places under the forces of the first harmonic at `omega`, without joints.
     fn solved(system: &crate::model::System, omega: f64) -> Vec<f64> {
         let dynamic = system.structure().stiffness() - system.structure().mass() * (omega * omega);
-        let force = system.loads()[0].at(omega).map(|f| f.re);
+        let force = system.excitation_harmonics()[0].amplitudes_at(omega).map(|f| f.re);
         let x = dynamic.lu().solve(&force).unwrap();
         system.at_places(x.as_slice())
     }
@@ -397,7 +399,7 @@ mod tests {
                 let ends = [a, b].map(|i| format!("end{a}{b}_{i}"));
                 for (end, i) in ends.iter().zip([a, b]) {
                     let row = vec![(0, x / x.hypot(z)), (1, z / x.hypot(z))];
-                    model.places.push(Place::new(end.clone(), row).of_node(format!("p{i}")));
+                    model.places.push(Place::new(end.clone(), row).as_view_of(format!("p{i}")));
                 }
                 model.springs.push(spring(&ends[0], &ends[1], stiffness));
             }
@@ -411,7 +413,7 @@ mod tests {
     /// Compares 50 random bodies on springs with `Tᵀ K T` and `diag(m, J)`, assembled here: the
     /// static and dynamic motion of a point under forces and moments.
     #[test]
-    fn random_bodies_move_as_an_independent_assembly_says() {
+    fn random_bodies_agree_with_independent_assembly() {
         for case in 0..50u64 {
             let stream = Stream::new(case);
             let mut draw = 0;

@@ -11,11 +11,11 @@
 use super::Model;
 use super::body::Body;
 use super::error::{Element, ModelError};
-use super::part::{Entries, Part};
+use super::name_resolution::{PlaceSource, Places};
 use super::place::Place;
-use super::places::{Of, Places};
+use super::substructure::{Entries, SubstructureParts};
 use crate::structure::reduction::Row;
-use crate::structure::{DampedModes, ReducedComponent};
+use crate::structure::{ModalDamping, ReducedComponent};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -33,25 +33,28 @@ pub(super) struct Coordinates {
     pub places: Vec<Row>,
     /// Marks places without results: places of a body that follow an imposed motion of that
     /// body.
-    pub unseen: Vec<bool>,
+    pub without_results: Vec<bool>,
     /// Mass, damping and stiffness of the substructure and the bodies.
     pub entries: [Entries; 3],
     /// Modal damping in addition to the damping entries, over the free and then the moved
     /// coordinates.
-    pub modes: Option<DampedModes>,
+    pub modes: Option<ModalDamping>,
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
-/// Largest number of places for which [`Turned::unseen`] decouples the moved displacements. The
-/// Gram matrix of more places would be large.
-const MOST_UNSEEN: usize = 2000;
+/// Largest number of places for which [`MotionElimination::decouple`] decouples the moved
+/// displacements. The Gram matrix of more places would be large.
+const DECOUPLING_LIMIT: usize = 2000;
 /// Relative tolerance: a moved place whose free part is smaller depends on other places and is
 /// not a separate coordinate.
-const DEPENDENT: f64 = 1e-10;
+const DEPENDENCE_TOLERANCE: f64 = 1e-10;
 
 impl Coordinates {
     pub fn new(model: &Model, places: &Places) -> Result<Self, ModelError> {
-        let part = model.substructure.as_ref().map_or_else(|| Ok(Part::default()), |own| Part::new(own, model))?;
+        let part = model
+            .substructure
+            .as_ref()
+            .map_or_else(|| Ok(SubstructureParts::default()), |own| SubstructureParts::new(own, model))?;
         let of_disk = model.substructure.as_ref().is_some_and(|own| own.disk.is_some());
         let masses: usize = model.masses.iter().map(|mass| mass.directions.len().max(1)).sum();
         let bodies: usize = model.bodies.iter().map(|body| body.directions.len()).sum();
@@ -59,15 +62,15 @@ impl Coordinates {
         let ring = model.ring.filter(|ring| of_disk || whole_sectors(ring.sectors, [part.names.len(), masses, bodies]));
         let sectors = ring.map_or(1, |ring| ring.sectors);
         let [part_each, masses_each, bodies_each] = [part.names.len(), masses, bodies].map(|count| count / sectors);
-        let order = Order { sectors, part: part_each, masses: masses_each, bodies: bodies_each };
+        let order = SectorOrder { sectors, part: part_each, masses: masses_each, bodies: bodies_each };
         let mut names = vec![String::new(); part.names.len() + masses + bodies];
-        let of_bodies = Bodies::new(model, &order);
+        let of_bodies = BodyCoordinates::new(model, &order);
         part.names.into_iter().enumerate().for_each(|(at, name)| names[order.of_part(at)] = name);
         let mut own = 0;
         let mut rows: Vec<Row> = Vec::with_capacity(places.stated.len());
         for place in &places.stated {
             rows.push(match place.of {
-                Of::Component(index, along) => match part.places.get(index) {
+                PlaceSource::Component(index, along) => match part.places.get(index) {
                     Some(rows) => rows[along].iter().map(|(at, weight)| (order.of_part(*at), *weight)).collect(),
                     None => {
                         let message = "the model has no structure for this place; add [structure]";
@@ -75,8 +78,8 @@ impl Coordinates {
                     }
                 },
                 // filled in below, after the rows of the nodes
-                Of::View(..) => Row::new(),
-                Of::Own(_) => {
+                PlaceSource::View(..) => Row::new(),
+                PlaceSource::Own(_) => {
                     let at = if own < masses { order.of_mass(own) } else { names.len() };
                     match names.get_mut(at) {
                         Some(name) => name.clone_from(&place.name),
@@ -85,7 +88,7 @@ impl Coordinates {
                     own += 1;
                     vec![(at, 1.0)]
                 }
-                Of::Body(index, along) => {
+                PlaceSource::Body(index, along) => {
                     let at = of_bodies.first[index];
                     names[at + along].clone_from(&place.name);
                     model.bodies[index].coordinates(&model.bodies[index].directions[along], at)
@@ -93,8 +96,8 @@ impl Coordinates {
             });
         }
         for (place, stated) in places.stated.iter().enumerate() {
-            if let Of::View(index, along) = stated.of {
-                rows[place] = view(&model.places[index], along, places, &rows);
+            if let PlaceSource::View(index, along) = stated.of {
+                rows[place] = node_view(&model.places[index], along, places, &rows);
             }
         }
         let of_part = |entries: Entries| -> Entries {
@@ -107,7 +110,7 @@ impl Coordinates {
             for (column, own) in columns.chunks_exact_mut(names.len().max(1)).zip(modes.iter()) {
                 own.iter().enumerate().for_each(|(at, value)| column[order.of_part(at)] = *value);
             }
-            DampedModes::new(names.len(), Arc::new(columns))
+            ModalDamping::new(names.len(), Arc::new(columns))
         });
         let moved: Vec<(&str, &Row)> = places
             .stated
@@ -116,7 +119,7 @@ impl Coordinates {
             .filter(|(place, _)| place.moved)
             .map(|(place, row)| (place.name.as_str(), row))
             .collect();
-        let mut turned = Turned::new(names.len(), &moved)?;
+        let mut turned = MotionElimination::new(names.len(), &moved)?;
         // a body has more points than coordinates, so that a moved point moves other points
         let of_body: Vec<bool> = match model.bodies.is_empty() {
             true => vec![false; rows.len()],
@@ -124,15 +127,15 @@ impl Coordinates {
         };
         let others = places.stated.iter().zip(&rows).zip(&of_body);
         let others = others.filter(|((place, _), of_body)| !place.moved && !**of_body).map(|(other, _)| other);
-        turned.unseen(&others.map(|(_, row)| turned.row(row)).collect::<Vec<Row>>());
+        turned.decouple(&others.map(|(_, row)| turned.row(row)).collect::<Vec<Row>>());
         let placed: Vec<Row> = rows.iter().map(|row| turned.row(row)).collect();
-        let unseen = follows(model, places, (&placed, &of_body), turned.free)?;
+        let without_results = check_followers(model, places, (&placed, &of_body), turned.free)?;
         Ok(Coordinates {
             free: turned.free,
             moved: moved.len(),
             names: names.into_iter().zip(&turned.pivot).filter(|(_, pivot)| !**pivot).map(|(name, _)| name).collect(),
             places: placed,
-            unseen,
+            without_results,
             entries: entries.map(|entries| turned.entries(entries)),
             modes: modes.map(|modes| turned.modes(&modes, moved.len())),
             reduced: part.reduced,
@@ -147,8 +150,8 @@ impl Coordinates {
 
 /// Returns one direction of a place that is a second view of a node, over the coordinates of
 /// that node.
-fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
-    let of = place.of.as_deref().unwrap_or_default();
+fn node_view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
+    let of = place.view_of.as_deref().unwrap_or_default();
     let is_of = |name: &str| name == of || name.split_once('.').is_some_and(|(node, _)| node == of);
     let node: Vec<&Row> =
         places.stated.iter().zip(rows).filter(|(stated, _)| is_of(&stated.name)).map(|(_, row)| row).collect();
@@ -160,7 +163,7 @@ fn view(place: &Place, along: usize, places: &Places, rows: &[Row]) -> Row {
 }
 
 /// The order of the coordinates of a substructure, of masses and of bodies: sector by sector.
-struct Order {
+struct SectorOrder {
     sectors: usize,
     /// Number of coordinates of the substructure in a sector.
     part: usize,
@@ -168,7 +171,7 @@ struct Order {
     bodies: usize,
 }
 
-impl Order {
+impl SectorOrder {
     fn of_part(&self, at: usize) -> usize {
         at + at / self.part * (self.masses + self.bodies)
     }
@@ -190,19 +193,19 @@ fn whole_sectors(sectors: usize, counts: [usize; 3]) -> bool {
 }
 
 /// Index of the first coordinate of every body.
-struct Bodies {
+struct BodyCoordinates {
     first: Vec<usize>,
 }
 
-impl Bodies {
-    fn new(model: &Model, order: &Order) -> Self {
+impl BodyCoordinates {
+    fn new(model: &Model, order: &SectorOrder) -> Self {
         let mut next = 0;
         let first = |body: &Body| {
             let at = order.of_body(next);
             next += body.directions.len();
             at
         };
-        Bodies { first: model.bodies.iter().map(first).collect() }
+        BodyCoordinates { first: model.bodies.iter().map(first).collect() }
     }
 
     /// Returns their mass entries. Every coordinate of a body has the mass of the body, because
@@ -217,20 +220,20 @@ impl Bodies {
 ///
 /// Results come from the free coordinates alone. Places of moved bodies are not rejected. They
 /// are marked as places without results if their imposed motion is not zero.
-fn follows(
+fn check_followers(
     model: &Model,
     places: &Places,
     (rows, of_body): (&[Row], &[bool]),
     free: usize,
 ) -> Result<Vec<bool>, ModelError> {
-    let mut unseen = vec![false; rows.len()];
+    let mut without_results = vec![false; rows.len()];
     let moved: Vec<&str> = places.stated.iter().filter(|place| place.moved).map(|place| place.name.as_str()).collect();
     let moves = |name: &str| model.motions.iter().any(|motion| motion.on == name && motion.amplitude != 0.0);
     for (number, (place, row)) in places.stated.iter().zip(rows).enumerate().filter(|(_, (place, _))| !place.moved) {
         let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
-        let mut on = row.iter().filter(|(at, weight)| *at >= free && weight.abs() > DEPENDENT * size);
+        let mut on = row.iter().filter(|(at, weight)| *at >= free && weight.abs() > DEPENDENCE_TOLERANCE * size);
         if of_body[number] {
-            unseen[number] = on.any(|(at, _)| moves(moved[at - free]));
+            without_results[number] = on.any(|(at, _)| moves(moved[at - free]));
             continue;
         }
         let Some((at, _)) = on.next() else { continue };
@@ -243,27 +246,27 @@ fn follows(
         );
         return Err(ModelError::new(Element::Motion(motion), "on", message));
     }
-    Ok(unseen)
+    Ok(without_results)
 }
 
 /// The transformation `x = T (q, u)`, in which moved displacements replace some coordinates.
-struct Turned {
+struct MotionElimination {
     free: usize,
     /// Marks the replaced coordinates.
     pivot: Vec<bool>,
     rows: Vec<Row>,
 }
 
-impl Turned {
+impl MotionElimination {
     fn new(count: usize, moved: &[(&str, &Row)]) -> Result<Self, ModelError> {
         // x_p = Σ a x + Σ b u for every replaced coordinate; the indices of u begin at `count`
         let mut given: BTreeMap<usize, Row> = BTreeMap::new();
         for (k, (name, row)) in moved.iter().enumerate() {
-            let row = combined(substituted(row, &given));
+            let row = merge_duplicates(substituted(row, &given));
             let size = row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
             let free = row.iter().filter(|(at, _)| *at < count);
             let most = free.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()).then(b.0.cmp(&a.0)));
-            let Some(&(at, weight)) = most.filter(|(_, weight)| weight.abs() > DEPENDENT * size) else {
+            let Some(&(at, weight)) = most.filter(|(_, weight)| weight.abs() > DEPENDENCE_TOLERANCE * size) else {
                 let message =
                     format!("the motion of `{name}` is determined by other imposed motions; remove one of them");
                 return Err(ModelError::new(Element::Motion(0), "on", message));
@@ -271,7 +274,7 @@ impl Turned {
             let mut own: Row = vec![(count + k, 1.0 / weight)];
             own.extend(row.iter().filter(|part| part.0 != at).map(|part| (part.0, -part.1 / weight)));
             let one = BTreeMap::from([(at, own)]);
-            given.values_mut().for_each(|other| *other = combined(substituted(other, &one)));
+            given.values_mut().for_each(|other| *other = merge_duplicates(substituted(other, &one)));
             given.extend(one);
         }
         let free = count - given.len();
@@ -287,7 +290,7 @@ impl Turned {
             Some(row) => row.iter().map(|(at, weight)| (renumber(*at), *weight)).collect(),
             None => vec![(renumber(at), 1.0)],
         };
-        Ok(Turned { free, rows: (0..count).map(row).collect(), pivot })
+        Ok(MotionElimination { free, rows: (0..count).map(row).collect(), pivot })
     }
 
     /// Changes the transformation so that none of the places `others` depends directly on a
@@ -297,12 +300,13 @@ impl Turned {
     /// `x = Z q + t u` describes the same structure for every `t` that moves the moved place by
     /// one. This function takes the `t` of the least norm that does not move the other places.
     /// The places stay unchanged if no such `t` exists.
-    fn unseen(&mut self, others: &[Row]) {
+    fn decouple(&mut self, others: &[Row]) {
         let size = |row: &Row| row.iter().fold(0.0, |most: f64, (_, weight)| most.max(weight.abs()));
         let moved = self.rows.iter().flatten().map(|(at, _)| (at + 1).saturating_sub(self.free)).max().unwrap_or(0);
-        let follows =
-            |row: &Row| row.iter().any(|(at, weight)| *at >= self.free && weight.abs() > DEPENDENT * size(row));
-        if others.len() > MOST_UNSEEN || !others.iter().any(follows) {
+        let follows = |row: &Row| {
+            row.iter().any(|(at, weight)| *at >= self.free && weight.abs() > DEPENDENCE_TOLERANCE * size(row))
+        };
+        if others.len() > DECOUPLING_LIMIT || !others.iter().any(follows) {
             return;
         }
         let mut parts = DMatrix::zeros(others.len(), self.free + moved);
@@ -311,7 +315,7 @@ impl Turned {
         }
         let (own, direct) = (parts.columns(0, self.free), parts.columns(self.free, moved));
         let Some(eigen) = eigen::symmetric(own * own.transpose()) else { return };
-        let least = DEPENDENT * eigen.eigenvalues.amax();
+        let least = DEPENDENCE_TOLERANCE * eigen.eigenvalues.amax();
         let inverse = eigen.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
         let shapes = &eigen.eigenvectors;
         let weights = shapes * DMatrix::from_diagonal(&inverse) * (shapes.transpose() * direct);
@@ -327,14 +331,14 @@ impl Turned {
                 .filter(|(_, weight)| *weight != 0.0)
                 .collect();
             row.extend(more);
-            *row = combined(std::mem::take(row));
+            *row = merge_duplicates(std::mem::take(row));
         }
     }
 
     /// Transforms a weighted sum of the coordinates to the free and then the moved coordinates.
     fn row(&self, row: &Row) -> Row {
         let parts = row.iter().flat_map(|(at, weight)| self.rows[*at].iter().map(move |(to, w)| (*to, weight * w)));
-        combined(parts.collect())
+        merge_duplicates(parts.collect())
     }
 
     /// Returns `Tᵀ A T`.
@@ -352,7 +356,7 @@ impl Turned {
     }
 
     /// Returns `Tᵀ U`.
-    fn modes(&self, modes: &DampedModes, moved: usize) -> DampedModes {
+    fn modes(&self, modes: &ModalDamping, moved: usize) -> ModalDamping {
         let n = self.free + moved;
         let mut columns = vec![0.0; modes.iter().count() * n];
         for (column, own) in columns.chunks_exact_mut(n.max(1)).zip(modes.iter()) {
@@ -360,7 +364,7 @@ impl Turned {
                 row.iter().for_each(|(to, weight)| column[*to] += weight * value);
             }
         }
-        DampedModes::new(n, Arc::new(columns))
+        ModalDamping::new(n, Arc::new(columns))
     }
 }
 
@@ -377,7 +381,7 @@ fn substituted(row: &Row, given: &BTreeMap<usize, Row>) -> Row {
 }
 
 /// Returns the same sum with every coordinate once, in the order of first occurrence.
-pub(super) fn combined(row: Row) -> Row {
+pub(super) fn merge_duplicates(row: Row) -> Row {
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
     let mut out: Row = Vec::with_capacity(row.len());
     for (at, weight) in row {

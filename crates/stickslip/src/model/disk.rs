@@ -4,7 +4,7 @@
 //! ring. `next.blade` is the blade of the next sector; the next sector of the last one is the
 //! first.
 
-use super::{Cyclic, Element, GROUND, Model, ModelError};
+use super::{CyclicSymmetry, Element, GROUND, Model, ModelError};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -13,12 +13,12 @@ use stickslip_numerics::random::Stream;
 /// Prefix of a place in the next sector.
 pub const NEXT: &str = "next.";
 /// Smallest number of sectors of a disk: a single sector would be adjacent to itself.
-pub const LEAST_SECTORS: usize = 2;
+pub const MIN_SECTORS: usize = 2;
 
 /// The distribution of a force or an imposed motion over the sectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Around {
+pub enum SectorDistribution {
     /// Sector n leads by `2π order n / sectors`: a travelling wave. A negative order reverses
     /// the direction.
     EngineOrder(i64),
@@ -28,35 +28,37 @@ pub enum Around {
     Sector(usize),
 }
 
-impl Around {
+impl SectorDistribution {
     /// Returns the fraction of the amplitude and the phase lead (rad) in a sector.
-    fn at(self, sector: usize, sectors: usize) -> (f64, f64) {
-        let phase = |order: i64| crate::structure::turn(turns(order, sector, sectors), sectors);
+    fn in_sector(self, sector: usize, sectors: usize) -> (f64, f64) {
+        let phase = |order: i64| crate::structure::unit_root(reduced_order(order, sector, sectors), sectors);
         match self {
             // without whole turns, so that equivalent orders give identical bits
-            Around::EngineOrder(order) => (1.0, TAU * turns(order, sector, sectors) as f64 / sectors as f64),
-            Around::NodalDiameter(diameter) => (phase(diameter).re, 0.0),
-            Around::Sector(one) => (if one == sector { 1.0 } else { 0.0 }, 0.0),
+            SectorDistribution::EngineOrder(order) => {
+                (1.0, TAU * reduced_order(order, sector, sectors) as f64 / sectors as f64)
+            }
+            SectorDistribution::NodalDiameter(diameter) => (phase(diameter).re, 0.0),
+            SectorDistribution::Sector(one) => (if one == sector { 1.0 } else { 0.0 }, 0.0),
         }
     }
 
     /// Returns the order of the wave, from 0 to the number of sectors, if it travels.
     fn order(self, sectors: usize) -> Option<usize> {
         match self {
-            Around::EngineOrder(order) => Some(turns(order, 1, sectors) as usize),
+            SectorDistribution::EngineOrder(order) => Some(reduced_order(order, 1, sectors) as usize),
             // a wave with all sectors in phase, or with opposite adjacent sectors, both stands
             // and travels
-            Around::NodalDiameter(diameter) => {
-                let order = turns(diameter, 1, sectors) as usize;
+            SectorDistribution::NodalDiameter(diameter) => {
+                let order = reduced_order(diameter, 1, sectors) as usize;
                 (2 * order).is_multiple_of(sectors).then_some(order)
             }
-            Around::Sector(_) => None,
+            SectorDistribution::Sector(_) => None,
         }
     }
 }
 
 /// Returns `order · sector` without whole turns.
-fn turns(order: i64, sector: usize, sectors: usize) -> i64 {
+fn reduced_order(order: i64, sector: usize, sectors: usize) -> i64 {
     let sectors = sectors as i64;
     (order.rem_euclid(sectors) * sector as i64).rem_euclid(sectors)
 }
@@ -67,9 +69,9 @@ pub struct Disk {
     /// Number of sectors.
     pub sectors: usize,
     /// Distribution of each force of the sector; engine order 0 if missing.
-    pub forces: Vec<Around>,
+    pub forces: Vec<SectorDistribution>,
     /// Distribution of each imposed motion of the sector; engine order 0 if missing.
-    pub motions: Vec<Around>,
+    pub motions: Vec<SectorDistribution>,
 }
 
 /// Layout of a ring's model: elements are stored sector by sector, with equally long lists per
@@ -101,7 +103,7 @@ impl Disk {
     /// Blades with springs between them, an engine order of 3 on 24 sectors: one wave with 3
     /// nodal diameters.
     /// ```
-    /// use stickslip::model::{Around, Disk};
+    /// use stickslip::model::{Disk, SectorDistribution};
     /// use stickslip::{Force, GROUND, Mass, Model, Spring};
     /// let spring = |other: &str, stiffness| Spring { between: ["blade".into(), other.into()], stiffness, damping: 0.1 };
     /// let sector = Model {
@@ -110,7 +112,7 @@ impl Disk {
     ///     forces: vec![Force { on: "blade".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
     ///     ..Model::default()
     /// };
-    /// let disk = Disk { sectors: 24, forces: vec![Around::EngineOrder(3)], motions: vec![] };
+    /// let disk = Disk { sectors: 24, forces: vec![SectorDistribution::EngineOrder(3)], motions: vec![] };
     /// let ring = disk.ring(|_| sector.clone()).unwrap();
     /// assert_eq!((ring.masses.len(), ring.masses[23].name.as_str()), (24, "blade_23"));
     /// assert_eq!(ring.springs[47].between, ["blade_23", "blade_0"]);
@@ -133,7 +135,7 @@ impl Disk {
             let name = |name: &String| self.name(name.as_str(), s);
             deviations.extend(one.substructure.iter().flat_map(|own| &own.disk).flat_map(|disk| &disk.deviations));
             one.places.iter_mut().for_each(|place| place.name = name(&place.name));
-            one.places.iter_mut().for_each(|place| place.of = place.of.as_ref().map(name));
+            one.places.iter_mut().for_each(|place| place.view_of = place.view_of.as_ref().map(name));
             one.masses.iter_mut().for_each(|mass| mass.name = name(&mass.name));
             one.bodies.iter_mut().for_each(|body| body.name = name(&body.name));
             one.springs.iter_mut().for_each(|spring| spring.between = spring.between.each_ref().map(name));
@@ -141,13 +143,13 @@ impl Disk {
                 joint.name = format!("{}_{s}", joint.name);
                 joint.between = joint.between.each_ref().map(name);
             }
-            for (force, around) in one.forces.iter_mut().zip(spread(&self.forces)) {
-                let (share, lead) = around.at(s, self.sectors);
+            for (force, around) in one.forces.iter_mut().zip(distributions(&self.forces)) {
+                let (share, lead) = around.in_sector(s, self.sectors);
                 force.on = name(&force.on);
                 (force.amplitude, force.phase) = (force.amplitude * share, force.phase + lead);
             }
-            for (motion, around) in one.motions.iter_mut().zip(spread(&self.motions)) {
-                let (share, lead) = around.at(s, self.sectors);
+            for (motion, around) in one.motions.iter_mut().zip(distributions(&self.motions)) {
+                let (share, lead) = around.in_sector(s, self.sectors);
                 motion.on = name(&motion.on);
                 (motion.amplitude, motion.phase) = (motion.amplitude * share, motion.phase + lead);
             }
@@ -171,10 +173,13 @@ impl Disk {
     /// `harmonic · order` is the engine order of each part, up to whole turns.
     fn order(&self, sector: &Model) -> Option<usize> {
         let forces =
-            sector.forces.iter().zip(spread(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
-        let motions =
-            sector.motions.iter().zip(spread(&self.motions)).map(|(m, around)| (m.amplitude, m.harmonic, around));
-        let excitation: Vec<(u32, Around)> = forces
+            sector.forces.iter().zip(distributions(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
+        let motions = sector
+            .motions
+            .iter()
+            .zip(distributions(&self.motions))
+            .map(|(m, around)| (m.amplitude, m.harmonic, around));
+        let excitation: Vec<(u32, SectorDistribution)> = forces
             .chain(motions)
             .filter(|(amplitude, ..)| *amplitude != 0.0)
             .map(|(_, harmonic, around)| (harmonic, around))
@@ -206,8 +211,8 @@ impl Disk {
     /// Checks the names of a sector. The assembly of the ring finds other errors.
     fn check(&self, sector: &Model) -> Result<(), ModelError> {
         let refuse = |element, key, message: String| Err(ModelError::new(element, key, message));
-        if self.sectors < LEAST_SECTORS {
-            let message = format!("a disk needs at least {LEAST_SECTORS} sectors, found {}", self.sectors);
+        if self.sectors < MIN_SECTORS {
+            let message = format!("a disk needs at least {MIN_SECTORS} sectors, found {}", self.sectors);
             return refuse(Element::Whole, "sectors", message);
         }
         if sector.substructure.as_ref().is_some_and(|own| own.disk.is_none()) {
@@ -245,14 +250,14 @@ impl Disk {
         for (i, joint) in sector.joints.iter().enumerate() {
             joint.between.iter().try_for_each(|name| find(name, Element::Joint(i), "between"))?;
         }
-        let excited = |on: &String, around: Around, element: Element| {
+        let excited = |on: &String, around: SectorDistribution, element: Element| {
             if let Some(place) = on.strip_prefix(NEXT) {
                 let message =
                     format!("name a place of the sector itself, such as `{place}`; each sector has its own excitation");
                 return refuse(element, "on", message);
             }
             match around {
-                Around::Sector(sector) if sector >= self.sectors => {
+                SectorDistribution::Sector(sector) if sector >= self.sectors => {
                     let message =
                         format!("there is no sector {sector}; sectors are numbered from 0 to {}", self.sectors - 1);
                     refuse(element, "sector", message)
@@ -260,11 +265,11 @@ impl Disk {
                 _ => Ok(()),
             }
         };
-        for (i, (force, around)) in sector.forces.iter().zip(spread(&self.forces)).enumerate() {
+        for (i, (force, around)) in sector.forces.iter().zip(distributions(&self.forces)).enumerate() {
             excited(&force.on, around, Element::Force(i))?;
             find(&force.on, Element::Force(i), "on")?;
         }
-        for (i, (motion, around)) in sector.motions.iter().zip(spread(&self.motions)).enumerate() {
+        for (i, (motion, around)) in sector.motions.iter().zip(distributions(&self.motions)).enumerate() {
             excited(&motion.on, around, Element::Motion(i))?;
         }
         Ok(())
@@ -277,10 +282,10 @@ impl Disk {
 ///
 /// # Example
 /// ```
-/// assert_eq!(stickslip::model::too_far(&[0.02, -0.01]), None);
-/// assert!(stickslip::model::too_far(&[2.0, -1.0]).unwrap().contains("sector 1 deviates by -100.0 %: no stiffness or mass remains"));
+/// assert_eq!(stickslip::model::deviation_error(&[0.02, -0.01]), None);
+/// assert!(stickslip::model::deviation_error(&[2.0, -1.0]).unwrap().contains("sector 1 deviates by -100.0 %: no stiffness or mass remains"));
 /// ```
-pub fn too_far(deviations: &[f64]) -> Option<String> {
+pub fn deviation_error(deviations: &[f64]) -> Option<String> {
     let first = |far: fn(f64) -> bool| deviations.iter().position(|deviation| far(*deviation));
     let said = |sector: usize| format!("sector {sector} deviates by {:.1} %", 100.0 * deviations[sector]);
     let nothing = first(|deviation| deviation <= -1.0).map(|sector| said(sector) + ": no stiffness or mass remains");
@@ -295,17 +300,17 @@ pub fn too_far(deviations: &[f64]) -> Option<String> {
 ///
 /// # Example
 /// ```
-/// let pattern = stickslip::model::normal_pattern(24, 0.02, 7);
-/// assert_eq!(pattern[..12], stickslip::model::normal_pattern(12, 0.02, 7));
+/// let pattern = stickslip::model::normal_deviations(24, 0.02, 7);
+/// assert_eq!(pattern[..12], stickslip::model::normal_deviations(12, 0.02, 7));
 /// ```
-pub fn normal_pattern(sectors: usize, deviation: f64, seed: u64) -> Vec<f64> {
+pub fn normal_deviations(sectors: usize, deviation: f64, seed: u64) -> Vec<f64> {
     let stream = Stream::new(seed);
     (0..sectors as u64).map(|sector| deviation * stream.normal(sector)).collect()
 }
 
 /// The property of a sector that deviates in a mistuned disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Mistuned {
+pub enum MistunedProperty {
     /// The mass with this name.
     Mass(String),
     /// The stiffness of the springs between these two places.
@@ -316,31 +321,31 @@ pub enum Mistuned {
     BladeFrequency,
 }
 
-impl Mistuned {
+impl MistunedProperty {
     /// Returns the sector with this property multiplied by `1 + deviation`.
     ///
     /// # Example
     /// ```
-    /// use stickslip::model::{Mass, Mistuned, Model};
+    /// use stickslip::model::{Mass, MistunedProperty, Model};
     /// let sector = Model { masses: vec![Mass::new("blade", 2.0)], ..Model::default() };
-    /// assert_eq!(Mistuned::Mass("blade".to_owned()).deviated(&sector, 0.5).masses[0].mass, 3.0);
+    /// assert_eq!(MistunedProperty::Mass("blade".to_owned()).apply(&sector, 0.5).masses[0].mass, 3.0);
     /// ```
     #[must_use]
-    pub fn deviated(&self, sector: &Model, deviation: f64) -> Model {
+    pub fn apply(&self, sector: &Model, deviation: f64) -> Model {
         let (mut model, factor) = (sector.clone(), 1.0 + deviation);
         let of_stiffness = match self {
-            Mistuned::Mass(name) => {
+            MistunedProperty::Mass(name) => {
                 model.masses.iter_mut().filter(|mass| mass.name == *name).for_each(|mass| mass.mass *= factor);
                 return model;
             }
-            Mistuned::Spring(ends) => {
+            MistunedProperty::Spring(ends) => {
                 let springs = model.springs.iter_mut().filter(|spring| joins(&spring.between, ends));
                 springs.for_each(|spring| spring.stiffness *= factor);
                 return model;
             }
-            Mistuned::BladeStiffness => deviation,
+            MistunedProperty::BladeStiffness => deviation,
             // stiffness changes with the square of the frequency
-            Mistuned::BladeFrequency => deviation * (2.0 + deviation),
+            MistunedProperty::BladeFrequency => deviation * (2.0 + deviation),
         };
         if let Some(disk) = model.substructure.as_mut().and_then(|own| own.disk.as_mut()) {
             disk.deviations = vec![of_stiffness];
@@ -351,9 +356,9 @@ impl Mistuned {
     /// Returns whether the sector has this property.
     pub fn is_in(&self, sector: &Model) -> bool {
         match self {
-            Mistuned::Mass(name) => sector.masses.iter().any(|mass| mass.name == *name),
-            Mistuned::Spring(ends) => sector.springs.iter().any(|spring| joins(&spring.between, ends)),
-            Mistuned::BladeStiffness | Mistuned::BladeFrequency => {
+            MistunedProperty::Mass(name) => sector.masses.iter().any(|mass| mass.name == *name),
+            MistunedProperty::Spring(ends) => sector.springs.iter().any(|spring| joins(&spring.between, ends)),
+            MistunedProperty::BladeStiffness | MistunedProperty::BladeFrequency => {
                 let disk = sector.substructure.as_ref().and_then(|own| own.disk.as_ref());
                 disk.is_some_and(|disk| !disk.blade.is_empty())
             }
@@ -366,14 +371,14 @@ fn joins([a, b]: &[String; 2], [c, d]: &[String; 2]) -> bool {
 }
 
 /// Extends the list with engine order 0 for all further elements.
-fn spread(stated: &[Around]) -> impl Iterator<Item = Around> {
-    stated.iter().copied().chain(std::iter::repeat(Around::EngineOrder(0)))
+fn distributions(stated: &[SectorDistribution]) -> impl Iterator<Item = SectorDistribution> {
+    stated.iter().copied().chain(std::iter::repeat(SectorDistribution::EngineOrder(0)))
 }
 
 impl Ring {
     /// Returns the wave that travels around the ring.
-    pub(super) fn wave(self) -> Option<Cyclic> {
-        self.order.map(|order| Cyclic { sectors: self.sectors, order })
+    pub(super) fn wave(self) -> Option<CyclicSymmetry> {
+        self.order.map(|order| CyclicSymmetry { sectors: self.sectors, order })
     }
 
     /// Returns the element of the sector that corresponds to an element of the ring's model
@@ -419,13 +424,13 @@ mod tests {
         }
     }
 
-    fn disk(sectors: usize, forces: &[Around]) -> Disk {
+    fn disk(sectors: usize, forces: &[SectorDistribution]) -> Disk {
         Disk { sectors, forces: forces.to_vec(), motions: Vec::new() }
     }
 
     #[test]
     fn names_lead_around_the_ring() {
-        let ring = disk(3, &[Around::EngineOrder(-1)]).ring(|_| sector()).unwrap();
+        let ring = disk(3, &[SectorDistribution::EngineOrder(-1)]).ring(|_| sector()).unwrap();
         let system = ring.assemble().unwrap();
         assert_eq!(system.places()[6..], ["disk_2", "blade_2.x", "blade_2.z"]);
         assert_eq!(ring.joints[2].between, ["blade_2.x", "blade_0.x"]);
@@ -439,24 +444,25 @@ mod tests {
     #[test]
     fn orders_alias() {
         for (a, b) in [(3, 27), (3, -21), (-3, 21), (0, 24), (12, -12)] {
-            let [a, b] = [a, b].map(|order| disk(24, &[Around::EngineOrder(order)]).ring(|_| sector()).unwrap());
+            let [a, b] =
+                [a, b].map(|order| disk(24, &[SectorDistribution::EngineOrder(order)]).ring(|_| sector()).unwrap());
             assert_eq!(a, b);
         }
     }
 
     /// One sector is solved only if the complete excitation travels with the wave.
     #[test]
-    fn which_waves_travel() {
-        let order = |forces: &[(u32, Around)], sectors: usize| {
+    fn travelling_waves_are_detected() {
+        let order = |forces: &[(u32, SectorDistribution)], sectors: usize| {
             let mut sector = sector();
             sector.forces = forces
                 .iter()
                 .map(|(harmonic, _)| Force { on: "blade.x".into(), amplitude: 1.0, phase: 0.0, harmonic: *harmonic })
                 .collect();
-            let around: Vec<Around> = forces.iter().map(|(_, around)| *around).collect();
+            let around: Vec<SectorDistribution> = forces.iter().map(|(_, around)| *around).collect();
             disk(sectors, &around).ring(|_| sector.clone()).unwrap().ring.unwrap().order
         };
-        use Around::{EngineOrder, NodalDiameter, Sector};
+        use SectorDistribution::{EngineOrder, NodalDiameter, Sector};
         assert_eq!(order(&[(1, EngineOrder(3))], 24), Some(3));
         assert_eq!(order(&[(1, EngineOrder(3)), (0, EngineOrder(0))], 24), Some(3), "and a constant load");
         assert_eq!(order(&[(0, EngineOrder(3))], 24), None, "a constant load that differs from blade to blade");
@@ -479,29 +485,29 @@ mod tests {
             sector.springs[1].stiffness *= 1.0 + 0.01 * s as f64;
             sector
         };
-        let ring = disk(5, &[Around::EngineOrder(1)]).ring(one).unwrap();
+        let ring = disk(5, &[SectorDistribution::EngineOrder(1)]).ring(one).unwrap();
         assert_eq!(ring.ring.unwrap().order, None);
         assert_eq!(ring.springs[3 * 4 + 1].stiffness, 1.04e5);
     }
 
     #[test]
     fn waves_that_stand() {
-        let ring = disk(8, &[Around::NodalDiameter(2)]).ring(|_| sector()).unwrap();
+        let ring = disk(8, &[SectorDistribution::NodalDiameter(2)]).ring(|_| sector()).unwrap();
         let amplitudes: Vec<f64> = ring.forces.iter().map(|force| force.amplitude).collect();
         assert_eq!(amplitudes, [2.0, 0.0, -2.0, 0.0, 2.0, 0.0, -2.0, 0.0]);
-        let one = disk(3, &[Around::Sector(1)]).ring(|_| sector()).unwrap();
+        let one = disk(3, &[SectorDistribution::Sector(1)]).ring(|_| sector()).unwrap();
         assert_eq!(one.forces.iter().map(|force| force.amplitude).collect::<Vec<_>>(), [0.0, 2.0, 0.0]);
     }
 
     #[test]
     fn wrong_sectors_are_refused_with_their_element() {
-        let wrong = |change: fn(&mut Model), around: Around, sectors: usize| {
+        let wrong = |change: fn(&mut Model), around: SectorDistribution, sectors: usize| {
             let mut sector = sector();
             change(&mut sector);
             let error = disk(sectors, &[around]).ring(|_| sector.clone()).unwrap_err();
             (error.element, error.message)
         };
-        let wave = Around::EngineOrder(1);
+        let wave = SectorDistribution::EngineOrder(1);
         let (element, message) = wrong(|m| m.springs[0].between[1] = "next.disc".into(), wave, 3);
         assert_eq!((element, message.as_str()), (Element::Spring(0), "there is no place `disc` in a sector"));
         assert!(wrong(|m| m.springs[0].between[1] = "next.ground".into(), wave, 3).1.contains("`ground`"));
@@ -509,7 +515,7 @@ mod tests {
         assert!(wrong(|m| m.masses[0].name = "next".into(), wave, 3).1.contains("`next` is reserved"));
         assert!(wrong(|m| m.forces[0].on = "next.blade.x".into(), wave, 3).1.contains("such as `blade.x`"));
         assert!(wrong(|_| {}, wave, 1).1.contains("at least 2 sectors"));
-        assert!(wrong(|_| {}, Around::Sector(3), 3).1.contains("from 0 to 2"));
+        assert!(wrong(|_| {}, SectorDistribution::Sector(3), 3).1.contains("from 0 to 2"));
         let mut moved = sector();
         moved.motions.push(Motion { on: "next.base".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 });
         assert!(disk(3, &[wave]).ring(|_| moved.clone()).is_err());

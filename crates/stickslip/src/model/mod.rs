@@ -6,26 +6,30 @@
 
 mod assemble;
 mod body;
-mod contraction;
+mod collinear;
 mod coordinates;
 mod disk;
 mod error;
 pub mod example;
-mod line;
-mod part;
+mod incremental_stability;
+mod name_resolution;
 mod place;
-mod places;
+mod substructure;
 mod survey;
 mod system;
 
 pub use body::{Body, ROTATIONS, TRANSLATIONS, with_rotations};
-pub use disk::{Around, Disk, LEAST_SECTORS, Mistuned, NEXT, Ring, normal_pattern, too_far};
+pub(crate) use collinear::{CollinearAxis, PARALLEL};
+pub use disk::{
+    Disk, MIN_SECTORS, MistunedProperty, NEXT, Ring, SectorDistribution, deviation_error, normal_deviations,
+};
 pub use error::{Element, ModelError};
-pub(crate) use line::{Line, PARALLEL};
+pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};
-pub use places::{is_identifier, is_place};
-pub use survey::{FirstSlip, LinearMode, Loose, Modes, Onset, Survey, Unpressed, WaveModes};
-pub use system::{Axis, Cyclic, Load, MovedPlace, System, SystemBuilder, SystemError, SystemJoint};
+pub use survey::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, Survey, UnloadedContacts, WaveModes};
+pub use system::{
+    Axis, CyclicSymmetry, ExcitationHarmonic, MovedPlace, System, SystemBuilder, SystemError, SystemJoint,
+};
 
 use crate::law::SharedLaw;
 use crate::structure::{Boundary, Component, ReducedComponent, Reduction};
@@ -73,7 +77,7 @@ pub struct Substructure {
     /// Reduction of the component to fewer coordinates.
     pub reduction: Reduction,
     /// Error of an earlier reduction, if the matrices themselves come from a reduced model.
-    pub earlier: Option<ReductionEvidence>,
+    pub earlier_reduction: Option<ReductionAccuracy>,
     /// Coupling to the next sector, if the structure is a sector of a [`Disk`].
     pub disk: Option<DiskPart>,
 }
@@ -82,34 +86,34 @@ impl Substructure {
     /// Returns this structure with the same damping and a reduction that is accurate to a
     /// higher frequency: `times` the range of the reduced component `few`.
     #[must_use]
-    pub fn farther(&self, few: &ReducedComponent, times: f64) -> Substructure {
+    pub fn with_extended_range(&self, few: &ReducedComponent, times: f64) -> Substructure {
         let (tolerance, kind) = match self.reduction {
             Reduction::UpTo { tolerance, kind, .. } => (tolerance, kind),
             Reduction::Modes { .. } | Reduction::None { .. } => (Reduction::TOLERANCE, None),
         };
         let damping = match self.damping {
-            SubstructureDamping::Ratio(ratio) => SubstructureDamping::RatioUpTo { ratio, up_to: few.serves() },
+            SubstructureDamping::Ratio(ratio) => SubstructureDamping::RatioUpTo { ratio, up_to: few.intended_up_to() },
             damping => damping,
         };
-        let reduction = Reduction::UpTo { up_to: times * few.serves(), tolerance, kind };
+        let reduction = Reduction::UpTo { up_to: times * few.intended_up_to(), tolerance, kind };
         Substructure { damping, reduction, ..self.clone() }
     }
 }
 
 /// Error of a reduced model relative to the full structure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ReductionEvidence {
+pub struct ReductionAccuracy {
     /// Largest relative error at the observed places.
     pub error: f64,
     /// Upper end of the frequency range in which the error holds, rad/s.
     pub up_to: f64,
 }
 
-impl ReductionEvidence {
+impl ReductionAccuracy {
     /// Combines the errors of two successive reductions: small relative errors add.
     #[must_use]
-    pub fn then(self, next: ReductionEvidence) -> ReductionEvidence {
-        ReductionEvidence { error: self.error + next.error, up_to: self.up_to.min(next.up_to) }
+    pub fn combine(self, next: ReductionAccuracy) -> ReductionAccuracy {
+        ReductionAccuracy { error: self.error + next.error, up_to: self.up_to.min(next.up_to) }
     }
 }
 
@@ -154,14 +158,14 @@ impl Serialize for Substructure {
     /// Serializes the settings and the sizes of the matrices, not the matrices.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let (mass, _, stiffness) = self.component.matrices();
-        let fields = 5 + usize::from(self.earlier.is_some());
+        let fields = 5 + usize::from(self.earlier_reduction.is_some());
         let mut out = serializer.serialize_struct("Substructure", fields)?;
         out.serialize_field("rows", &self.component.dofs())?;
         out.serialize_field("entries_of_mass", &mass.len())?;
         out.serialize_field("entries_of_stiffness", &stiffness.len())?;
         out.serialize_field("damping", &format!("{:?}", self.damping))?;
         out.serialize_field("reduction", &format!("{:?}", self.reduction))?;
-        if let Some(earlier) = &self.earlier {
+        if let Some(earlier) = &self.earlier_reduction {
             out.serialize_field("earlier", earlier)?;
         }
         out.end()

@@ -26,7 +26,7 @@ pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
 /// // the contact plane is inclined by 30 degrees about x
 /// let (sin, cos) = (0.5, 0.75f64.sqrt());
 /// let frame = Frame::new([0.0, -sin, cos], Some([1.0, 0.0, 0.0])).unwrap();
-/// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).turned(frame);
+/// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).in_frame(frame);
 /// let normal = &node.displacements(&node.rows)[2];
 /// assert_eq!(normal.len(), 2);
 /// assert!((normal[0].1 + sin).abs() < 1e-15 && (normal[1].1 - cos).abs() < 1e-15);
@@ -45,26 +45,26 @@ pub struct Place {
     pub frame: Option<Frame>,
     /// The node of masses of which this place is another view. The rows then count the
     /// directions of that node, from 0. `None` means that they are rows of the substructure.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub of: Option<String>,
+    #[serde(rename = "of", skip_serializing_if = "Option::is_none")]
+    pub view_of: Option<String>,
 }
 
 impl Place {
     /// Creates a place with one displacement.
     pub fn new(name: impl Into<String>, row: Row) -> Self {
-        Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None, of: None }
+        Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None, view_of: None }
     }
 
     /// Creates a node with one displacement per direction.
     pub fn node(name: impl Into<String>, directions: &[&str], rows: Vec<Row>) -> Self {
         let directions = directions.iter().map(|&along| along.to_owned()).collect();
-        Place { name: name.into(), directions, rows, frame: None, of: None }
+        Place { name: name.into(), directions, rows, frame: None, view_of: None }
     }
 
     /// Returns this node with axes along a local frame. Its rows are the displacements along x,
     /// y, z.
     #[must_use]
-    pub fn turned(self, frame: Frame) -> Self {
+    pub fn in_frame(self, frame: Frame) -> Self {
         Place { frame: Some(frame), ..self }
     }
 
@@ -80,13 +80,13 @@ impl Place {
     /// use stickslip::{Mass, Model};
     /// let (sin, cos) = (0.5, 0.75f64.sqrt());
     /// let node = Mass { directions: vec!["x".into(), "z".into()], ..Mass::new("block", 2.0) };
-    /// let face = Place::node("face", &["t", "n"], vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]]).of_node("block");
+    /// let face = Place::node("face", &["t", "n"], vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]]).as_view_of("block");
     /// let model = Model { masses: vec![node], places: vec![face], ..Model::default() };
     /// assert_eq!(model.assemble().unwrap().places(), ["block.x", "block.z", "face.t", "face.n"]);
     /// ```
     #[must_use]
-    pub fn of_node(self, node: impl Into<String>) -> Self {
-        Place { of: Some(node.into()), ..self }
+    pub fn as_view_of(self, node: impl Into<String>) -> Self {
+        Place { view_of: Some(node.into()), ..self }
     }
 
     /// Returns the displacement along each direction for the given `rows`, in the numbering of
@@ -119,7 +119,9 @@ pub enum FrameError {
     #[error("the {0} must be three finite numbers, not all zero")]
     NoDirection(&'static str),
     /// The tangent is parallel to the normal.
-    #[error("the angle between tangent and normal is {angle:.1} degrees; it must be more than {LEAST} degrees")]
+    #[error(
+        "the angle between tangent and normal is {angle:.1} degrees; it must be more than {MIN_TANGENT_ANGLE} degrees"
+    )]
     Parallel {
         /// Angle between tangent and normal, degrees.
         angle: f64,
@@ -128,7 +130,7 @@ pub enum FrameError {
 
 /// Smallest angle between a tangent and the normal or its opposite, degrees. Vectors with three
 /// digits still define a plane at this angle.
-const LEAST: f64 = 1.0;
+const MIN_TANGENT_ANGLE: f64 = 1.0;
 
 impl Frame {
     /// Creates a frame from a normal and an optional tangent.
@@ -151,7 +153,7 @@ impl Frame {
         let share = dot(along, normal);
         let across: [f64; 3] = std::array::from_fn(|i| along[i] - share * normal[i]);
         let angle = dot(across, across).sqrt().atan2(share.abs()).to_degrees();
-        let first = unit(across).filter(|_| angle > LEAST).ok_or(FrameError::Parallel { angle })?;
+        let first = unit(across).filter(|_| angle > MIN_TANGENT_ANGLE).ok_or(FrameError::Parallel { angle })?;
         let second = [
             normal[1] * first[2] - normal[2] * first[1],
             normal[2] * first[0] - normal[0] * first[2],

@@ -1,8 +1,8 @@
 //! A checked and assembled model: a structure, its joints, its excitation.
 
-use super::ReductionEvidence;
+use super::ReductionAccuracy;
 use crate::law::{LawError, SharedLaw};
-use crate::structure::{ReducedComponent, Sector, Structure, turn};
+use crate::structure::{ReducedComponent, RingSector, Structure, unit_root};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
@@ -38,13 +38,13 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 pub struct System {
     structure: Structure,
     places: Vec<String>,
-    seen: Vec<Axis>,
+    place_axes: Vec<Axis>,
     reduced: Option<Arc<ReducedComponent>>,
-    earlier: Option<ReductionEvidence>,
+    earlier: Option<ReductionAccuracy>,
     joints: Vec<SystemJoint>,
-    loads: Vec<Load>,
+    loads: Vec<ExcitationHarmonic>,
     moved: Vec<MovedPlace>,
-    cyclic: Option<Cyclic>,
+    cyclic: Option<CyclicSymmetry>,
 }
 
 /// The symmetry of a ring of equal sectors under a travelling excitation.
@@ -52,14 +52,14 @@ pub struct System {
 /// Sector n repeats the motion of the first sector, earlier by `order n / sectors` of a period
 /// of the excitation. Degrees of freedom, joints and moved places are stored sector by sector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cyclic {
+pub struct CyclicSymmetry {
     /// Number of sectors.
     pub sectors: usize,
     /// Nodal diameter of the first harmonic.
     pub order: usize,
 }
 
-impl Cyclic {
+impl CyclicSymmetry {
     /// Returns the nodal diameter of a harmonic of the excitation.
     pub fn diameter(self, harmonic: usize) -> usize {
         harmonic % self.sectors * self.order % self.sectors
@@ -67,8 +67,8 @@ impl Cyclic {
 
     /// Returns the phase factor of a harmonic in sector `sector` relative to the first sector,
     /// `e^{j 2π h order n / sectors}`.
-    pub fn lead(self, harmonic: usize, sector: usize) -> Complex64 {
-        turn((self.diameter(harmonic) * sector) as i64, self.sectors)
+    pub fn phase_factor(self, harmonic: usize, sector: usize) -> Complex64 {
+        unit_root((self.diameter(harmonic) * sector) as i64, self.sectors)
     }
 }
 
@@ -76,7 +76,7 @@ impl PartialEq for System {
     fn eq(&self, other: &Self) -> bool {
         self.structure == other.structure
             && self.places == other.places
-            && self.seen == other.seen
+            && self.place_axes == other.place_axes
             && self.joints == other.joints
             && self.loads == other.loads
             && self.moved == other.moved
@@ -145,7 +145,7 @@ impl Axis {
     /// Returns this axis as an angle in rad instead of a displacement. In comparisons of sizes
     /// it counts as the arc at this radius, m.
     #[must_use]
-    pub fn rotation(self, radius: f64) -> Self {
+    pub fn as_rotation(self, radius: f64) -> Self {
         Axis { radius: Some(radius), ..self }
     }
 
@@ -161,7 +161,7 @@ impl Axis {
 
     /// Returns the length in m to which one unit of the coordinate corresponds in comparisons
     /// with displacements.
-    pub fn length(&self) -> f64 {
+    pub fn length_scale(&self) -> f64 {
         self.radius.unwrap_or(1.0)
     }
 
@@ -179,7 +179,7 @@ impl Axis {
 
     /// Returns this axis with imposed relative motion `g(t) = Re Σ_h G_h e^{j h Ω t}`, as
     /// (harmonic, complex amplitude in m).
-    pub fn moved(mut self, imposed: impl IntoIterator<Item = (u32, Complex64)>) -> Self {
+    pub fn with_imposed_motion(mut self, imposed: impl IntoIterator<Item = (u32, Complex64)>) -> Self {
         let mut sum: BTreeMap<u32, Complex64> = self.imposed.into_iter().collect();
         for (harmonic, amplitude) in imposed {
             *sum.entry(harmonic).or_default() += amplitude;
@@ -206,12 +206,12 @@ impl Axis {
     /// Returns the component of displacements or velocities (length n) along this axis, without
     /// imposed motion.
     #[inline]
-    pub fn along(&self, values: &[f64]) -> f64 {
+    pub fn component(&self, values: &[f64]) -> f64 {
         self.rows.iter().map(|&(i, w)| w * values[i]).sum()
     }
 
     /// Returns the component of complex amplitudes along this axis, without imposed motion.
-    pub fn along_complex(&self, values: &DVector<Complex64>) -> Complex64 {
+    pub fn complex_component(&self, values: &DVector<Complex64>) -> Complex64 {
         self.rows.iter().map(|&(i, w)| values[i] * w).sum()
     }
 
@@ -238,7 +238,7 @@ impl Axis {
 /// One harmonic of the excitation: `Re((force + s·by_velocity + s²·by_acceleration) e^{st})` at
 /// `s = jhΩ`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Load {
+pub struct ExcitationHarmonic {
     /// Harmonic number h; 0 is constant.
     pub harmonic: u32,
     /// Complex force amplitudes, length n, N.
@@ -251,15 +251,15 @@ pub struct Load {
     pub by_acceleration: DVector<Complex64>,
 }
 
-impl Load {
+impl ExcitationHarmonic {
     fn zero(harmonic: u32, n: usize) -> Self {
         let zeros = || DVector::from_element(n, ZERO);
-        Load { harmonic, force: zeros(), by_velocity: zeros(), by_acceleration: zeros() }
+        ExcitationHarmonic { harmonic, force: zeros(), by_velocity: zeros(), by_acceleration: zeros() }
     }
 
     /// Returns the complex force amplitudes at excitation frequency `omega` (rad/s), length n,
     /// N.
-    pub fn at(&self, omega: f64) -> DVector<Complex64> {
+    pub fn amplitudes_at(&self, omega: f64) -> DVector<Complex64> {
         let s = Complex64::new(0.0, f64::from(self.harmonic) * omega);
         &self.force + &self.by_velocity * s + &self.by_acceleration * (s * s)
     }
@@ -341,9 +341,9 @@ pub struct SystemBuilder {
     structure: Structure,
     places: Option<(Vec<String>, Vec<Axis>)>,
     reduced: Option<Arc<ReducedComponent>>,
-    earlier: Option<ReductionEvidence>,
+    earlier: Option<ReductionAccuracy>,
     joints: Vec<SystemJoint>,
-    loads: BTreeMap<u32, Load>,
+    loads: BTreeMap<u32, ExcitationHarmonic>,
     moved: Vec<MovedPlace>,
     wrong: Option<SystemError>,
 }
@@ -352,9 +352,9 @@ impl SystemBuilder {
     /// Adds a place of results. Without any call, each degree of freedom is a place.
     #[must_use]
     pub fn place(mut self, name: impl Into<String>, along: Axis) -> Self {
-        let (names, seen) = self.places.get_or_insert_default();
+        let (names, place_axes) = self.places.get_or_insert_default();
         names.push(name.into());
-        seen.push(along);
+        place_axes.push(along);
         self
     }
 
@@ -366,7 +366,7 @@ impl SystemBuilder {
 
     /// Sets the error of an earlier reduction of a part of the structure.
     #[must_use]
-    pub(super) fn earlier(self, earlier: Option<ReductionEvidence>) -> Self {
+    pub(super) fn earlier(self, earlier: Option<ReductionAccuracy>) -> Self {
         SystemBuilder { earlier, ..self }
     }
 
@@ -396,7 +396,7 @@ impl SystemBuilder {
         } else if !parts.iter().all(|part| part.is_finite()) {
             self.wrong.get_or_insert_with(|| SystemError::NotFinite { what: what() });
         } else {
-            let load = self.loads.entry(harmonic).or_insert_with(|| Load::zero(harmonic, n));
+            let load = self.loads.entry(harmonic).or_insert_with(|| ExcitationHarmonic::zero(harmonic, n));
             load.force[row] += parts[0];
             load.by_velocity[row] += parts[1];
             load.by_acceleration[row] += parts[2];
@@ -425,8 +425,8 @@ impl SystemBuilder {
             let rows = (0..n).map(|row| Axis::new(vec![(row, 1.0)]));
             (self.structure.places().to_vec(), rows.collect())
         };
-        let (places, seen) = self.places.unwrap_or_else(unit);
-        for (name, axis) in places.iter().zip(&seen) {
+        let (places, place_axes) = self.places.unwrap_or_else(unit);
+        for (name, axis) in places.iter().zip(&place_axes) {
             axis.check(n, || format!("place `{name}`"))?;
         }
         for joint in &self.joints {
@@ -442,7 +442,7 @@ impl SystemBuilder {
         Ok(System {
             structure: self.structure,
             places,
-            seen,
+            place_axes,
             reduced: self.reduced,
             earlier: self.earlier,
             joints: self.joints,
@@ -455,7 +455,7 @@ impl SystemBuilder {
 
 /// Relative difference between loads of a sector and those of the first sector that counts as
 /// rounding of the phases. It is relative to the largest load.
-const ALIKE: f64 = 1e-12;
+const SYMMETRY_TOLERANCE: f64 = 1e-12;
 
 impl System {
     /// Creates a builder for a system on a structure.
@@ -482,10 +482,10 @@ impl System {
     ///
     /// # Errors
     /// See [`SystemBuilder::build`].
-    pub fn on(&self, structure: Structure) -> Result<System, SystemError> {
+    pub fn with_structure(&self, structure: Structure) -> Result<System, SystemError> {
         let loads = self.loads.iter().map(|load| (load.harmonic, load.clone()));
         let builder = SystemBuilder {
-            places: Some((self.places.clone(), self.seen.clone())),
+            places: Some((self.places.clone(), self.place_axes.clone())),
             reduced: self.reduced.clone(),
             earlier: self.earlier,
             joints: self.joints.clone(),
@@ -500,7 +500,7 @@ impl System {
     ///
     /// Harmonic h becomes `h · periods`. A motion that repeats after `periods` periods of the
     /// excitation repeats after one period of the new system.
-    pub(crate) fn slowed(&self, periods: u32) -> System {
+    pub(crate) fn subharmonic(&self, periods: u32) -> System {
         // a motion of several periods need not travel with the excitation
         let mut system = System { cyclic: None, ..self.clone() };
         system.loads.iter_mut().for_each(|load| load.harmonic *= periods);
@@ -515,29 +515,29 @@ impl System {
     ///
     /// # Errors
     /// [`SystemError::NotCyclic`]: the sectors differ, or the loads do not travel with the wave.
-    pub fn travelling(self, cyclic: Cyclic) -> Result<System, SystemError> {
-        match self.off(cyclic) {
+    pub fn with_cyclic_symmetry(self, cyclic: CyclicSymmetry) -> Result<System, SystemError> {
+        match self.symmetry_violation(cyclic) {
             Some(what) => Err(SystemError::NotCyclic(what)),
             None => Ok(System { cyclic: Some(cyclic), ..self }),
         }
     }
 
     /// Returns the symmetry of a ring in a travelling wave, if it is known; see
-    /// [`System::travelling`].
-    pub fn cyclic(&self) -> Option<Cyclic> {
+    /// [`System::with_cyclic_symmetry`].
+    pub fn cyclic(&self) -> Option<CyclicSymmetry> {
         self.cyclic
     }
 
     /// Returns the first part of the system that violates the given symmetry.
-    fn off(&self, cyclic: Cyclic) -> Option<&'static str> {
-        let Cyclic { sectors, order } = cyclic;
+    fn symmetry_violation(&self, cyclic: CyclicSymmetry) -> Option<&'static str> {
+        let CyclicSymmetry { sectors, order } = cyclic;
         let n = self.dofs();
-        if order >= sectors || Sector::of(&self.structure, sectors).is_none() {
+        if order >= sectors || RingSector::from_ring(&self.structure, sectors).is_none() {
             return Some("masses, dampers or springs");
         }
         let size = n / sectors;
         let near = |first: Complex64, harmonic: u32, sector: usize, z: Complex64, largest: f64| {
-            (first * cyclic.lead(harmonic as usize, sector) - z).norm() <= ALIKE * largest
+            (first * cyclic.phase_factor(harmonic as usize, sector) - z).norm() <= SYMMETRY_TOLERANCE * largest
         };
         for load in &self.loads {
             for values in [&load.force, &load.by_velocity, &load.by_acceleration] {
@@ -591,8 +591,8 @@ impl System {
     }
 
     /// Returns each place as a weighted sum of degrees of freedom.
-    pub fn seen(&self) -> &[Axis] {
-        &self.seen
+    pub fn place_axes(&self) -> &[Axis] {
+        &self.place_axes
     }
 
     /// Returns the reduced component that is a part of the structure, with its error.
@@ -605,10 +605,10 @@ impl System {
     ///
     /// It is the largest relative error at the places and the upper end of its frequency range
     /// (rad/s).
-    pub fn reduction_evidence(&self) -> Option<ReductionEvidence> {
-        let now = self.reduced().map(|reduced| ReductionEvidence { error: reduced.error(), up_to: reduced.up_to() });
+    pub fn reduction_evidence(&self) -> Option<ReductionAccuracy> {
+        let now = self.reduced().map(|reduced| ReductionAccuracy { error: reduced.error(), up_to: reduced.up_to() });
         match (self.earlier, now) {
-            (Some(first), Some(then)) => Some(first.then(then)),
+            (Some(first), Some(then)) => Some(first.combine(then)),
             (one, other) => one.or(other),
         }
     }
@@ -616,7 +616,7 @@ impl System {
     /// Returns displacements, velocities or accelerations at the places, from those of the
     /// degrees of freedom (length n).
     pub fn at_places(&self, values: &[f64]) -> Vec<f64> {
-        self.seen.iter().map(|axis| axis.along(values)).collect()
+        self.place_axes.iter().map(|axis| axis.component(values)).collect()
     }
 
     /// Returns the joints.
@@ -631,19 +631,19 @@ impl System {
 
     /// Returns the excitation by harmonic, sorted by harmonic number; each number occurs at
     /// most once.
-    pub fn loads(&self) -> &[Load] {
+    pub fn excitation_harmonics(&self) -> &[ExcitationHarmonic] {
         &self.loads
     }
 
     /// Returns the places with imposed motion, which are not degrees of freedom.
-    pub fn moved(&self) -> &[MovedPlace] {
+    pub fn moved_places(&self) -> &[MovedPlace] {
         &self.moved
     }
 
     /// Returns the complex force amplitudes at excitation frequency `omega` (rad/s): (harmonic,
     /// length n).
     pub fn excitation(&self, omega: f64) -> Vec<(u32, DVector<Complex64>)> {
-        self.loads.iter().map(|load| (load.harmonic, load.at(omega))).collect()
+        self.loads.iter().map(|load| (load.harmonic, load.amplitudes_at(omega))).collect()
     }
 
     /// Returns whether excitation and laws are odd, so that an orbit with `x(t + T/2) = -x(t)`

@@ -2,7 +2,7 @@
 
 /// Why time integration of a motion failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Breakdown {
+pub enum IntegrationError {
     /// Too many transitions.
     #[error("joint `{joint}` chatters: {switches} transitions before t = {time:.6e} s")]
     Chatter {
@@ -29,7 +29,7 @@ pub enum Breakdown {
     },
     /// The contact problem has no solution.
     #[error("no combination of stick and slip satisfies the contact conditions at t = {time:.6e} s")]
-    Undecidable {
+    NoContactState {
         /// Time of the failure, s.
         time: f64,
     },
@@ -62,7 +62,7 @@ pub enum Breakdown {
     },
     /// A law returned NaN or infinity.
     #[error("law `{law}` of joint `{joint}` returned NaN or infinity at t = {time:.6e} s")]
-    NoNumber {
+    NotFinite {
         /// Time of the failure, s.
         time: f64,
         /// Name of the joint.
@@ -101,7 +101,7 @@ pub enum Breakdown {
         time: f64,
     },
     /// The motion grows without bound, or a number is no longer finite.
-    #[error("the motion{} grows without bound{}", .place.as_ref().map_or_else(String::new, |place| format!(" of `{place}`")), by(*.time))]
+    #[error("the motion{} grows without bound{}", .place.as_ref().map_or_else(String::new, |place| format!(" of `{place}`")), time_suffix(*.time))]
     Unbounded {
         /// Time of the failure, s; not finite if it is unknown.
         time: f64,
@@ -112,13 +112,13 @@ pub enum Breakdown {
 
 /// Formats an estimate with two digits, or with four if two do not distinguish it from the
 /// tolerance.
-fn told_apart(estimate: f64, tolerance: f64) -> String {
+fn distinct_digits(estimate: f64, tolerance: f64) -> String {
     let short = format!("{estimate:.1e}");
     if short == format!("{tolerance:.1e}") { format!("{estimate:.3e}") } else { short }
 }
 
 /// Returns advice for a series that is too short.
-fn beyond(needed: Option<usize>) -> String {
+fn truncation_advice(needed: Option<usize>) -> String {
     let raise = "raise `tolerance`";
     needed.map_or_else(
         || format!("; {raise}"),
@@ -131,36 +131,36 @@ fn beyond(needed: Option<usize>) -> String {
     )
 }
 
-fn by(time: f64) -> String {
+fn time_suffix(time: f64) -> String {
     if time.is_finite() { format!(" by t = {time:.6e} s") } else { String::new() }
 }
 
-impl Breakdown {
+impl IntegrationError {
     /// Returns the time of the failure, s, if known.
     pub fn time(&self) -> Option<f64> {
-        self.clone().instant().map(|time| *time).filter(|time| time.is_finite())
+        self.clone().time_mut().map(|time| *time).filter(|time| time.is_finite())
     }
 
     /// Shifts the time of the failure by `begin` (s), for a motion that began later.
-    pub(crate) fn later(mut self, begin: f64) -> Self {
-        if let Some(time) = self.instant() {
+    pub(crate) fn shifted(mut self, begin: f64) -> Self {
+        if let Some(time) = self.time_mut() {
             *time += begin;
         }
         self
     }
 
-    fn instant(&mut self) -> Option<&mut f64> {
+    fn time_mut(&mut self) -> Option<&mut f64> {
         match self {
-            Breakdown::Chatter { time, .. }
-            | Breakdown::Redundant { time, .. }
-            | Breakdown::Undecidable { time }
-            | Breakdown::Defective { time, .. }
-            | Breakdown::TooFast { time }
-            | Breakdown::Stalled { time, .. }
-            | Breakdown::NoNumber { time, .. }
-            | Breakdown::OutOfRange { time }
-            | Breakdown::Unbounded { time, .. } => Some(time),
-            Breakdown::Unresolved { .. } | Breakdown::Offset { .. } => None,
+            IntegrationError::Chatter { time, .. }
+            | IntegrationError::Redundant { time, .. }
+            | IntegrationError::NoContactState { time }
+            | IntegrationError::Defective { time, .. }
+            | IntegrationError::TooFast { time }
+            | IntegrationError::Stalled { time, .. }
+            | IntegrationError::NotFinite { time, .. }
+            | IntegrationError::OutOfRange { time }
+            | IntegrationError::Unbounded { time, .. } => Some(time),
+            IntegrationError::Unresolved { .. } | IntegrationError::Offset { .. } => None,
         }
     }
 }
@@ -172,8 +172,8 @@ pub enum OrbitError {
     #[error(
         "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}{}; use a \
          neighbouring orbit as initial guess, or check that a periodic motion exists (an undamped resonance has \
-         none){instead}",
-        if *spent { ", at the work limit of a point" } else { "" }
+         none){advice}",
+        if *work_limit_reached { ", at the work limit of a point" } else { "" }
     )]
     NotConverged {
         /// Name of the method.
@@ -185,15 +185,15 @@ pub enum OrbitError {
         /// Smallest residual reached.
         residual: f64,
         /// True if the search exhausted the work limit of a point.
-        spent: bool,
+        work_limit_reached: bool,
         /// Advice about other methods, as text that follows a comma; empty if no method was
         /// asked or none applies.
-        instead: String,
+        advice: String,
     },
     /// The motion does not settle.
     #[error(
         "{method} at Ω = {omega:.4} rad/s: the motion has not settled after {returns} returns; it still changes by {change:.1e} per return{}",
-        unsettled(*.repeats, *.needed, .instead)
+        settling_advice(*.repeats, *.needed, .advice)
     )]
     Unsettled {
         /// Name of the method.
@@ -212,7 +212,7 @@ pub enum OrbitError {
         needed: Option<f64>,
         /// Advice about methods that need no settling, as text that follows a comma; empty if no
         /// method was asked or none applies.
-        instead: String,
+        advice: String,
     },
     /// The time integration of the motion failed.
     #[error("{method} failed at Ω = {omega:.4} rad/s: {cause}")]
@@ -222,7 +222,7 @@ pub enum OrbitError {
         /// Excitation frequency, rad/s.
         omega: f64,
         /// Cause of the failure.
-        cause: Breakdown,
+        cause: IntegrationError,
     },
     /// The evidence contradicts the orbit.
     #[error("{method} rejected its orbit at Ω = {omega:.4} rad/s: the energy balance has a gap of {energy_gap:.1e}")]
@@ -236,8 +236,8 @@ pub enum OrbitError {
     },
     /// The longest series that the method may use does not reach the tolerance.
     #[error(
-        "{method} at Ω = {omega:.4} rad/s: the estimated error with {harmonics} harmonics is {}, above the tolerance {tolerance:.1e}{}{instead}",
-        told_apart(*.estimate, *.tolerance), beyond(*.needed)
+        "{method} at Ω = {omega:.4} rad/s: the estimated error with {harmonics} harmonics is {}, above the tolerance {tolerance:.1e}{}{advice}",
+        distinct_digits(*.estimate, *.tolerance), truncation_advice(*.needed)
     )]
     Truncation {
         /// Name of the method.
@@ -257,14 +257,14 @@ pub enum OrbitError {
         state: Vec<f64>,
         /// Advice about other methods, as text that follows a comma; empty if no method was
         /// asked or none applies.
-        instead: String,
+        advice: String,
     },
     /// No stiffness, or friction alone, carries the mean of the forces.
     #[error(
         "{method} found no periodic motion at Ω = {omega:.4} rad/s, because a body drifts: friction or contacts \
          alone hold part of the structure, and the mean force exceeds what they carry; increase the normal loads, or \
          add a spring{}",
-        if .instead.is_empty() { String::new() } else { format!("{instead}, which may find a motion that friction holds") }
+        if .advice.is_empty() { String::new() } else { format!("{advice}, which may find a motion that friction holds") }
     )]
     Drift {
         /// Name of the method.
@@ -273,18 +273,18 @@ pub enum OrbitError {
         omega: f64,
         /// Advice about methods that can follow such a motion, as text that follows a comma;
         /// empty if no method was asked or none applies.
-        instead: String,
+        advice: String,
     },
     /// No orbit was found. A motion that was integrated from static equilibrium shows the actual
     /// behaviour.
-    #[error("{method} found no orbit at Ω = {omega:.4} rad/s; a time integration from static equilibrium {course}")]
+    #[error("{method} found no orbit at Ω = {omega:.4} rad/s; a time integration from static equilibrium {observed}")]
     NoOrbit {
         /// Name of the method.
         method: &'static str,
         /// Excitation frequency, rad/s.
         omega: f64,
         /// Behaviour of the integrated motion.
-        course: Course,
+        observed: ObservedMotion,
         /// State at t = 0 of the integrated motion at its end, see [`OrbitError::candidate`].
         state: Vec<f64>,
     },
@@ -292,7 +292,7 @@ pub enum OrbitError {
     #[error(
         "{method} at Ω = {omega:.4} rad/s: without its joints, the structure {}: {}",
         if *resonance == 0.0 { "has a rigid-body mode" } else { "has an undamped resonance" },
-        unbounded(*resonance)
+        resonance_advice(*resonance)
     )]
     Resonance {
         /// Name of the method.
@@ -303,14 +303,14 @@ pub enum OrbitError {
         resonance: f64,
     },
     /// The path that a method returned is not a periodic motion.
-    #[error("the motion that {method} returned at Ω = {omega:.4} rad/s is not an orbit: it {what}")]
+    #[error("the motion that {method} returned at Ω = {omega:.4} rad/s is not an orbit: it {problem}")]
     NotAnOrbit {
         /// Name of the method.
         method: &'static str,
         /// Excitation frequency, rad/s.
         omega: f64,
         /// Description of the problem.
-        what: &'static str,
+        problem: &'static str,
     },
     /// The excitation frequency is not positive and finite.
     #[error("the excitation frequency is {omega} rad/s; it must be positive and finite")]
@@ -322,7 +322,7 @@ pub enum OrbitError {
 
 /// Behaviour of a motion that was integrated in time.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Course {
+pub enum ObservedMotion {
     /// It converges to a motion that repeats with the excitation.
     Settles,
     /// It approaches a motion that repeats with the excitation, but has not reached it.
@@ -336,71 +336,71 @@ pub enum Course {
         periods: usize,
     },
     /// A body drifts away, period by period.
-    MovesOn {
+    Drifts {
         /// The place with the largest drift.
         place: String,
         /// Its drift, m.
-        way: f64,
+        drift: f64,
         /// Number of periods of this drift.
         periods: usize,
         /// The joint that is separated for the largest fraction of the last period.
         joint: String,
         /// This fraction; zero if no faces separate.
-        share: f64,
+        open_fraction: f64,
     },
     /// It neither repeats nor drifts.
-    Wanders {
+    Irregular {
         /// Number of integrated periods.
         periods: usize,
         /// The joint that is separated for the largest fraction of the last period.
         joint: String,
         /// This fraction; zero if no faces separate.
-        share: f64,
+        open_fraction: f64,
     },
 }
 
-impl std::fmt::Display for Course {
+impl std::fmt::Display for ObservedMotion {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let apart = |joint: &str, share: f64| {
-            if share > 0.0 {
-                format!(" (`{joint}` is separated for {:.0} % of the last)", 100.0 * share)
+        let apart = |joint: &str, open_fraction: f64| {
+            if open_fraction > 0.0 {
+                format!(" (`{joint}` is separated for {:.0} % of the last)", 100.0 * open_fraction)
             } else {
                 String::new()
             }
         };
         match self {
-            Course::Settles => {
+            ObservedMotion::Settles => {
                 write!(
                     f,
                     "converges to a periodic motion, which this series does not reach: use more harmonics, or method `transient`"
                 )
             }
-            Course::Settling { periods } => write!(
+            ObservedMotion::Settling { periods } => write!(
                 f,
                 "converges slowly: it still changes after {periods} periods; use more harmonics, or method `transient`"
             ),
-            Course::Repeats { periods } => {
+            ObservedMotion::Repeats { periods } => {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
-            Course::MovesOn { place, way, periods, joint, share } => write!(
+            ObservedMotion::Drifts { place, drift, periods, joint, open_fraction } => write!(
                 f,
-                "drifts: `{place}` moves by {way:.2e} m in {periods} periods{}; add a spring, increase the normal \
+                "drifts: `{place}` moves by {drift:.2e} m in {periods} periods{}; add a spring, increase the normal \
                  loads, or add damping",
-                apart(joint, *share)
+                apart(joint, *open_fraction)
             ),
-            Course::Wanders { periods, joint, share } => write!(
+            ObservedMotion::Irregular { periods, joint, open_fraction } => write!(
                 f,
                 "neither repeats nor settles in {periods} periods{}, which does not exclude an orbit; increase the \
                  normal loads, add damping, or examine the motion with kind = \"transient\"",
-                apart(joint, *share)
+                apart(joint, *open_fraction)
             ),
         }
     }
 }
 
 /// Describes a motion that does not settle, and gives advice.
-fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> String {
-    let by_newton = if instead.is_empty() { String::new() } else { format!("{instead}, which needs no settling") };
+fn settling_advice(repeats: Option<usize>, needed: Option<f64>, advice: &str) -> String {
+    let by_newton = if advice.is_empty() { String::new() } else { format!("{advice}, which needs no settling") };
     match repeats {
         // A motion that repeats after one return is settled, so `repeats` is at least 2.
         Some(repeats) => {
@@ -419,7 +419,7 @@ fn unsettled(repeats: Option<usize>, needed: Option<f64>, instead: &str) -> Stri
 
 /// Describes a structure with an undamped resonance at this frequency, rad/s, and gives advice.
 /// Zero means a mean force that no stiffness carries.
-fn unbounded(resonance: f64) -> String {
+fn resonance_advice(resonance: f64) -> String {
     if resonance == 0.0 {
         return "some bodies have no support; add a spring, or a constant force or preload that closes their contacts"
             .to_owned();
@@ -431,14 +431,21 @@ impl OrbitError {
     /// Returns the error of a search that stopped after a number of iterations, with its
     /// smallest residual.
     pub(crate) fn not_converged(method: &'static str, omega: f64, iterations: usize, residual: f64) -> Self {
-        OrbitError::NotConverged { method, omega, iterations, residual, spent: false, instead: String::new() }
+        OrbitError::NotConverged {
+            method,
+            omega,
+            iterations,
+            residual,
+            work_limit_reached: false,
+            advice: String::new(),
+        }
     }
 
     /// Adds that the method `other` found no orbit either.
-    pub(crate) fn after(mut self, other: &str) -> Self {
+    pub(crate) fn with_failed_alternative(mut self, other: &str) -> Self {
         match &mut self {
-            OrbitError::NotConverged { instead, .. } | OrbitError::Truncation { instead, .. } => {
-                *instead = format!("; `{other}` found no orbit either");
+            OrbitError::NotConverged { advice, .. } | OrbitError::Truncation { advice, .. } => {
+                *advice = format!("; `{other}` found no orbit either");
             }
             _ => {}
         }
@@ -457,7 +464,7 @@ impl OrbitError {
 
     /// Returns the error of a motion that drifts.
     pub(crate) fn drift(method: &'static str, omega: f64) -> Self {
-        OrbitError::Drift { method, omega, instead: String::new() }
+        OrbitError::Drift { method, omega, advice: String::new() }
     }
 
     /// Returns one word for tables.
@@ -468,8 +475,10 @@ impl OrbitError {
             OrbitError::Breakdown { .. } => "breakdown",
             OrbitError::Evidence { .. } => "evidence-fails",
             OrbitError::Truncation { .. } => "tolerance-not-reached",
-            OrbitError::Drift { .. } | OrbitError::NoOrbit { course: Course::MovesOn { .. }, .. } => "drifts",
-            OrbitError::NoOrbit { course: Course::Settles | Course::Settling { .. }, .. } => "not-converged",
+            OrbitError::Drift { .. } | OrbitError::NoOrbit { observed: ObservedMotion::Drifts { .. }, .. } => "drifts",
+            OrbitError::NoOrbit { observed: ObservedMotion::Settles | ObservedMotion::Settling { .. }, .. } => {
+                "not-converged"
+            }
             OrbitError::NoOrbit { .. } => "not-settled",
             OrbitError::Resonance { .. } => "resonance",
             OrbitError::NotAnOrbit { .. } => "not-an-orbit",

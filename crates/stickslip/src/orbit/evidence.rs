@@ -38,7 +38,7 @@ pub struct Evidence {
     pub harmonics: Option<usize>,
     /// Estimated relative error of the amplitudes from discretisation; `None` for a method
     /// without such an estimate.
-    pub truncation: Option<f64>,
+    pub error_estimate: Option<f64>,
     /// Comparison of that error with the tolerance.
     pub accuracy: Accuracy,
     /// Distance between the state at t = 0 and its return under an independent time integration,
@@ -56,11 +56,11 @@ pub struct Evidence {
     /// position. The reported orbit is the one that starts at static equilibrium under the
     /// constant loads ([`StaticEquilibrium`](crate::method::StaticEquilibrium)). With method
     /// `transient`, it is the one that the integrated motion reached.
-    pub history: Vec<String>,
-    /// Largest change of an amplitude under two other histories of the joints in `history`,
-    /// relative to the largest amplitude. The other histories have no friction forces in static
-    /// equilibrium, or the opposite ones. `None` if amplitudes do not depend on the history, or
-    /// if it was not measured (methods other than harmonic balance).
+    pub history_dependent: Vec<String>,
+    /// Largest change of an amplitude under two other histories of the joints in
+    /// `history_dependent`, relative to the largest amplitude. The other histories have no
+    /// friction forces in static equilibrium, or the opposite ones. `None` if amplitudes do not
+    /// depend on the history, or if it was not measured (methods other than harmonic balance).
     pub history_spread: Option<f64>,
     /// The algorithm that found the orbit: the method's name, or the successful search of harmonic
     /// balance.
@@ -71,5 +71,5 @@ pub struct Evidence {
     pub found_by: &'static str,
     /// The method that was tried first and failed, if another method found the orbit. See
     /// [`Auto`](crate::method::auto::Auto).
-    pub instead_of: Option<&'static str>,
+    pub fallback_from: Option<&'static str>,
 }

@@ -6,16 +6,16 @@
 
 mod error;
 mod evidence;
-pub(crate) mod measure;
 mod motion;
 mod path;
-mod sampled;
+pub(crate) mod postprocess;
+mod sampled_path;
 mod stability;
 
 pub use crate::law::Contact;
-use crate::law::{Piece, SharedLaw, Slider};
+use crate::law::{IdealElement, SharedLaw, Slider};
 use crate::model::System;
-pub use error::{Breakdown, Course, OrbitError};
+pub use error::{IntegrationError, ObservedMotion, OrbitError};
 pub use evidence::{Accuracy, Evidence};
 pub use motion::{Energy, JointMotion, PlaceMotion, Symmetry};
 use nalgebra::DMatrix;
@@ -37,7 +37,7 @@ pub struct Orbit {
     pub symmetry: Symmetry,
     /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints. It
     /// serves as initial guess for neighbouring orbits.
-    pub start: Vec<f64>,
+    pub initial_state: Vec<f64>,
     /// One entry per place.
     pub places: Vec<PlaceMotion>,
     /// One entry per joint.
@@ -50,7 +50,7 @@ pub struct Orbit {
     /// to the state at t = 0. It is 0 × 0 if the method did not need it; [`Orbit::multipliers`]
     /// then computes it.
     pub return_map: DMatrix<f64>,
-    /// No two motions of the system diverge: [`crate::model::System::contracts`].
+    /// No two motions of the system diverge: [`crate::model::System::is_incrementally_stable`].
     pub(crate) contracts: bool,
     pub(crate) path: Arc<dyn Path>,
 }
@@ -60,9 +60,9 @@ pub(crate) fn laws(system: &System) -> impl Iterator<Item = &SharedLaw> {
     system.joints().iter().map(|joint| joint.law())
 }
 
-/// Returns the names of joints whose history affects the orbit: see [`Evidence::history`]. The
-/// laws are those that the method used.
-pub(crate) fn history<'a>(
+/// Returns the names of joints whose history affects the orbit: see
+/// [`Evidence::history_dependent`]. The laws are those that the method used.
+pub(crate) fn history_dependent_joints<'a>(
     laws: impl Iterator<Item = &'a SharedLaw>,
     joints: &[JointMotion],
     stuck: &[String],
@@ -73,12 +73,12 @@ pub(crate) fn history<'a>(
     }
     let holds = |law: &SharedLaw, motion: &JointMotion| {
         let travel = motion.displacement.first().map_or(0.0, |(low, high)| high - low);
-        let sliders = law.pieces().into_iter().flatten().filter_map(|piece| match piece {
-            Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => Some((stiffness, limit)),
+        let sliders = law.ideal_elements().into_iter().flatten().filter_map(|piece| match piece {
+            IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => Some((stiffness, limit)),
             _ => None,
         });
         let mut reaches = sliders.filter(|(_, limit)| *limit > 0.0).map(|(stiffness, limit)| limit / stiffness);
-        let inner = law.masing().is_some_and(|law| travel <= 2.0 * law.slips_at());
+        let inner = law.masing().is_some_and(|law| travel <= 2.0 * law.slip_displacement());
         stuck.contains(&motion.name) || inner || reaches.any(|reach| travel <= 2.0 * reach)
     };
     let kept = laws.zip(joints).filter(|(law, motion)| holds(law, motion));
@@ -87,7 +87,7 @@ pub(crate) fn history<'a>(
 
 /// Data that a method supplies with the path of an orbit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct OrbitData {
     /// Name of the method.
     pub method: &'static str,
     /// Excitation frequency Ω, rad/s.
@@ -97,28 +97,28 @@ pub struct Found {
     /// The return that was closed.
     pub symmetry: Symmetry,
     /// State at t = 0: displacements (m), velocities (m/s), then the states of the joints.
-    pub start: Vec<f64>,
+    pub initial_state: Vec<f64>,
     /// Relative residual of the method's equations.
     pub residual: f64,
     /// Iterations of the method.
     pub iterations: usize,
     /// Estimated relative error of the amplitudes, if available.
-    pub truncation: Option<f64>,
+    pub error_estimate: Option<f64>,
     /// Comparison of that error with the tolerance.
     pub accuracy: Accuracy,
 }
 
-/// Permitted difference between the ends of a period, and between `start` and the path.
+/// Permitted difference between the ends of a period, and between `initial_state` and the path.
 /// Displacements are relative to their size, velocities to their size times Ω. A series of a few
 /// harmonics is no more accurate.
-const CLOSES: f64 = 1e-3;
+const CLOSURE: f64 = 1e-3;
 /// Two states are equal below this difference relative to the largest amplitude (velocities:
 /// times Ω). Time integration closes orbits to 1e-9, which stiff contacts degrade to 1e-7. The
 /// second constant is the number of instants that are compared.
-const REPEATS: f64 = 1e-6;
-const REPEATED_AT: usize = 8;
+const EQUAL_STATES: f64 = 1e-6;
+const COMPARED_INSTANTS: usize = 8;
 /// Distance from the end of the period at which the path is evaluated, relative to the period.
-const BEFORE: f64 = 1e-9;
+const END_OFFSET: f64 = 1e-9;
 /// Energy gap above which a motion is not an orbit of the system.
 const LARGEST_GAP: f64 = 0.1;
 
@@ -128,7 +128,7 @@ impl Orbit {
     ///
     /// # Errors
     /// [`OrbitError::NotAnOrbit`] if the path does not fit the system, does not close, or does
-    /// not begin at `start`; [`OrbitError::Evidence`] if its energy gap exceeds 0.1.
+    /// not begin at `initial_state`; [`OrbitError::Evidence`] if its energy gap exceeds 0.1.
     ///
     /// # Example
     /// An oscillator without joints, with a known solution.
@@ -137,7 +137,7 @@ impl Orbit {
     /// use num_complex::Complex64;
     /// use std::sync::Arc;
     /// use stickslip::model::System;
-    /// use stickslip::orbit::{Accuracy, Found, Orbit, Path, Sample, Symmetry};
+    /// use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
     /// use stickslip::structure::Structure;
     ///
     /// struct Harmonic { x: Complex64, omega: f64 }
@@ -146,9 +146,9 @@ impl Orbit {
     ///     fn sample(&self, time: f64) -> Sample {
     ///         let (x, s) = (self.x * Complex64::cis(self.omega * time), Complex64::new(0.0, self.omega));
     ///         let [displacement, velocity, acceleration] = [x, s * x, s * s * x].map(|z| vec![z.re]);
-    ///         Sample { displacement, velocity, acceleration, joints: Vec::new(), moved: Vec::new() }
+    ///         Sample { displacement, velocity, acceleration, joints: Vec::new(), imposed: Vec::new() }
     ///     }
-    ///     fn switch_times(&self) -> Vec<f64> {
+    ///     fn transition_times(&self) -> Vec<f64> {
     ///         Vec::new()
     ///     }
     /// }
@@ -157,9 +157,9 @@ impl Orbit {
     /// let system = System::builder(structure).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap();
     /// let omega = 1.5;
     /// let x = 1.0 / Complex64::new(4.0 - omega * omega, 0.1 * omega);
-    /// let found = |x: Complex64| Found {
+    /// let found = |x: Complex64| OrbitData {
     ///     method: "by hand", omega, periods: 1, symmetry: Symmetry::HalfPeriod,
-    ///     start: vec![x.re, -omega * x.im], residual: 0.0, iterations: 1, truncation: None, accuracy: Accuracy::Converged,
+    ///     initial_state: vec![x.re, -omega * x.im], residual: 0.0, iterations: 1, error_estimate: None, accuracy: Accuracy::Converged,
     /// };
     /// let orbit = Orbit::new(&system, Arc::new(Harmonic { x, omega }), found(x)).unwrap();
     /// assert!((orbit.places[0].amplitude() - x.norm()).abs() < 1e-9);
@@ -168,36 +168,47 @@ impl Orbit {
     /// let wrong = Harmonic { x: 2.0 * x, omega };
     /// assert!(Orbit::new(&system, Arc::new(wrong), found(2.0 * x)).is_err());
     /// ```
-    pub fn new(system: &System, path: Arc<dyn Path>, found: Found) -> Result<Orbit, OrbitError> {
-        let Found { method, omega, periods, symmetry, start, residual, iterations, truncation, accuracy } = found;
+    pub fn new(system: &System, path: Arc<dyn Path>, found: OrbitData) -> Result<Orbit, OrbitError> {
+        let OrbitData {
+            method,
+            omega,
+            periods,
+            symmetry,
+            initial_state,
+            residual,
+            iterations,
+            error_estimate,
+            accuracy,
+        } = found;
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        let wrong = |what| OrbitError::NotAnOrbit { method, omega, what };
+        let wrong = |problem| OrbitError::NotAnOrbit { method, omega, problem };
         let (n, period) = (system.dofs(), periods as f64 * std::f64::consts::TAU / omega);
         if periods == 0 {
             return Err(wrong("has `periods` = 0; `periods` must be at least 1"));
         }
-        if start.len() < 2 * n || !start.iter().all(|z| z.is_finite()) {
+        if initial_state.len() < 2 * n || !initial_state.iter().all(|z| z.is_finite()) {
             return Err(wrong("has a `start` without finite displacements and velocities of all degrees of freedom"));
         }
-        let sampled = sampled::Sampled::new(system, path.as_ref(), omega, period);
-        if !sampled.fits() {
+        let sampled = sampled_path::Sampled::new(system, path.as_ref(), omega, period);
+        if !sampled.is_consistent() {
             return Err(wrong("has samples with a wrong number of values, or with NaN or infinity"));
         }
-        let Ok(measured) = measure::measure(system, &sampled, omega, (Symmetry::FullPeriod, period));
+        let Ok(measured) = postprocess::results(system, &sampled, omega, (Symmetry::FullPeriod, period));
         let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
         let apart =
-            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSES * size);
+            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSURE * size);
         let rated = |sample: Sample| -> Vec<f64> {
             sample.displacement.into_iter().chain(sample.velocity.into_iter().map(|v| v / omega)).collect()
         };
         let begin = rated(path.sample(0.0));
-        let stated: Vec<f64> = (0..2 * n).map(|i| if i < n { start[i] } else { start[i] / omega }).collect();
+        let stated: Vec<f64> =
+            (0..2 * n).map(|i| if i < n { initial_state[i] } else { initial_state[i] / omega }).collect();
         if apart(&begin, 1.0, &stated) {
-            return Err(wrong("does not begin at `start`"));
+            return Err(wrong("does not begin at `initial_state`"));
         }
-        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - BEFORE)))) {
+        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - END_OFFSET)))) {
             return Err(wrong("does not return to its initial state after one period"));
         }
         if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
@@ -212,27 +223,27 @@ impl Orbit {
             omega,
             periods,
             symmetry,
-            start,
+            initial_state,
             evidence: Evidence {
                 residual,
                 energy_gap,
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations,
                 harmonics: None,
-                truncation,
+                error_estimate,
                 accuracy,
                 return_defect: None,
-                history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+                history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
                 stuck: measured.stuck,
                 history_spread: None,
                 found_by: method,
-                instead_of: None,
+                fallback_from: None,
             },
             places: measured.places,
             joints: measured.joints,
             energy: measured.energy,
             return_map: DMatrix::zeros(0, 0),
-            contracts: system.contracts(),
+            contracts: system.is_incrementally_stable(),
             path,
         })
     }
@@ -246,19 +257,19 @@ impl Orbit {
     /// Returns the smallest number of excitation periods after which the motion repeats. A
     /// search for motions of several periods also finds those of fewer. States that differ by
     /// less than 1e-6 count as equal.
-    pub fn repeats(&self) -> usize {
+    pub fn minimal_periods(&self) -> usize {
         let state = |time: f64| {
             let sample = self.sample(time);
             let velocities = sample.velocity.into_iter().map(|v| v / self.omega);
             sample.displacement.into_iter().chain(velocities).collect::<Vec<f64>>()
         };
-        let size = self.places.iter().map(|place| place.size()).fold(0.0, f64::max);
+        let size = self.places.iter().map(|place| place.length_amplitude()).fold(0.0, f64::max);
         let drive = self.period() / self.periods as f64;
         let after = |periods: usize| {
-            (0..REPEATED_AT).all(|i| {
-                let time = self.period() * i as f64 / REPEATED_AT as f64;
+            (0..COMPARED_INSTANTS).all(|i| {
+                let time = self.period() * i as f64 / COMPARED_INSTANTS as f64;
                 let (now, later) = (state(time), state(time + periods as f64 * drive));
-                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= REPEATS * size)
+                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= EQUAL_STATES * size)
             })
         };
         (1..self.periods)
@@ -273,8 +284,8 @@ impl Orbit {
     }
 
     /// Returns the times in `[0, T)` at which a joint switches, in increasing order, s.
-    pub fn switch_times(&self) -> Vec<f64> {
-        self.path.switch_times()
+    pub fn transition_times(&self) -> Vec<f64> {
+        self.path.transition_times()
     }
 
     /// Returns the motion of a place by name.
@@ -289,7 +300,7 @@ impl Orbit {
 
     /// Tells whether a joint sticks for the whole period, so that the orbit belongs to a
     /// continuum.
-    pub fn is_one_of_many(&self) -> bool {
+    pub fn is_in_continuum(&self) -> bool {
         !self.evidence.stuck.is_empty()
     }
 }

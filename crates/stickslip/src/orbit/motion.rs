@@ -35,7 +35,7 @@ pub struct PlaceMotion {
     pub first_harmonic: Complex64,
     /// Only for a rotation, with values in rad instead of m: the radius (m) that converts it
     /// into a displacement.
-    pub radius: Option<f64>,
+    pub rotation_radius: Option<f64>,
 }
 
 /// A first harmonic below this fraction of the amplitude is rounding. Orbits are more accurate
@@ -49,8 +49,8 @@ impl PlaceMotion {
     }
     /// Returns the amplitude as a length, m, for comparisons between places. For a rotation it
     /// is the arc at its radius.
-    pub fn size(&self) -> f64 {
-        self.amplitude() * self.radius.unwrap_or(1.0)
+    pub fn length_amplitude(&self) -> f64 {
+        self.amplitude() * self.rotation_radius.unwrap_or(1.0)
     }
     /// Returns the phase of the first harmonic relative to `cos Ωt`, degrees in (-180, 180]. NaN
     /// if the motion has no first harmonic.

@@ -1,7 +1,7 @@
 //! A motion that can be evaluated at any time.
 
 use super::Symmetry;
-use crate::law::{Contact, MOST_DIRECTIONS};
+use crate::law::{Contact, MAX_DIRECTIONS};
 use nalgebra::DMatrix;
 
 /// State of a motion at one instant.
@@ -16,7 +16,7 @@ pub struct Sample {
     /// State of each joint.
     pub joints: Vec<JointSample>,
     /// Displacement (m) and driving force (N) of each place with imposed motion.
-    pub moved: Vec<(f64, f64)>,
+    pub imposed: Vec<(f64, f64)>,
 }
 
 /// State of a joint at one instant.
@@ -24,18 +24,18 @@ pub struct Sample {
 pub struct JointSample {
     /// Relative displacement in the joint's directions, m. In this and the following arrays,
     /// only the joint's directions are used.
-    pub displacement: [f64; MOST_DIRECTIONS],
+    pub displacement: [f64; MAX_DIRECTIONS],
     /// Relative velocity, m/s.
-    pub velocity: [f64; MOST_DIRECTIONS],
+    pub velocity: [f64; MAX_DIRECTIONS],
     /// Force, N.
-    pub force: [f64; MOST_DIRECTIONS],
+    pub force: [f64; MAX_DIRECTIONS],
     /// Contact state.
     pub contact: Contact,
 }
 
 impl JointSample {
     /// Creates the state of a joint with one direction.
-    pub fn along(displacement: f64, velocity: f64, force: f64, contact: Contact) -> Self {
+    pub fn one_dimensional(displacement: f64, velocity: f64, force: f64, contact: Contact) -> Self {
         let first = |value: f64| [value, 0.0, 0.0];
         JointSample { displacement: first(displacement), velocity: first(velocity), force: first(force), contact }
     }
@@ -52,7 +52,7 @@ pub trait Path: Send + Sync {
     /// Returns the state at `time` in `[0, T)`.
     fn sample(&self, time: f64) -> Sample;
     /// Returns the times of all transitions in `[0, T)`, in increasing order.
-    fn switch_times(&self) -> Vec<f64>;
+    fn transition_times(&self) -> Vec<f64>;
     /// Returns the derivative of the return map at `start`, for a method that does not compute
     /// it during its search. `None` if it is not available.
     fn return_map(&self, _start: &[f64], _symmetry: Symmetry) -> Option<DMatrix<f64>> {

@@ -1,10 +1,10 @@
 //! Stability of an orbit against small disturbances.
 //!
 //! If no two motions of the system diverge, every orbit is stable, and nothing is computed
-//! ([`System::contracts`]). Otherwise the Floquet multipliers of largest modulus decide. They
-//! are eigenvalues of the derivative of the return map.
+//! ([`System::is_incrementally_stable`]). Otherwise the Floquet multipliers of largest modulus
+//! decide. They are eigenvalues of the derivative of the return map.
 //!
-//! [`System::contracts`]: crate::model::System::contracts
+//! [`System::is_incrementally_stable`]: crate::model::System::is_incrementally_stable
 
 use super::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -20,7 +20,7 @@ const NEUTRAL: f64 = 1e-6;
 /// Knowledge about the stability of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stability {
-    /// No disturbance grows, by theorem: see [`crate::model::System::contracts`].
+    /// No disturbance grows, by theorem: see [`crate::model::System::is_incrementally_stable`].
     Proven,
     /// Determined by the Floquet multipliers.
     Computed {
@@ -41,7 +41,7 @@ impl Orbit {
             return Stability::Unknown;
         }
         match eigen::largest_modulus(&self.return_map) {
-            Some(modulus) => Stability::Computed { largest: self.over_period(modulus.into()).norm() },
+            Some(modulus) => Stability::Computed { largest: self.full_period(modulus.into()).norm() },
             None => Stability::Unknown,
         }
     }
@@ -64,12 +64,12 @@ impl Orbit {
     /// Source: Leine and Nijmeijer (2004), Ch. 7.
     pub fn multipliers(&self) -> Option<Vec<Complex64>> {
         let map = if self.return_map.is_empty() && !self.places.is_empty() {
-            Cow::Owned(self.path.return_map(&self.start, self.symmetry)?)
+            Cow::Owned(self.path.return_map(&self.initial_state, self.symmetry)?)
         } else {
             Cow::<DMatrix<f64>>::Borrowed(&self.return_map)
         };
         let found = eigen::eigenvalues(&map)?;
-        let mut multipliers: Vec<Complex64> = found.into_iter().map(|value| self.over_period(value)).collect();
+        let mut multipliers: Vec<Complex64> = found.into_iter().map(|value| self.full_period(value)).collect();
         multipliers.sort_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()).then(b.im.total_cmp(&a.im)));
         Some(multipliers)
     }
@@ -80,11 +80,11 @@ impl Orbit {
     /// not known yet, this call integrates the motion over one return. `None` if no integrator
     /// supports the laws of the system.
     pub fn return_defect(&self) -> Option<f64> {
-        self.evidence.return_defect.or_else(|| self.path.return_defect(&self.start, self.symmetry))
+        self.evidence.return_defect.or_else(|| self.path.return_defect(&self.initial_state, self.symmetry))
     }
 
     /// Converts the multiplier of a return into that of the full period.
-    fn over_period(&self, value: Complex64) -> Complex64 {
+    fn full_period(&self, value: Complex64) -> Complex64 {
         match self.symmetry {
             // the signed half-period map is the square root of the full map
             Symmetry::HalfPeriod => value * value,

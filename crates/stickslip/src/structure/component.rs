@@ -3,12 +3,13 @@
 //! The matrices come from finite-element programs. A component has named rows and gives its
 //! full or reduced form for observed places.
 
-use super::cyclic::{Blade, BladeError, Boundary, CyclicSector};
 use super::reduction::{
-    Damping, Deviation, EXTENTS, Free, Lacking, Mixed, NominalRing, Reduce, Reduced, ReducedSector, Reduction,
-    ReductionError, ReductionKind, Reference, RingModes, Row, STEPS, Whole,
+    AutomaticReduction, EXTENTS, FullStructure, MistunedModes, MistuningError, NominalRing, ReducedMatrices,
+    ReducedSector, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, RingModes, Row,
+    RubinBasis, STEPS, StructureDamping,
 };
-use super::{DampedModes, StructureError, free_vibrations, symmetric};
+use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
+use super::{ModalDamping, StructureError, free_vibrations, symmetric};
 use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -40,68 +41,68 @@ use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, mult
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone)]
-pub struct Component(Arc<Kept>);
+pub struct Component(Arc<ComponentData>);
 
-struct Kept {
+struct ComponentData {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
-    whole: Whole,
+    whole: FullStructure,
     /// True if the mass matrix is positive definite.
     definite_mass: bool,
     /// Stored reductions by request, because the cases of a study repeat requests.
-    reductions: Known<Asked, Answer>,
+    reductions: Cache<ReductionRequest, ReducedResult>,
     /// Stored modal damping, by ratio and largest frequency.
-    damped: Known<(f64, f64), Damped>,
+    damped: Cache<(f64, f64), Damped>,
     /// Stored numbers of modes below a frequency.
-    counts: Known<f64, Option<usize>>,
+    counts: Cache<f64, Option<usize>>,
     /// The component as a sector of a ring, by boundary and number of sectors.
-    sectors: Mutex<Vec<(Boundary, usize, Arc<KeptSector>)>>,
+    sectors: Mutex<Vec<(Boundary, usize, Arc<SectorCache>)>>,
 }
 
 /// A component as a sector of a ring, with its stored results.
 #[derive(Debug)]
-pub(crate) struct KeptSector {
+pub(crate) struct SectorCache {
     pub sector: CyclicSector,
-    reductions: Known<Asked, Answer>,
-    blades: Known<Vec<usize>, KeptBlade>,
+    reductions: Cache<ReductionRequest, ReducedResult>,
+    blades: Cache<Vec<usize>, KeptBlade>,
 }
 
 /// The blade of a sector, with its stored results.
 #[derive(Debug)]
-pub(crate) struct SectorBlade {
+pub(crate) struct BladeCache {
     blade: Blade,
     entries: OnceLock<Vec<(usize, usize, f64)>>,
     /// Stored reductions, by request and number of steps of blade vectors.
-    reductions: Known<(Asked, usize), Relieved>,
+    reductions: Cache<(ReductionRequest, usize), ReducedRingResult>,
     /// Stored results, by request and deviations of all blades.
-    mistuned: Known<Pattern, Arc<ReducedComponent>>,
+    mistuned: Cache<MistuningPattern, Arc<ReducedComponent>>,
 }
 
-type KeptBlade = Result<Arc<SectorBlade>, BladeError>;
+type KeptBlade = Result<Arc<BladeCache>, BladeError>;
 /// A request, and the deviations of all blades.
-type Pattern = (Asked, Vec<f64>);
-type Relieved = Result<Arc<InFew>, ReductionError>;
+type MistuningPattern = (ReductionRequest, Vec<f64>);
+type ReducedRingResult = Result<Arc<ReducedRing>, ReductionError>;
 
 /// A reduced sector, the ring in its coordinates, and the estimate of its error.
 #[derive(Debug)]
-struct InFew {
+struct ReducedRing {
     component: Arc<ReducedComponent>,
     ring: NominalRing,
-    lacking: Lacking,
+    lacking: MistuningError,
 }
 
 /// Requests with their results.
-type Known<K, V> = Mutex<Vec<(K, V)>>;
-type Asked = (Vec<Row>, Reduction);
-type Answer = Result<Arc<ReducedComponent>, ReductionError>;
+type Cache<K, V> = Mutex<Vec<(K, V)>>;
+type ReductionRequest = (Vec<Row>, Reduction);
+type ReducedResult = Result<Arc<ReducedComponent>, ReductionError>;
 /// Factor of the stiffness, s, and the remaining modal damping.
-type Damped = Result<(f64, DampedModes), ReductionError>;
+type Damped = Result<(f64, ModalDamping), ReductionError>;
 
 /// A reduced component, with its error relative to the full component.
 #[derive(Debug, Clone)]
 pub struct ReducedComponent {
-    form: Form,
-    deviation: Deviation,
+    form: ReducedForm,
+    deviation: ReductionDeviation,
     /// Computed frequencies of the full component, rad/s.
     frequencies: Vec<f64>,
     /// Number of free motions among them.
@@ -112,13 +113,14 @@ pub struct ReducedComponent {
     serves: f64,
 }
 
-/// A reduced component that also serves a second stiffness; see [`Component::reduced_between`].
+/// A reduced component that also serves a second stiffness; see
+/// [`Component::reduced_for_two_stiffnesses`].
 #[derive(Debug, Clone)]
-pub struct BetweenComponent {
+pub struct CommonBasisComponent {
     /// The reduced component with its own stiffness.
     pub component: Component,
     /// The second stiffness in the same coordinates, N/m.
-    pub there: SparseMatrix,
+    pub other_stiffness: SparseMatrix,
     /// The observed displacements, over the coordinates.
     pub seen: Vec<Row>,
     /// Description of the reduction.
@@ -150,9 +152,9 @@ pub struct SectorComponent {
 
 /// The reduced matrices.
 #[derive(Debug, Clone)]
-pub(crate) enum Form {
+pub(crate) enum ReducedForm {
     /// A single component, without its basis.
-    Alone(Arc<Reduced>),
+    Alone(Arc<ReducedMatrices>),
     /// One sector of a ring.
     Sector(Arc<ReducedSector>),
     /// A ring with different blades.
@@ -162,11 +164,11 @@ pub(crate) enum Form {
 /// Number of mistuning patterns whose modes are stored. A case is assembled several times in
 /// succession, and a campaign has a million patterns. The modes of 240 blades with five places
 /// each use 40 MB.
-const PATTERNS: usize = 16;
+const CACHED_PATTERNS: usize = 16;
 
 /// Ratio of the highest retained frequency to the highest frequency of interest. The last modes
 /// only improve those below.
-const BEYOND: f64 = 1.5;
+const MODE_MARGIN: f64 = 1.5;
 
 impl Component {
     /// Creates a component from row names and symmetric sparse matrices.
@@ -193,14 +195,24 @@ impl Component {
             }
         }
         let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
-        let damping = damping.map_or(Damping::Rayleigh { mass: 0.0, stiffness: 0.0 }, Damping::Matrix);
+        let damping =
+            damping.map_or(StructureDamping::Rayleigh { mass: 0.0, stiffness: 0.0 }, StructureDamping::Matrix);
         // sizes and symmetry are already checked
-        let whole = Whole::unseen(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
+        let whole = FullStructure::without_ports(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let definite = sparse_definite_with_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
         let (index, reductions) = (OnceLock::new(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Ok(Component(Arc::new(Kept { rows, index, whole, definite_mass, reductions, damped, counts, sectors })))
+        Ok(Component(Arc::new(ComponentData {
+            rows,
+            index,
+            whole,
+            definite_mass,
+            reductions,
+            damped,
+            counts,
+            sectors,
+        })))
     }
 
     /// Returns the number of rows of the matrices.
@@ -224,9 +236,9 @@ impl Component {
 
     /// Returns mass (kg), damping (kg/s), if any, and stiffness (N/m).
     pub fn matrices(&self) -> (&SparseMatrix, Option<&SparseMatrix>, &SparseMatrix) {
-        let Whole { mass, damping, stiffness, .. } = &self.0.whole;
+        let FullStructure { mass, damping, stiffness, .. } = &self.0.whole;
         let own = match damping {
-            Damping::Matrix(own) => Some(own),
+            StructureDamping::Matrix(own) => Some(own),
             _ => None,
         };
         (mass, own, stiffness)
@@ -243,7 +255,7 @@ impl Component {
     /// # Errors
     /// [`ReductionError::Modes`].
     pub fn frequencies(&self, count: usize) -> Result<Vec<f64>, ReductionError> {
-        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        let FullStructure { mass, stiffness, analysis, .. } = &self.0.whole;
         let modes = NaturalModes::new(analysis, stiffness, mass, ModeSelection::Lowest(count))?;
         Ok(natural(&modes))
     }
@@ -270,7 +282,7 @@ impl Component {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn free_vibration(&self, count: usize) -> Result<Option<Vec<f64>>, ReductionError> {
-        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
+        let FullStructure { mass, stiffness, analysis, .. } = &self.0.whole;
         let Some(damping) = self.matrices().1.filter(|damping| damping.asymmetry(0.0).is_some()) else {
             return Ok(None);
         };
@@ -297,8 +309,8 @@ impl Component {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn modes_below(&self, omega: f64) -> Option<usize> {
-        let Whole { mass, stiffness, analysis, .. } = &self.0.whole;
-        once(&self.0.counts, &omega, || {
+        let FullStructure { mass, stiffness, analysis, .. } = &self.0.whole;
+        cached(&self.0.counts, &omega, || {
             analysis.factor(&[(1.0, stiffness), (-omega * omega, mass)]).ok().map(|factor| factor.negative_pivots())
         })
     }
@@ -309,9 +321,9 @@ impl Component {
     /// # Errors
     /// [`ReductionError`]: no place, a failure of the mode computation, or no reduction within
     /// the tolerance.
-    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
-        once(&self.0.reductions, &(seen.to_vec(), *how), || {
-            self.0.whole.seen_at(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
+    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
+        cached(&self.0.reductions, &(seen.to_vec(), *how), || {
+            self.0.whole.with_ports(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
         })
     }
 
@@ -334,29 +346,29 @@ impl Component {
     /// let mass = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
     /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 };
-    /// let few = rest.reduced_between(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
-    /// assert_eq!(few.component.dofs(), few.there.n());
+    /// let few = rest.reduced_for_two_stiffnesses(&rod(1.5e4)?, &[vec![(2, 1.0)]], &how)?;
+    /// assert_eq!(few.component.dofs(), few.other_stiffness.n());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn reduced_between(
+    pub fn reduced_for_two_stiffnesses(
         &self,
         there: &SparseMatrix,
         seen: &[Row],
         how: &Reduction,
-    ) -> Result<BetweenComponent, ReductionError> {
+    ) -> Result<CommonBasisComponent, ReductionError> {
         let tolerance = match *how {
             Reduction::UpTo { tolerance, .. } => tolerance,
             _ => f64::INFINITY,
         };
-        let reduce = |whole: &Whole| in_few(whole, how).map(|few| (few.reduced, few.up_to));
-        let few = self.0.whole.seen_at(seen.to_vec())?.between(there, reduce, tolerance)?;
-        let Reduced { mass, damping, stiffness, ports, kind, .. } = few.rest;
+        let reduce = |whole: &FullStructure| reduce_whole(whole, how).map(|few| (few.reduced, few.up_to));
+        let few = self.0.whole.with_ports(seen.to_vec())?.between(there, reduce, tolerance)?;
+        let ReducedMatrices { mass, damping, stiffness, ports, kind, .. } = few.own;
         let damping = if self.matrices().1.is_some() { Some(sparse(&damping)?) } else { None };
         let component = Component::new(vec![String::new(); mass.nrows()], sparse(&mass)?, damping, sparse(&stiffness)?);
         let seen = ports.row_iter().map(|row| row.iter().copied().enumerate().filter(|part| part.1 != 0.0).collect());
-        Ok(BetweenComponent {
+        Ok(CommonBasisComponent {
             component: component.map_err(|_| ReductionError::OutOfRange)?,
-            there: sparse(&few.there.stiffness)?,
+            other_stiffness: sparse(&few.other.stiffness)?,
             seen: seen.collect(),
             kind,
             error: few.deviation.error,
@@ -382,7 +394,7 @@ impl Component {
     ) -> Result<SectorComponent, ReductionError> {
         let kept = self.sector(boundary, sectors);
         let few = kept.reduced(seen, how)?;
-        let Form::Sector(reduced) = few.form() else { return Err(ReductionError::NoPorts) };
+        let ReducedForm::Sector(reduced) = few.form() else { return Err(ReductionError::NoPorts) };
         let r = reduced.dofs();
         let columns = kept.sector.whole_columns(&reduced.basis);
         let (mass, damping, stiffness) = self.matrices();
@@ -414,20 +426,20 @@ impl Component {
     /// Returns damping with one ratio for all modes up to a frequency (rad/s), and proportional
     /// to the stiffness above. The result is stored.
     pub(crate) fn modal_damping(&self, ratio: f64, up_to: f64) -> Damped {
-        once(&self.0.damped, &(ratio, up_to), || {
+        cached(&self.0.damped, &(ratio, up_to), || {
             let (beta, columns) = self.0.whole.modal_damping(ratio, up_to)?;
-            Ok((beta, DampedModes::new(self.dofs(), Arc::new(columns))))
+            Ok((beta, ModalDamping::new(self.dofs(), Arc::new(columns))))
         })
     }
 
     /// Returns the component as one of `sectors` sectors of a ring.
-    pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<KeptSector> {
+    pub(crate) fn sector(&self, boundary: &Boundary, sectors: usize) -> Arc<SectorCache> {
         let mut known = self.0.sectors.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((.., kept)) = known.iter().find(|(own, count, _)| own == boundary && *count == sectors) {
             return kept.clone();
         }
         let sector = CyclicSector::new(self.matrices(), boundary, sectors);
-        let kept = Arc::new(KeptSector { sector, reductions: Mutex::default(), blades: Mutex::default() });
+        let kept = Arc::new(SectorCache { sector, reductions: Mutex::default(), blades: Mutex::default() });
         known.push((boundary.clone(), sectors, kept.clone()));
         kept
     }
@@ -442,7 +454,7 @@ fn sparse(dense: &DMatrix<f64>) -> Result<SparseMatrix, ReductionError> {
 
 /// Returns a stored result, or computes it once. Concurrent identical requests wait for the
 /// first one.
-fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
+fn cached<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, compute: impl FnOnce() -> V) -> V {
     let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, answer)) = known.iter().find(|(key, _)| key == asked) {
         return answer.clone();
@@ -452,16 +464,16 @@ fn once<K: PartialEq + Clone, V: Clone>(known: &Known<K, V>, asked: &K, compute:
     answer
 }
 
-impl KeptSector {
+impl SectorCache {
     /// Returns the reduced sector.
-    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> Answer {
-        once(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
+    pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
+        cached(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
     }
 
-    fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> Answer {
+    fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> ReducedResult {
         let chosen = self.sector.reduced(seen, how, blade)?;
         let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
-        let form = Form::Sector(Arc::new(chosen.reduced));
+        let form = ReducedForm::Sector(Arc::new(chosen.reduced));
         Ok(Arc::new(ReducedComponent {
             form,
             deviation,
@@ -474,10 +486,10 @@ impl KeptSector {
 
     /// Returns the blade that consists of the rows `blade` of the component.
     pub fn blade(&self, component: &Component, blade: &[usize]) -> KeptBlade {
-        once(&self.blades, &blade.to_vec(), || {
+        cached(&self.blades, &blade.to_vec(), || {
             let blade = self.sector.blade(component.rows(), component.matrices().2, blade)?;
             let (reductions, mistuned) = (Mutex::default(), Mutex::default());
-            Ok(Arc::new(SectorBlade { blade, entries: OnceLock::new(), reductions, mistuned }))
+            Ok(Arc::new(BladeCache { blade, entries: OnceLock::new(), reductions, mistuned }))
         })
     }
 
@@ -486,7 +498,7 @@ impl KeptSector {
     ///
     /// The sector basis receives as many blade vectors as the error requires, or the number
     /// with the smallest error.
-    pub fn mistuned(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+    pub fn mistuned(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
         let asked = ((seen.to_vec(), *how), deviations.to_vec());
         let known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, answer)) = known.iter().find(|(key, _)| *key == asked) {
@@ -494,32 +506,32 @@ impl KeptSector {
         }
         // other patterns need not wait
         drop(known);
-        let answer = self.nearest(blade, deviations, seen, how)?;
+        let answer = self.best_mistuned(blade, deviations, seen, how)?;
         let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() >= PATTERNS {
+        if known.len() >= CACHED_PATTERNS {
             known.remove(0);
         }
         known.push((asked, answer.clone()));
         Ok(answer)
     }
 
-    fn nearest(&self, blade: &SectorBlade, deviations: &[f64], seen: &[Row], how: &Reduction) -> Answer {
+    fn best_mistuned(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
         // the number of modes is fixed, without blade vectors
         let (steps, enough) = match *how {
             Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
             _ => (0..1, f64::INFINITY),
         };
-        let mut best: Option<(Arc<InFew>, Mixed, Deviation)> = None;
+        let mut best: Option<(Arc<ReducedRing>, MistunedModes, ReductionDeviation)> = None;
         for step in steps {
             // a later failure keeps the earlier result
-            let few = match (self.few(blade, seen, how, step), &best) {
+            let few = match (self.reduced_ring(blade, seen, how, step), &best) {
                 (Ok(few), _) => few,
                 (Err(_), Some(_)) => continue,
                 (Err(error), None) => return Err(error),
             };
-            let mixed = few.ring.mixed(deviations, EXTENTS[0])?;
+            let mixed = few.ring.mistuned_modes(deviations, EXTENTS[0])?;
             let (own, found) =
-                (few.component.deviation, few.lacking.deviation((&mixed.values, &mixed.shapes), deviations));
+                (few.component.deviation, few.lacking.deviation(&mixed.values, &mixed.shapes, deviations));
             let deviation = if found.error > own.error { found } else { own };
             if best.as_ref().is_none_or(|(.., best)| deviation.error < best.error) {
                 best = Some((few, mixed, deviation));
@@ -532,31 +544,31 @@ impl KeptSector {
         let (mut modes, mut left_out) = few.ring.modes(&mixed)?;
         for extent in EXTENTS.into_iter().skip(1).filter(|_| enough.is_finite()) {
             if left_out.error > enough {
-                (modes, left_out) = few.ring.modes(&few.ring.mixed(deviations, extent)?)?;
+                (modes, left_out) = few.ring.modes(&few.ring.mistuned_modes(deviations, extent)?)?;
             }
         }
         let deviation = if left_out.error > deviation.error { left_out } else { deviation };
-        let form = Form::Ring(Arc::new(modes));
+        let form = ReducedForm::Ring(Arc::new(modes));
         Ok(Arc::new(ReducedComponent { form, deviation, ..ReducedComponent::clone(&few.component) }))
     }
 
     /// Reduces the sector with the blade vectors of this step; step 0 has none.
-    fn few(&self, blade: &SectorBlade, seen: &[Row], how: &Reduction, step: usize) -> Relieved {
-        once(&blade.reductions, &((seen.to_vec(), *how), step), || {
+    fn reduced_ring(&self, blade: &BladeCache, seen: &[Row], how: &Reduction, step: usize) -> ReducedRingResult {
+        cached(&blade.reductions, &((seen.to_vec(), *how), step), || {
             let component = match step {
                 0 => self.reduced(seen, how)?,
                 _ => self.chosen(seen, how, Some((&blade.blade, step)))?,
             };
-            let Form::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
-            let (of_blade, up_to) = (blade.blade.along(sector.n, &sector.basis), component.up_to);
-            let lacking = Lacking::new((&self.sector, seen), &blade.blade, sector, up_to)?;
+            let ReducedForm::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
+            let (of_blade, up_to) = (blade.blade.projected(sector.n, &sector.basis), component.up_to);
+            let lacking = MistuningError::new((&self.sector, seen), &blade.blade, sector, up_to)?;
             let ring = NominalRing::new(sector, of_blade, self.sector.sectors, up_to)?;
-            Ok(Arc::new(InFew { component, ring, lacking }))
+            Ok(Arc::new(ReducedRing { component, ring, lacking }))
         })
     }
 }
 
-impl SectorBlade {
+impl BladeCache {
     /// Returns the stiffness entries for a relative deviation of one, over all remaining rows.
     pub fn entries(&self) -> &[(usize, usize, f64)] {
         self.entries.get_or_init(|| self.blade.entries())
@@ -582,17 +594,17 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
     modes.values.iter().map(|value| value.max(0.0).sqrt()).collect()
 }
 
-fn reduce(whole: &Whole, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
-    let Fewer { reduced, deviation, modes, up_to, serves } = in_few(whole, how)?;
+fn reduce(whole: &FullStructure, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
+    let ReductionResult { reduced, deviation, modes, up_to, serves } = reduce_whole(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.rigid_body_count());
-    let form = Form::Alone(Arc::new(reduced.in_metres()));
+    let form = ReducedForm::Alone(Arc::new(reduced.scaled_to_metres()));
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
 
 /// A reduced form of the whole component.
-struct Fewer {
-    reduced: Reduced,
-    deviation: Deviation,
+struct ReductionResult {
+    reduced: ReducedMatrices,
+    deviation: ReductionDeviation,
     /// The modes that it uses.
     modes: NaturalModes,
     /// Upper end of the frequency range in which the error holds, rad/s.
@@ -601,24 +613,24 @@ struct Fewer {
     serves: f64,
 }
 
-fn in_few(whole: &Whole, how: &Reduction) -> Result<Fewer, ReductionError> {
+fn reduce_whole(whole: &FullStructure, how: &Reduction) -> Result<ReductionResult, ReductionError> {
     Ok(match *how {
         Reduction::None { .. } => return Err(ReductionError::NoPorts),
         Reduction::UpTo { up_to, tolerance, kind } => {
-            let chosen = Reduce { up_to, tolerance, kind }.of(whole)?;
+            let chosen = AutomaticReduction { up_to, tolerance, kind }.apply(whole)?;
             let (reduced, deviation, modes) = (chosen.reduced, chosen.deviation, chosen.modes);
-            Fewer { reduced, deviation, modes, up_to, serves: up_to }
+            ReductionResult { reduced, deviation, modes, up_to, serves: up_to }
         }
         Reduction::Modes { modes: count, kind, orders, up_to } => {
             let modes = whole.lowest_modes(count)?;
-            let serves = natural(&modes).last().map_or(0.0, |last| last / BEYOND);
+            let serves = natural(&modes).last().map_or(0.0, |last| last / MODE_MARGIN);
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
-                ReductionKind::Rubin => Free::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
-                ReductionKind::CraigBampton => whole.held(ModeSelection::Lowest(count))?,
+                ReductionKind::Rubin => RubinBasis::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,
+                ReductionKind::CraigBampton => whole.fixed_interface(ModeSelection::Lowest(count))?,
             };
-            let deviation = Reference::new(whole, &modes, up_to)?.deviation(&reduced);
-            Fewer { reduced, deviation, modes, up_to, serves }
+            let deviation = ReferenceReceptance::new(whole, &modes, up_to)?.deviation(&reduced);
+            ReductionResult { reduced, deviation, modes, up_to, serves }
         }
     })
 }
@@ -628,18 +640,18 @@ impl ReducedComponent {
     /// of one sector.
     pub fn dofs(&self) -> usize {
         match &self.form {
-            Form::Alone(reduced) => reduced.dofs(),
-            Form::Sector(sector) => sector.dofs(),
-            Form::Ring(modes) => modes.own.len(),
+            ReducedForm::Alone(reduced) => reduced.dofs(),
+            ReducedForm::Sector(sector) => sector.dofs(),
+            ReducedForm::Ring(modes) => modes.own.len(),
         }
     }
 
     /// Returns a description of the reduction.
     pub fn kind(&self) -> &str {
         match &self.form {
-            Form::Alone(reduced) => &reduced.kind,
-            Form::Sector(sector) => &sector.kind,
-            Form::Ring(modes) => &modes.kind,
+            ReducedForm::Alone(reduced) => &reduced.kind,
+            ReducedForm::Sector(sector) => &sector.kind,
+            ReducedForm::Ring(modes) => &modes.kind,
         }
     }
 
@@ -661,7 +673,7 @@ impl ReducedComponent {
 
     /// Returns the highest frequency for which the basis is intended, rad/s. A damping ratio
     /// applies to all modes up to this frequency.
-    pub fn serves(&self) -> f64 {
+    pub fn intended_up_to(&self) -> f64 {
         self.serves
     }
 
@@ -671,12 +683,12 @@ impl ReducedComponent {
     }
 
     /// Returns the number of free motions among its modes.
-    pub fn free(&self) -> usize {
+    pub fn free_modes(&self) -> usize {
         self.free
     }
 
     /// Returns the reduced matrices.
-    pub(crate) fn form(&self) -> &Form {
+    pub(crate) fn form(&self) -> &ReducedForm {
         &self.form
     }
 }

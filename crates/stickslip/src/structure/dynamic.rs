@@ -1,7 +1,7 @@
 //! The dynamic stiffness of a structure: `(s² M + s C + K) x = F` at `s = jhΩ`.
 
-use super::modal::WithModes;
-use super::{Form, Structure};
+use super::modal_damping::ModallyDampedFactor;
+use super::{Storage, Structure};
 use num_complex::Complex64;
 use stickslip_numerics::dense::ComplexLu;
 use stickslip_numerics::sparse::{ComplexFactor, Singular, SymbolicAnalysis};
@@ -10,14 +10,14 @@ use stickslip_numerics::sparse::{ComplexFactor, Singular, SymbolicAnalysis};
 /// number of loads.
 #[derive(Debug, Clone)]
 pub struct DynamicStiffness {
-    factor: Factor,
+    factor: DynamicFactor,
 }
 
 #[derive(Debug, Clone)]
-enum Factor {
+enum DynamicFactor {
     Full(ComplexLu),
     Sparse(ComplexFactor),
-    Modal(Box<WithModes>),
+    Modal(Box<ModallyDampedFactor>),
 }
 
 impl Structure {
@@ -27,27 +27,29 @@ impl Structure {
     /// # Errors
     /// [`Singular`]: an undamped resonance, or a structure with free motions at `s = 0`.
     pub fn dynamic_stiffness(&self, s: Complex64) -> Result<DynamicStiffness, Singular> {
-        self.held_stiffness(s, 0.0)
+        self.shifted_dynamic_stiffness(s, 0.0)
     }
 
     /// Factors the dynamic stiffness with additional springs of `hold` (1/s²) times the mass
     /// matrix.
-    pub(crate) fn held_stiffness(&self, s: Complex64, hold: f64) -> Result<DynamicStiffness, Singular> {
+    pub(crate) fn shifted_dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<DynamicStiffness, Singular> {
         let of_mass = s * s + hold;
         let factor = match &self.0.form {
-            Form::Full(full) => {
+            Storage::Full(full) => {
                 let n = self.dofs();
                 let entries = full.mass.iter().zip(full.damping.iter()).zip(full.stiffness.iter());
                 let sum = entries.map(|((m, c), k)| of_mass * m + s * c + k).collect();
-                Factor::Full(ComplexLu::new(sum, n).map_err(|row| Singular { row })?)
+                DynamicFactor::Full(ComplexLu::new(sum, n).map_err(|row| Singular { row })?)
             }
-            Form::Sparse { mass, damping, stiffness, modes, analysis, .. } => {
+            Storage::Sparse { mass, damping, stiffness, modes, analysis, .. } => {
                 let analysis = analysis.get_or_init(|| SymbolicAnalysis::new(&[mass, damping, stiffness]));
                 let one = Complex64::new(1.0, 0.0);
                 let factor = analysis.factor_complex(&[(of_mass, mass), (s, damping), (one, stiffness)])?;
                 match modes {
-                    Some(modes) if s != Complex64::ZERO => Factor::Modal(Box::new(WithModes::new(factor, modes, s)?)),
-                    _ => Factor::Sparse(factor),
+                    Some(modes) if s != Complex64::ZERO => {
+                        DynamicFactor::Modal(Box::new(ModallyDampedFactor::new(factor, modes, s)?))
+                    }
+                    _ => DynamicFactor::Sparse(factor),
                 }
             }
         };
@@ -58,8 +60,8 @@ impl Structure {
     /// sparsity pattern without a factorization. Zero for full matrices.
     pub(crate) fn factor_bytes(&self) -> usize {
         match &self.0.form {
-            Form::Full(_) => 0,
-            Form::Sparse { mass, damping, stiffness, analysis, .. } => {
+            Storage::Full(_) => 0,
+            Storage::Sparse { mass, damping, stiffness, analysis, .. } => {
                 let analysis = analysis.get_or_init(|| SymbolicAnalysis::new(&[mass, damping, stiffness]));
                 analysis.complex_bytes()
             }
@@ -71,9 +73,9 @@ impl DynamicStiffness {
     /// Returns its memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         match &self.factor {
-            Factor::Full(factor) => factor.bytes(),
-            Factor::Sparse(factor) => factor.bytes(),
-            Factor::Modal(factor) => factor.bytes(),
+            DynamicFactor::Full(factor) => factor.bytes(),
+            DynamicFactor::Sparse(factor) => factor.bytes(),
+            DynamicFactor::Modal(factor) => factor.bytes(),
         }
     }
 
@@ -84,9 +86,9 @@ impl DynamicStiffness {
     /// If the length of `loads` is not a multiple of n.
     pub fn solve(&self, loads: &mut [Complex64]) {
         match &self.factor {
-            Factor::Full(factor) => factor.solve(loads),
-            Factor::Sparse(factor) => factor.solve(loads),
-            Factor::Modal(factor) => factor.solve(loads),
+            DynamicFactor::Full(factor) => factor.solve(loads),
+            DynamicFactor::Sparse(factor) => factor.solve(loads),
+            DynamicFactor::Modal(factor) => factor.solve(loads),
         }
     }
 }

@@ -22,7 +22,7 @@ const EQUAL: f64 = 1e-12;
 
 /// The rows of the first sector in the matrices of a ring.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sector {
+pub struct RingSector {
     sectors: usize,
     places: Vec<String>,
     /// Row, column, offset of the column in sectors, values of mass, damping, stiffness.
@@ -41,7 +41,7 @@ pub struct Wave {
 
 /// Returns `e^{j 2π k/n}`. Equivalent arguments give identical bits, and quarter turns are
 /// exact.
-pub(crate) fn turn(k: i64, n: usize) -> Complex64 {
+pub(crate) fn unit_root(k: i64, n: usize) -> Complex64 {
     let n = n as i64;
     let k = k.rem_euclid(n);
     match 4 * k {
@@ -68,7 +68,7 @@ pub(crate) fn is_real(diameter: usize, sectors: usize) -> bool {
 /// The input is (row, column, offset of the column in sectors, value) for a matrix of `rows` by
 /// `columns`. The output is (row, column, value) at twice the size, or at single size if the
 /// wave is real.
-pub(super) fn in_wave(
+pub(super) fn wave_entries(
     entries: impl Iterator<Item = (usize, usize, i64, f64)>,
     [rows, columns]: [usize; 2],
     diameter: usize,
@@ -77,7 +77,7 @@ pub(super) fn in_wave(
     let real = is_real(diameter, sectors);
     let mut triplets = Vec::new();
     for (row, column, shift, value) in entries {
-        let phase = turn(diameter as i64 * shift, sectors);
+        let phase = unit_root(diameter as i64 * shift, sectors);
         triplets.push((row, column, value * phase.re));
         if !real {
             triplets.push((rows + row, columns + column, value * phase.re));
@@ -88,12 +88,12 @@ pub(super) fn in_wave(
     triplets
 }
 
-impl Sector {
+impl RingSector {
     /// Returns the first of `sectors` equal sectors, whose degrees of freedom are stored sector
-    /// by sector in `ring`.
+    /// by sector in `cyclic_basis`.
     ///
     /// Returns `None` if the sectors differ, or if modal damping couples all sectors.
-    pub fn of(ring: &Structure, sectors: usize) -> Option<Sector> {
+    pub fn from_ring(ring: &Structure, sectors: usize) -> Option<RingSector> {
         let all = ring.dofs();
         if sectors == 0 || !all.is_multiple_of(sectors) || ring.damped_modes().is_some() {
             return None;
@@ -122,7 +122,7 @@ impl Sector {
                 _ => return None,
             }
         }
-        (met == sectors * entries.len()).then(|| Sector { sectors, places: ring.places()[..n].to_vec(), entries })
+        (met == sectors * entries.len()).then(|| RingSector { sectors, places: ring.places()[..n].to_vec(), entries })
     }
 
     /// Returns the number of degrees of freedom of a sector.
@@ -146,7 +146,7 @@ impl Sector {
     /// `k + 2 kc (1 - cos 2πd/N)`.
     /// ```
     /// use num_complex::Complex64;
-    /// use stickslip::structure::{Sector, Structure};
+    /// use stickslip::structure::{RingSector, Structure};
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let (n, d) = (12, 5);
     /// let entries = |own: f64, beside: f64| {
@@ -155,7 +155,7 @@ impl Sector {
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
     /// let ring = Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5)).unwrap();
-    /// let wave = Sector::of(&ring, n).unwrap().wave(d).unwrap();
+    /// let wave = RingSector::from_ring(&ring, n).unwrap().wave(d).unwrap();
     /// let mut x = vec![Complex64::new(1.0, 0.0)];
     /// wave.dynamic_stiffness(Complex64::ZERO, 0.0).unwrap().solve(&mut x);
     /// let stiffness = 2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
@@ -168,7 +168,7 @@ impl Sector {
         let matrix = |kind: usize| {
             let all =
                 self.entries.iter().map(|&(row, column, shift, values)| (row, column, shift as i64, values[kind]));
-            in_wave(all.filter(|entry| entry.3 != 0.0), [n, n], diameter, self.sectors)
+            wave_entries(all.filter(|entry| entry.3 != 0.0), [n, n], diameter, self.sectors)
         };
         let triplets = [0, 1, 2].map(matrix);
         let [mass, damping, stiffness] = triplets.map(|entries| {
@@ -203,7 +203,7 @@ impl Wave {
 
     /// Returns the phase factor of a sector relative to the first one, `e^{j d θ s}`.
     pub fn phase(&self, sector: i64) -> Complex64 {
-        turn(self.diameter as i64 * sector, self.sectors)
+        unit_root(self.diameter as i64 * sector, self.sectors)
     }
 
     /// Factors `s² M_d + s C_d + K_d`, with additional springs of `hold` (1/s²) times the mass
@@ -212,7 +212,7 @@ impl Wave {
     /// # Errors
     /// [`Singular`]: an undamped resonance.
     pub fn dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<WaveStiffness, Singular> {
-        let factor = self.structure.held_stiffness(s, hold)?;
+        let factor = self.structure.shifted_dynamic_stiffness(s, hold)?;
         Ok(WaveStiffness { dofs: self.dofs, double: self.is_double(), factor })
     }
 }
@@ -276,7 +276,7 @@ mod tests {
     fn a_sector_is_its_ring() {
         for sectors in [2, 3, 7, 24, 30] {
             let ring = ring(sectors, 0.0);
-            let sector = Sector::of(&ring, sectors).unwrap();
+            let sector = RingSector::from_ring(&ring, sectors).unwrap();
             for diameter in 0..sectors {
                 let wave = sector.wave(diameter).unwrap();
                 assert_eq!(wave.is_double(), 2 * diameter % sectors != 0);
@@ -298,19 +298,19 @@ mod tests {
 
     #[test]
     fn unequal_sectors_are_none() {
-        assert!(Sector::of(&ring(7, 1e-6), 7).is_none());
-        assert!(Sector::of(&ring(7, 0.0), 4).is_none());
-        assert!(Sector::of(&ring(7, 0.0), 0).is_none());
+        assert!(RingSector::from_ring(&ring(7, 1e-6), 7).is_none());
+        assert!(RingSector::from_ring(&ring(7, 0.0), 4).is_none());
+        assert!(RingSector::from_ring(&ring(7, 0.0), 0).is_none());
         // a smaller number of sectors is valid: each then comprises several of the original
         // ones
-        assert_eq!(Sector::of(&ring(6, 0.0), 3).unwrap().dofs(), 4);
+        assert_eq!(RingSector::from_ring(&ring(6, 0.0), 3).unwrap().dofs(), 4);
     }
 
     #[test]
     fn turns_are_exact_where_they_can_be() {
-        assert_eq!(turn(6, 8), Complex64::new(0.0, -1.0));
-        assert_eq!(turn(-5, 24), turn(19, 24));
-        assert_eq!(turn(5, 24), turn(19, 24).conj());
-        assert!((turn(7, 24) - Complex64::cis(TAU * 7.0 / 24.0)).norm() < 1e-15);
+        assert_eq!(unit_root(6, 8), Complex64::new(0.0, -1.0));
+        assert_eq!(unit_root(-5, 24), unit_root(19, 24));
+        assert_eq!(unit_root(5, 24), unit_root(19, 24).conj());
+        assert!((unit_root(7, 24) - Complex64::cis(TAU * 7.0 / 24.0)).norm() < 1e-15);
     }
 }

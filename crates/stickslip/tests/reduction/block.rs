@@ -2,7 +2,9 @@
 
 use super::brick::Brick;
 use std::f64::consts::TAU;
-use stickslip::structure::reduction::{Damping, Free, Reduce, Reference, Series, Whole};
+use stickslip::structure::reduction::{
+    AutomaticReduction, FullStructure, ReferenceReceptance, ResidualSeries, RubinBasis, StructureDamping,
+};
 use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SymbolicAnalysis};
 
 /// Ratio of the highest retained mode to the highest frequency of interest.
@@ -79,12 +81,12 @@ fn reductions_of_the_block() {
     let up_to = TAU * 40e3;
     let (mass, stiffness, ports) = (brick.mass.clone(), brick.stiffness.clone(), brick.face(16));
     assert_eq!((brick.dofs(), ports.len()), (1512, 48));
-    let whole = Whole::new(mass, Damping::Ratio { ratio: 0.005, up_to }, stiffness, ports).unwrap();
+    let whole = FullStructure::new(mass, StructureDamping::Ratio { ratio: 0.005, up_to }, stiffness, ports).unwrap();
     let modes = whole.modes(BEYOND * up_to).unwrap();
     let inside = modes.values.partition_point(|value| *value < up_to * up_to);
     assert!(inside > 5, "{inside}");
-    let reference = Reference::new(&whole, &modes, up_to).unwrap();
-    let free = Free::new(&whole, &modes, 0.0, 2).unwrap();
+    let reference = ReferenceReceptance::new(&whole, &modes, up_to).unwrap();
+    let free = RubinBasis::new(&whole, &modes, 0.0, 2).unwrap();
     let [one, two] = [1, 2].map(|order| free.reduced(modes.count(), order).unwrap());
     let held = whole.craig_bampton(BEYOND_HELD * up_to).unwrap();
     // the contribution of the first omitted mode, `(ω² / λ)²ᴶ`, times its part of the response;
@@ -101,7 +103,7 @@ fn reductions_of_the_block() {
         assert!(deviation.error < tolerance, "{}: {deviation:?}", reduced.kind);
     }
     let shift = 0.5 * up_to * up_to;
-    let series = Series::new(&Free::new(&whole, &modes, shift, 4).unwrap(), modes.count()).unwrap();
+    let series = ResidualSeries::new(&RubinBasis::new(&whole, &modes, shift, 4).unwrap(), modes.count()).unwrap();
     let deviation = reference.deviation_of_series(&series);
     // for a shift in the middle of the range, the step is at most half of it
     let step: f64 = 0.5 / (BEYOND * BEYOND - 0.5);
@@ -114,16 +116,16 @@ fn reductions_of_the_block() {
 fn samples_keep_clear_of_equal_modes() {
     let brick = brick([8, 3, 3], true);
     let up_to = TAU * 40e3;
-    let damping = Damping::Ratio { ratio: 0.002, up_to };
-    let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), brick.face(4)).unwrap();
+    let damping = StructureDamping::Ratio { ratio: 0.002, up_to };
+    let whole = FullStructure::new(brick.mass.clone(), damping, brick.stiffness.clone(), brick.face(4)).unwrap();
     let modes = whole.modes(1.5 * up_to).unwrap();
     let equal = modes.values.windows(2).filter(|pair| pair[1] / pair[0] - 1.0 < 1e-9).count();
     assert!(equal > 1, "{:?}", modes.values);
-    let reference = Reference::new(&whole, &modes, up_to).unwrap();
+    let reference = ReferenceReceptance::new(&whole, &modes, up_to).unwrap();
     for omega in reference.frequencies() {
         assert!(modes.values.iter().all(|value| (omega / value.sqrt() - 1.0).abs() > 9e-5), "{omega}");
     }
-    let reduced = Free::new(&whole, &modes, 0.0, 2).unwrap().reduced(modes.count(), 2).unwrap();
+    let reduced = RubinBasis::new(&whole, &modes, 0.0, 2).unwrap().reduced(modes.count(), 2).unwrap();
     let deviation = reference.deviation(&reduced);
     // the contribution of the first omitted mode, with twice as many terms as orders
     assert!(deviation.error < 1.5f64.powi(-8), "{deviation:?}");
@@ -137,11 +139,11 @@ fn many_ports_are_judged_together() {
     let up_to = TAU * 30e3;
     let ports = brick.face(49);
     let error = |ports: Vec<Vec<(usize, f64)>>| {
-        let damping = Damping::Ratio { ratio: 0.005, up_to };
-        let whole = Whole::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
+        let damping = StructureDamping::Ratio { ratio: 0.005, up_to };
+        let whole = FullStructure::new(brick.mass.clone(), damping, brick.stiffness.clone(), ports).unwrap();
         let modes = whole.modes(2.0 * up_to).unwrap();
-        let reduced = Free::new(&whole, &modes, 0.0, 0).unwrap().reduced(modes.count(), 0).unwrap();
-        Reference::at(&whole, &[0.3 * up_to, 0.8 * up_to]).unwrap().deviation(&reduced).error
+        let reduced = RubinBasis::new(&whole, &modes, 0.0, 0).unwrap().reduced(modes.count(), 0).unwrap();
+        ReferenceReceptance::at_frequencies(&whole, &[0.3 * up_to, 0.8 * up_to]).unwrap().deviation(&reduced).error
     };
     assert_eq!(ports.len(), 147);
     let (all, few) = (error(ports.clone()), error(ports.into_iter().step_by(2).collect()));
@@ -153,12 +155,16 @@ fn many_ports_are_judged_together() {
 fn the_error_chooses_the_size() {
     let brick = brick([10, 4, 4], true);
     let up_to = TAU * 20e3;
-    let whole =
-        Whole::new(brick.mass.clone(), Damping::Ratio { ratio: 0.005, up_to }, brick.stiffness.clone(), brick.face(4))
-            .unwrap();
+    let whole = FullStructure::new(
+        brick.mass.clone(),
+        StructureDamping::Ratio { ratio: 0.005, up_to },
+        brick.stiffness.clone(),
+        brick.face(4),
+    )
+    .unwrap();
     let mut last = 0;
     for tolerance in [1e-2, 1e-4, 1e-7] {
-        let chosen = Reduce { up_to, tolerance, kind: None }.of(&whole).unwrap();
+        let chosen = AutomaticReduction { up_to, tolerance, kind: None }.apply(&whole).unwrap();
         assert!(chosen.deviation.error <= tolerance && chosen.reduced.dofs() >= last);
         last = chosen.reduced.dofs();
     }
@@ -173,17 +179,18 @@ fn many_ports_take_modes_before_orders() {
     let brick = brick([4, 6, 6], true);
     let up_to = TAU * 20e3;
     let mut ports = brick.face(49);
-    let damping = Damping::Ratio { ratio: 0.005, up_to };
-    let whole = |ports| Whole::new(brick.mass.clone(), damping.clone(), brick.stiffness.clone(), ports).unwrap();
-    let chosen = Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole(ports.clone())).unwrap();
+    let damping = StructureDamping::Ratio { ratio: 0.005, up_to };
+    let whole =
+        |ports| FullStructure::new(brick.mass.clone(), damping.clone(), brick.stiffness.clone(), ports).unwrap();
+    let chosen = AutomaticReduction { up_to, tolerance: 1e-4, kind: None }.apply(&whole(ports.clone())).unwrap();
     assert!(chosen.deviation.error <= 1e-4, "{:?}", chosen.deviation);
     assert_eq!(chosen.reduced.dofs(), chosen.modes.count() + ports.len(), "{}", chosen.reduced.kind);
     // a port that is the mean of two others
     ports.push(vec![(ports[0][0].0, 0.5), (ports[3][0].0, 0.5)]);
     let whole = whole(ports);
     let modes = whole.modes(1.5 * up_to).unwrap();
-    let free = Free::new(&whole, &modes, 0.0, 2).unwrap();
-    let reference = Reference::new(&whole, &modes, up_to).unwrap();
+    let free = RubinBasis::new(&whole, &modes, 0.0, 2).unwrap();
+    let reference = ReferenceReceptance::new(&whole, &modes, up_to).unwrap();
     let mut last = f64::INFINITY;
     for order in 1..=2 {
         let reduced = free.reduced(modes.count(), order).unwrap();

@@ -49,10 +49,10 @@ fn contacts_of_a_block_move_as_in_time() {
         let balance = HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() };
         let series = balance.solver(&system).unwrap().orbit(omega, None).unwrap();
         let shooting = Shooting { tolerance: STEP, ..Shooting::default() };
-        let in_time = shooting.solver(&system).unwrap().orbit(omega, Some(&series.start)).unwrap();
+        let in_time = shooting.solver(&system).unwrap().orbit(omega, Some(&series.initial_state)).unwrap();
         let slip = series.joints.iter().map(|joint| joint.slip_fraction).fold(0.0, f64::max);
         assert!(slip > 0.1 && slip < 0.99, "{nodes}: {slip}");
-        let truncation = series.evidence.truncation.unwrap();
+        let truncation = series.evidence.error_estimate.unwrap();
         assert!(truncation < 0.02, "{truncation}");
         let largest = in_time.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
         let distance = series.places.iter().zip(&in_time.places).map(|(a, b)| (a.amplitude() - b.amplitude()).abs());

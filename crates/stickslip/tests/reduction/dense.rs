@@ -2,7 +2,10 @@
 
 use nalgebra::{Complex, DMatrix};
 use proptest::prelude::*;
-use stickslip::structure::reduction::{Damping, Free, Reduce, Reduced, ReductionError, Reference, Row, Series, Whole};
+use stickslip::structure::reduction::{
+    AutomaticReduction, FullStructure, ReducedMatrices, ReductionError, ReferenceReceptance, ResidualSeries, Row,
+    RubinBasis, StructureDamping,
+};
 use stickslip_numerics::sparse::SparseMatrix;
 
 fn sparse(n: usize, entries: impl IntoIterator<Item = (usize, usize, f64)>) -> SparseMatrix {
@@ -77,7 +80,7 @@ fn ports(n: usize) -> Vec<Row> {
 /// A frequency above all modes of these structures, `√(4 · 3 / 1)`.
 const ABOVE_ALL: f64 = 4.0;
 
-const UNDAMPED: Damping = Damping::Rayleigh { mass: 0.0, stiffness: 0.0 };
+const UNDAMPED: StructureDamping = StructureDamping::Rayleigh { mass: 0.0, stiffness: 0.0 };
 
 /// The error of a reduction with residual vectors of J orders behaves like `(ω² / λ)²ᴶ⁺¹`, with
 /// λ of the first omitted mode. The static response is exact. This holds for fixed and for free
@@ -87,11 +90,11 @@ fn residual_vectors_make_low_frequencies_exact() {
     let n = 60;
     for held in [true, false] {
         let (m, k) = (masses(n), chain(n, held));
-        let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports(n)).unwrap();
+        let whole = FullStructure::new(m.clone(), UNDAMPED, k.clone(), ports(n)).unwrap();
         let (values, _) = modes(&m, &k);
         let found = whole.modes((values[10] * values[9]).sqrt().sqrt()).unwrap();
         assert_eq!(found.count(), 10);
-        let free = Free::new(&whole, &found, 0.0, 3).unwrap();
+        let free = RubinBasis::new(&whole, &found, 0.0, 3).unwrap();
         let none = DMatrix::zeros(n, n);
         for order in 1..=3 {
             let reduced = free.reduced(10, order).unwrap();
@@ -113,12 +116,12 @@ fn residual_vectors_make_low_frequencies_exact() {
 fn residual_flexibility_of_a_free_structure() {
     let n = 40;
     let (m, k) = (masses(n), chain(n, false));
-    let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports(n)).unwrap();
+    let whole = FullStructure::new(m.clone(), UNDAMPED, k.clone(), ports(n)).unwrap();
     let (values, shapes) = modes(&m, &k);
     let found = whole.modes((values[5] * values[4]).sqrt().sqrt()).unwrap();
     for count in [1, 3, 5] {
         for (shift, order) in [(0.0, 2), (0.5 * values[4] + 0.5 * values[3], 2)] {
-            let series = Series::new(&Free::new(&whole, &found, shift, order).unwrap(), count).unwrap();
+            let series = ResidualSeries::new(&RubinBasis::new(&whole, &found, shift, order).unwrap(), count).unwrap();
             assert_eq!(series.terms(), 4);
             let omega: f64 = 0.6 * values[count].sqrt();
             let row = |row: &Row, mode: usize| row.iter().map(|(at, v)| v * shapes[(*at, mode)]).sum::<f64>();
@@ -144,7 +147,7 @@ fn damping_by_ratio() {
     let (m, k) = (masses(n), chain(n, true));
     let (values, shapes) = modes(&m, &k);
     let (ratio, up_to) = (0.02, 0.5 * (values[6].sqrt() + values[7].sqrt()));
-    let whole = Whole::new(m.clone(), Damping::Ratio { ratio, up_to }, k.clone(), ports(n)).unwrap();
+    let whole = FullStructure::new(m.clone(), StructureDamping::Ratio { ratio, up_to }, k.clone(), ports(n)).unwrap();
     let modal = |value: f64| match value.sqrt() {
         omega if omega < up_to => 2.0 * ratio * omega,
         omega => 2.0 * ratio / up_to * omega * omega,
@@ -153,8 +156,8 @@ fn damping_by_ratio() {
     let c =
         &force * DMatrix::from_diagonal(&DMatrix::from_fn(n, 1, |i, _| modal(values[i])).column(0)) * force.transpose();
     let found = whole.modes(1.5 * up_to).unwrap();
-    let free = Free::new(&whole, &found, 0.0, 3).unwrap();
-    let series = Series::new(&free, found.count()).unwrap();
+    let free = RubinBasis::new(&whole, &found, 0.0, 3).unwrap();
+    let series = ResidualSeries::new(&free, found.count()).unwrap();
     for omega in [0.3 * up_to, values[2].sqrt(), up_to] {
         let expected = receptance(&m, &c, &k, &ports(n), omega);
         let error = off(&free.reduced(found.count(), 3).unwrap().receptance(omega).unwrap(), &expected);
@@ -173,12 +176,12 @@ fn damping_matrix() {
     let n = 30;
     let (m, k) = (masses(n), chain(n, true));
     let c = sparse(n, [(3, 3, 0.2), (4, 9, 0.3), (9, 4, -0.3), (20, 20, 0.1)]);
-    let whole = Whole::new(m.clone(), Damping::Matrix(c.clone()), k.clone(), ports(n)).unwrap();
+    let whole = FullStructure::new(m.clone(), StructureDamping::Matrix(c.clone()), k.clone(), ports(n)).unwrap();
     let found = whole.modes(1.3).unwrap();
-    let free = Free::new(&whole, &found, 0.0, 2).unwrap();
-    assert_eq!(Series::new(&free, 2).unwrap_err(), ReductionError::SeriesDamping);
+    let free = RubinBasis::new(&whole, &found, 0.0, 2).unwrap();
+    assert_eq!(ResidualSeries::new(&free, 2).unwrap_err(), ReductionError::SeriesDamping);
     let reduced = free.reduced(found.count(), 2).unwrap();
-    let reference = Reference::new(&whole, &found, 0.7).unwrap();
+    let reference = ReferenceReceptance::new(&whole, &found, 0.7).unwrap();
     let own = reference
         .frequencies()
         .map(|omega| off(&reduced.receptance(omega).unwrap(), &receptance(&m, &full(&c), &k, &ports(n), omega)));
@@ -188,7 +191,7 @@ fn damping_matrix() {
     assert!(deviation.error < 5.0 * own && own < 5.0 * deviation.error, "{own:.1e} {deviation:?}");
     let all = whole.modes(ABOVE_ALL).unwrap();
     assert_eq!(all.count(), n);
-    let exact = Free::new(&whole, &all, 0.0, 0).unwrap().reduced(n, 0).unwrap();
+    let exact = RubinBasis::new(&whole, &all, 0.0, 0).unwrap().reduced(n, 0).unwrap();
     assert!(reference.deviation(&exact).error < 1e-9, "{:?}", reference.deviation(&exact));
 }
 
@@ -199,9 +202,9 @@ fn ports_without_mass() {
     let m = sparse(n, (0..n).filter(|i| i % 2 == 0).map(|i| (i, i, 1.0)));
     let k = chain(n, true);
     let ports = vec![vec![(n - 1, 1.0)], vec![(7, 1.0)]];
-    let whole = Whole::new(m.clone(), UNDAMPED, k.clone(), ports.clone()).unwrap();
+    let whole = FullStructure::new(m.clone(), UNDAMPED, k.clone(), ports.clone()).unwrap();
     // all twenty modes with a frequency; of the two ports, the one without mass adds its spring
-    let free = Free::new(&whole, &whole.modes(ABOVE_ALL).unwrap(), 0.0, 1).unwrap();
+    let free = RubinBasis::new(&whole, &whole.modes(ABOVE_ALL).unwrap(), 0.0, 1).unwrap();
     assert_eq!(free.modes(), 20);
     for reduced in [free.reduced(20, 1).unwrap(), whole.craig_bampton(ABOVE_ALL).unwrap()] {
         for omega in [0.01, 0.1, 0.3] {
@@ -217,7 +220,7 @@ fn what_is_no_reduction_says_why() {
     let n = 20;
     let (m, k) = (masses(n), chain(n, false));
     let make = |m: &SparseMatrix, k: &SparseMatrix, damping, ports| {
-        Whole::new(m.clone(), damping, k.clone(), ports).map(|_| ())
+        FullStructure::new(m.clone(), damping, k.clone(), ports).map(|_| ())
     };
     let one_sided = sparse(n, k.entries().chain([(0, 5, 1.0)]));
     assert!(matches!(
@@ -229,19 +232,19 @@ fn what_is_no_reduction_says_why() {
     for row in [vec![], vec![(n, 1.0)], vec![(0, f64::NAN)], vec![(0, 0.0)]] {
         assert_eq!(make(&m, &k, UNDAMPED, vec![vec![(0, 1.0)], row]), Err(ReductionError::Port { port: 1, n }));
     }
-    let negative = Damping::Ratio { ratio: -0.1, up_to: 1.0 };
+    let negative = StructureDamping::Ratio { ratio: -0.1, up_to: 1.0 };
     assert!(matches!(make(&m, &k, negative, ports(n)), Err(ReductionError::Number { .. })));
     // a port at one end of two separate free chains does not remove the free motion of the
     // second chain
     let two = [springs(n / 2, &(1..n / 2).map(|i| (i - 1, i, 1.0)).collect::<Vec<_>>()); 1];
     let apart = sparse(n, two[0].entries().flat_map(|(i, k, v)| [(i, k, v), (i + n / 2, k + n / 2, v)]));
-    let whole = Whole::new(m.clone(), UNDAMPED, apart, vec![vec![(0, 1.0)]]).unwrap();
-    assert!(matches!(whole.craig_bampton(1.0), Err(ReductionError::NotHeld { count: 1 })));
-    let whole = Whole::new(m, UNDAMPED, k, ports(n)).unwrap();
-    let reach = Reduce { up_to: 0.9, tolerance: 1e-16, kind: None }.of(&whole);
-    assert!(matches!(reach, Err(ReductionError::OutOfReach { .. })), "{reach:?}");
+    let whole = FullStructure::new(m.clone(), UNDAMPED, apart, vec![vec![(0, 1.0)]]).unwrap();
+    assert!(matches!(whole.craig_bampton(1.0), Err(ReductionError::FreeInterfaceMotion { count: 1 })));
+    let whole = FullStructure::new(m, UNDAMPED, k, ports(n)).unwrap();
+    let reach = AutomaticReduction { up_to: 0.9, tolerance: 1e-16, kind: None }.apply(&whole);
+    assert!(matches!(reach, Err(ReductionError::ToleranceNotReached { .. })), "{reach:?}");
     assert!(matches!(
-        Reduce { up_to: 0.0, tolerance: 1e-3, kind: None }.of(&whole),
+        AutomaticReduction { up_to: 0.0, tolerance: 1e-3, kind: None }.apply(&whole),
         Err(ReductionError::Number { .. })
     ));
 }
@@ -250,8 +253,8 @@ fn what_is_no_reduction_says_why() {
 #[test]
 fn without_modes() {
     let n = 30;
-    let whole = Whole::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
-    let chosen = Reduce { up_to: 1e-3, tolerance: 1e-6, kind: None }.of(&whole).unwrap();
+    let whole = FullStructure::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
+    let chosen = AutomaticReduction { up_to: 1e-3, tolerance: 1e-6, kind: None }.apply(&whole).unwrap();
     assert_eq!((chosen.modes.count(), chosen.reduced.dofs()), (0, 3));
 }
 
@@ -259,8 +262,8 @@ fn without_modes() {
 #[test]
 fn expansion() {
     let n = 30;
-    let whole = Whole::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
-    let reduced: Reduced = whole.craig_bampton(1.0).unwrap();
+    let whole = FullStructure::new(masses(n), UNDAMPED, chain(n, true), ports(n)).unwrap();
+    let reduced: ReducedMatrices = whole.craig_bampton(1.0).unwrap();
     let q: Vec<f64> = (0..reduced.dofs()).map(|i| (i as f64).sin()).collect();
     let x = reduced.expand(&q);
     for (row, weights) in reduced.ports.row_iter().zip(ports(n)) {
@@ -325,8 +328,8 @@ fn nearly_dependent_vectors_are_passed_over() {
     let (values, _) = modes(&m, &k);
     let up_to = 0.5 * (values[5].sqrt() + values[6].sqrt());
     let ports: Vec<Row> = vec![vec![(23, 1.0)], vec![(22, 1.0), (23, -1.0)]];
-    let whole = Whole::new(m, Damping::Ratio { ratio: 0.01, up_to }, k, ports).unwrap();
-    assert!(Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole).unwrap().deviation.error <= 1e-4);
+    let whole = FullStructure::new(m, StructureDamping::Ratio { ratio: 0.01, up_to }, k, ports).unwrap();
+    assert!(AutomaticReduction { up_to, tolerance: 1e-4, kind: None }.apply(&whole).unwrap().deviation.error <= 1e-4);
 }
 
 proptest! {
@@ -345,8 +348,8 @@ proptest! {
         let ports: Vec<Row> = seen.iter().map(|&(i, k)| if i == k { vec![(i, 1.0)] } else { vec![(i, 1.0), (k, -1.0)] }).collect();
         let (values, _) = modes(&m, &k);
         let up_to = 0.5 * (values[5].sqrt() + values[6].sqrt());
-        let whole = Whole::new(m.clone(), Damping::Ratio { ratio: 0.01, up_to }, k.clone(), ports.clone()).unwrap();
-        let chosen = Reduce { up_to, tolerance: 1e-4, kind: None }.of(&whole).unwrap();
+        let whole = FullStructure::new(m.clone(), StructureDamping::Ratio { ratio: 0.01, up_to }, k.clone(), ports.clone()).unwrap();
+        let chosen = AutomaticReduction { up_to, tolerance: 1e-4, kind: None }.apply(&whole).unwrap();
         prop_assert!(chosen.deviation.error <= 1e-4);
         let (omega, undamped) = (at * up_to, DMatrix::zeros(n, n));
         prop_assume!(values.iter().all(|v| (v.max(0.0).sqrt() - omega).abs() > 2e-3 * up_to));

@@ -3,7 +3,7 @@
 use crate::brick::Brick;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
-use stickslip::model::{Around, Disk, DiskPart, Model, Place, Substructure, SubstructureDamping, System};
+use stickslip::model::{Disk, DiskPart, Model, Place, SectorDistribution, Substructure, SubstructureDamping, System};
 use stickslip::structure::{Boundary, Component, Reduction, ReductionKind};
 use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 
@@ -45,10 +45,11 @@ fn ring(reduction: Reduction, blades: &[f64]) -> System {
     let sector = |deviation: f64| {
         let disk = DiskPart { boundary: boundary.clone(), blade: blade.clone(), deviations: vec![deviation] };
         let (component, damping) = (component.clone(), SubstructureDamping::Own);
-        let substructure = Some(Substructure { component, damping, reduction, earlier: None, disk: Some(disk) });
+        let substructure =
+            Some(Substructure { component, damping, reduction, earlier_reduction: None, disk: Some(disk) });
         Model { substructure, places: places.clone(), ..Model::default() }
     };
-    let disk = Disk { sectors: blades.len(), forces: Vec::<Around>::new(), motions: vec![] };
+    let disk = Disk { sectors: blades.len(), forces: Vec::<SectorDistribution>::new(), motions: vec![] };
     disk.ring(|s| sector(blades[s])).unwrap().assemble().unwrap()
 }
 
@@ -57,8 +58,8 @@ fn answers(system: &System, omega: f64) -> DVector<Complex<f64>> {
     let structure = system.structure();
     let (m, k) = (structure.mass(), structure.stiffness());
     let z = m.zip_map(k, |m, k| Complex::new(k - omega * omega * m, 2.0 * HALF_WIDTH * k));
-    let mut seen: DMatrix<Complex<f64>> = DMatrix::zeros(system.seen().len(), m.nrows());
-    for (place, axis) in system.seen().iter().enumerate() {
+    let mut seen: DMatrix<Complex<f64>> = DMatrix::zeros(system.place_axes().len(), m.nrows());
+    for (place, axis) in system.place_axes().iter().enumerate() {
         axis.rows().iter().for_each(|(at, weight)| seen[(place, *at)] += Complex::new(*weight, 0.0));
     }
     let load: DVector<Complex<f64>> =
@@ -127,11 +128,15 @@ fn answers_of_many(system: &System, frequencies: &[f64]) -> Vec<Vec<Complex<f64>
     let one = |omega: &f64| {
         let sum = [(Complex::new(1.0, 2.0 * HALF_WIDTH), &stiffness), (Complex::new(-omega * omega, 0.0), &mass)];
         let mut moved = vec![Complex::new(0.0, 0.0); system.dofs()];
-        for (place, axis) in system.seen().iter().enumerate() {
+        for (place, axis) in system.place_axes().iter().enumerate() {
             axis.rows().iter().for_each(|(at, weight)| moved[*at] += weight * load(place));
         }
         analysis.factor_complex(&sum).unwrap().solve(&mut moved);
-        system.seen().iter().map(|axis| axis.rows().iter().map(|(at, weight)| moved[*at] * *weight).sum()).collect()
+        system
+            .place_axes()
+            .iter()
+            .map(|axis| axis.rows().iter().map(|(at, weight)| moved[*at] * *weight).sum())
+            .collect()
     };
     frequencies.iter().map(one).collect()
 }

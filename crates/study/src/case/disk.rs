@@ -10,20 +10,22 @@ use crate::syntax::key::MAX_MASSES;
 use crate::syntax::suggest::{excerpt, suggest};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use stickslip::model::{Disk, DiskPart, Element, LEAST_SECTORS, Mistuned, Model, normal_pattern, too_far};
-use stickslip::structure::{Axis, Boundary, Component, Faces, FacesError, Node, Reduction};
+use stickslip::model::{
+    Disk, DiskPart, Element, MIN_SECTORS, MistunedProperty, Model, deviation_error, normal_deviations,
+};
+use stickslip::structure::{Boundary, Component, CoordinateAxis, FacesError, NodeCoordinates, Reduction, SectorFaces};
 
 /// The quantity that differs from sector to sector.
 enum MistunedQuantity {
     /// A parameter, by index.
     Parameter(usize),
     /// A part of the sector.
-    Part(Mistuned),
+    Part(MistunedProperty),
 }
 
 /// Quantities of a blade given by matrices that may deviate.
-const BLADE_QUANTITIES: [(&str, Mistuned); 2] =
-    [("blade.stiffness", Mistuned::BladeStiffness), ("blade.frequency", Mistuned::BladeFrequency)];
+const BLADE_QUANTITIES: [(&str, MistunedProperty); 2] =
+    [("blade.stiffness", MistunedProperty::BladeStiffness), ("blade.frequency", MistunedProperty::BladeFrequency)];
 
 /// Limit on the rows of all sectors of a disk without reduction: matrices of several GB.
 const MAX_ROWS: usize = 1_000_000;
@@ -99,9 +101,11 @@ fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, secto
     // only names are known
     let Some(substructure) = &mut sector.substructure else { return Ok(()) };
     let axis = match table.entry("axis").map(|entry| &entry.value) {
-        Some(CompiledValue::Fixed(ResolvedValue::Text(axis))) => [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)]
-            .into_iter()
-            .find_map(|(name, known)| (name == axis).then_some(known)),
+        Some(CompiledValue::Fixed(ResolvedValue::Text(axis))) => {
+            [("x", CoordinateAxis::X), ("y", CoordinateAxis::Y), ("z", CoordinateAxis::Z)]
+                .into_iter()
+                .find_map(|(name, known)| (name == axis).then_some(known))
+        }
         _ => None,
     };
     let component = &substructure.component;
@@ -135,7 +139,7 @@ fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, secto
 fn pairs<'a>(
     disk: &'a DiskSource,
     component: &Component,
-    axis: Option<Axis>,
+    axis: Option<CoordinateAxis>,
     sectors: usize,
 ) -> Result<Cow<'a, [(String, String)]>, Problem> {
     let table = &disk.table;
@@ -157,8 +161,9 @@ fn pairs<'a>(
     let moving = component.rows().iter().filter_map(|row| Some(row.rsplit_once('.')?.0));
     let named = disk.boundary.iter().flatten().flat_map(|(low, high)| [low.as_str(), high.as_str()]);
     let counts: HashSet<&str> = moving.chain(named).collect();
-    let missing: Vec<Node> = nodes.iter().filter(|(name, _)| counts.contains(name.as_str())).cloned().collect();
-    let faces = Faces::new(&missing, axis, sectors);
+    let missing: Vec<NodeCoordinates> =
+        nodes.iter().filter(|(name, _)| counts.contains(name.as_str())).cloned().collect();
+    let faces = SectorFaces::new(&missing, axis, sectors);
     let key = if disk.boundary.is_some() { "boundary" } else { "nodes" };
     let found = match &disk.boundary {
         Some(named) => faces.check(named).map(|()| Cow::from(named.as_slice())),
@@ -191,8 +196,8 @@ fn blade_rows<'a>(component: &Component, nodes: &'a [String]) -> Result<Vec<usiz
 
 fn sectors(disk: &DiskSource, values: &Values) -> Result<usize, Vec<Problem>> {
     let sectors = whole_number(&disk.table, values, "sectors").map_err(|problem| vec![problem])?.unwrap_or(0);
-    usize::try_from(sectors).ok().filter(|sectors| *sectors >= LEAST_SECTORS).ok_or_else(|| {
-        let message = format!("a disk needs at least {LEAST_SECTORS} sectors, found {sectors}");
+    usize::try_from(sectors).ok().filter(|sectors| *sectors >= MIN_SECTORS).ok_or_else(|| {
+        let message = format!("a disk needs at least {MIN_SECTORS} sectors, found {sectors}");
         vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]
     })
 }
@@ -209,7 +214,7 @@ fn deviations(disk: &DiskSource, values: &Values, sectors: usize) -> Result<Opti
     }
     let seed = whole_number(table, mistuning, "seed").map_err(|problem| vec![problem])?.unwrap_or(0);
     let deviation = mistuning.quantity("deviation").unwrap_or(0.0);
-    Ok(Some(normal_pattern(sectors, deviation, seed as u64)))
+    Ok(Some(normal_deviations(sectors, deviation, seed as u64)))
 }
 
 fn mistuning<'a>(disk: &'a DiskSource, values: &'a Values) -> Option<(&'a CompiledTable, &'a Values)> {
@@ -229,7 +234,7 @@ fn mistuned_sectors(
         return Ok(Vec::new());
     };
     let quantity = mistuned_quantity(disk, table, environment, first).map_err(|problem| vec![problem])?;
-    if let Some(message) = too_far(deviations) {
+    if let Some(message) = deviation_error(deviations) {
         let key = if disk.pattern.is_some() { "file" } else { "deviation" };
         let problem = Problem::new(table.location_of(key, None), key, message);
         return Err(vec![problem.help("write deviations as fractions or in percent: 0.02 is 2 %")]);
@@ -237,7 +242,7 @@ fn mistuned_sectors(
     let mut models = Vec::with_capacity(deviations.len());
     for (sector, deviation) in deviations.iter().enumerate() {
         models.push(match &quantity {
-            MistunedQuantity::Part(part) => part.deviated(first, *deviation),
+            MistunedQuantity::Part(part) => part.apply(first, *deviation),
             MistunedQuantity::Parameter(index) => {
                 let changed = environment.values[*index].si * (1.0 + deviation);
                 let values = again(&[(*index, changed)]).map_err(|problem| vec![problem])?;
@@ -294,7 +299,7 @@ fn mistuned_quantity(
             if let Some(index) = environment.names.iter().position(|known| known == name) {
                 return Ok(MistunedQuantity::Parameter(index));
             }
-            let mass = Mistuned::Mass(name.clone());
+            let mass = MistunedProperty::Mass(name.clone());
             if mass.is_in(sector) {
                 return Ok(MistunedQuantity::Part(mass));
             }
@@ -309,7 +314,7 @@ fn mistuned_quantity(
             Err(Problem::new(place, "of", format!("there is no parameter or mass `{}`", excerpt(name))).help(help))
         }
         [a, b] => {
-            let spring = Mistuned::Spring([a.clone(), b.clone()]);
+            let spring = MistunedProperty::Spring([a.clone(), b.clone()]);
             if spring.is_in(sector) {
                 return Ok(MistunedQuantity::Part(spring));
             }

@@ -30,7 +30,7 @@ pub(crate) struct Start {
 /// Returns the value of each named place by its row. Skips places that are not a degree of
 /// freedom themselves.
 fn values_by_row(system: &System, given: Option<&BTreeMap<String, f64>>) -> BTreeMap<usize, f64> {
-    let places = system.places().iter().zip(system.seen());
+    let places = system.places().iter().zip(system.place_axes());
     let named = places.filter_map(|(place, along)| Some((along.rows(), *given?.get(place)?)));
     named.filter_map(|(rows, value)| if let [(row, _)] = rows { Some((*row, value)) } else { None }).collect()
 }

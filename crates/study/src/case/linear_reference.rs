@@ -31,8 +31,8 @@ impl LinearReference {
         for joint in &mut model.joints {
             let law: &dyn Law = &*joint.law;
             let changed: Option<SharedLaw> = match self {
-                LinearReference::Free => law.free(),
-                LinearReference::Stuck => law.stuck(),
+                LinearReference::Free => law.frictionless_reference(),
+                LinearReference::Stuck => law.stuck_reference(),
             };
             let none =
                 || self.no_reference(&format!("the law `{}` of joint `{}` has no slip limit", law.name(), joint.name));

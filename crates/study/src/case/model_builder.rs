@@ -10,7 +10,8 @@ use crate::syntax::key::DAMPING_RATIO;
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::model::{
-    Around, Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, Spring, with_rotations,
+    Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, SectorDistribution, Spring,
+    with_rotations,
 };
 
 /// Returns the places of the structure given by matrices.
@@ -24,7 +25,7 @@ pub(crate) fn build_model(
     structure: &SourceModel,
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
-) -> (Model, Vec<Around>, Vec<Around>) {
+) -> (Model, Vec<SectorDistribution>, Vec<SectorDistribution>) {
     let SourceModel { lists, template, matrices } = structure;
     let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     let mut model = Model::default();
@@ -222,13 +223,19 @@ fn with_node_tangents(
     };
     let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();
     match (stated, directions) {
-        (false, Some(directions @ 2..)) => law.with(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone()),
+        (false, Some(directions @ 2..)) => {
+            law.with_value(TANGENTS, (directions - 1) as f64).unwrap_or_else(|| law.clone())
+        }
         _ => law.clone(),
     }
 }
 
 /// Returns the distribution of an entry of a list over the sectors.
-pub(crate) fn sector_distribution(table: &CompiledTable, values: &Values, problems: &mut Vec<Problem>) -> Around {
+pub(crate) fn sector_distribution(
+    table: &CompiledTable,
+    values: &Values,
+    problems: &mut Vec<Problem>,
+) -> SectorDistribution {
     let mut found = Vec::new();
     for key in ["engine_order", "nodal_diameter", "sector"] {
         match whole_number(table, values, key) {
@@ -238,16 +245,16 @@ pub(crate) fn sector_distribution(table: &CompiledTable, values: &Values, proble
         }
     }
     match found[..] {
-        [] => Around::EngineOrder(0),
-        [("engine_order", order)] => Around::EngineOrder(order),
-        [("nodal_diameter", diameter)] => Around::NodalDiameter(diameter),
-        [(_, sector)] => Around::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
+        [] => SectorDistribution::EngineOrder(0),
+        [("engine_order", order)] => SectorDistribution::EngineOrder(order),
+        [("nodal_diameter", diameter)] => SectorDistribution::NodalDiameter(diameter),
+        [(_, sector)] => SectorDistribution::Sector(usize::try_from(sector).unwrap_or(usize::MAX)),
         [(one, _), (other, _), ..] => {
             let message = format!("`{one}` and `{other}` both define the wave");
             let help =
                 format!("keep one of them; for two waves write two entries, one with `{one}` and one with `{other}`");
             problems.push(Problem::new(table.location_of(other, None), other, message).help(help));
-            Around::EngineOrder(0)
+            SectorDistribution::EngineOrder(0)
         }
     }
 }

@@ -315,7 +315,7 @@ impl Study {
         let frequencies = match self.study.entry("frequency").map(|entry| &entry.value) {
             Some(CompiledValue::List(list, _)) => list.len(),
             Some(CompiledValue::Range { points, .. }) => *points,
-            Some(CompiledValue::Adaptive { .. }) => stickslip::curve::adaptive::FIRST + 1,
+            Some(CompiledValue::Adaptive { .. }) => stickslip::curve::adaptive::INITIAL_INTERVALS + 1,
             _ => 1,
         };
         self.cases() * frequencies
@@ -875,7 +875,7 @@ pub(crate) fn case_model(
 fn numbers_in_range(model: &Model) -> bool {
     let not_negative = |value: f64| value.is_finite() && value >= 0.0;
     model.masses.iter().all(|mass| not_negative(mass.mass))
-        && model.bodies.iter().all(|body| body.is_sound())
+        && model.bodies.iter().all(|body| body.is_valid())
         && model.springs.iter().all(|spring| not_negative(spring.stiffness) && spring.damping.is_finite())
         && model.joints.iter().all(|joint| joint.law.check().is_ok())
         && model.forces.iter().all(|force| force.amplitude.is_finite() && force.phase.is_finite())

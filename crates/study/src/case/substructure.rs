@@ -6,7 +6,7 @@ use crate::compile::source_model::MatrixSource;
 use crate::syntax::error::Problem;
 use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use stickslip::method::WIDTH;
-use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionEvidence, Substructure, SubstructureDamping};
+use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
@@ -98,10 +98,10 @@ pub(crate) fn structure_from_table(
         (None, Some(false)) => UNREDUCED,
         _ => Reduction::up_to(0.0),
     };
-    let earlier = values.table("reduced").and_then(|reduced| {
-        Some(ReductionEvidence { error: reduced.quantity("error")?, up_to: reduced.quantity("up_to")? })
+    let earlier_reduction = values.table("reduced").and_then(|reduced| {
+        Some(ReductionAccuracy { error: reduced.quantity("error")?, up_to: reduced.quantity("up_to")? })
     });
-    Substructure { component, damping, reduction, earlier, disk: None }
+    Substructure { component, damping, reduction, earlier_reduction, disk: None }
 }
 
 fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'static str, &'static str)> {
@@ -160,7 +160,8 @@ pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &V
     let drive = values.frequencies("frequency").into_iter().filter_map(|frequencies| frequencies.highest());
     let excited = most * ends.chain(drive).fold(0.0, f64::max);
     let joints = !model.joints.is_empty() && excited > 0.0;
-    let exact = method.quantity(WIDTH).is_none() && model.joints.iter().all(|joint| joint.law.pieces().is_some());
+    let exact =
+        method.quantity(WIDTH).is_none() && model.joints.iter().all(|joint| joint.law.ideal_elements().is_some());
     let Some(Substructure { component, reduction, disk, .. }) = model.substructure.as_mut() else { return };
     if joints && exact && disk.is_none() && *reduction == Reduction::up_to(0.0) && is_unreduced(component) {
         *reduction = UNREDUCED;
@@ -331,7 +332,7 @@ pub(crate) fn place_on_element(table: &CompiledTable, values: &Values, model: &M
         let message = format!("{} names in `directions` for {}", directions.len(), names.join(", "));
         return Err(problem("directions", message).map_help("name each tangent and the normal, or remove `directions`"));
     }
-    Ok(Place { name, directions, rows, frame: None, of: Some(of.to_owned()) })
+    Ok(Place { name, directions, rows, frame: None, view_of: Some(of.to_owned()) })
 }
 
 /// Builds a point of a body, with all directions of its points or those that are named.
@@ -500,7 +501,7 @@ fn build_place(table: &CompiledTable, values: &Values, component: &Component) ->
         }
         None => None,
     };
-    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, of: None })
+    Ok(Place { name: values.text("name").unwrap_or_default().to_owned(), directions, rows, frame, view_of: None })
 }
 
 /// Returns the rows of a node in the order x, y, z of a frame, by the ends of their names.

@@ -124,7 +124,7 @@ impl Frequencies {
     /// initial points.
     pub fn len(&self) -> usize {
         match self {
-            Frequencies::Adaptive { .. } => adaptive::FIRST + 1,
+            Frequencies::Adaptive { .. } => adaptive::INITIAL_INTERVALS + 1,
             Frequencies::List(list) => list.len(),
             Frequencies::Range { points, .. } => *points,
         }

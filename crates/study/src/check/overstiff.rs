@@ -138,5 +138,5 @@ fn stiffness(law: &dyn Law) -> f64 {
     let is_stiffness =
         |parameter: &Parameter| parameter.key == "stiffness" && parameter.dimension == Dimension::STIFFNESS;
     let linear = law.info().parameters.iter().any(is_stiffness);
-    law.value("stiffness").filter(|_| linear && !law.is_free()).unwrap_or(0.0)
+    law.value("stiffness").filter(|_| linear && !law.carries_no_force()).unwrap_or(0.0)
 }

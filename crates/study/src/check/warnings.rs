@@ -5,8 +5,8 @@ use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::syntax::format::{format_significant, format_with_prefix};
 use crate::syntax::key::MAX_POINTS;
 use std::f64::consts::TAU;
-use stickslip::curve::modes::unit;
-use stickslip::model::{Cyclic, LinearMode, Modes};
+use stickslip::curve::modes::unit_amplitude;
+use stickslip::model::{CyclicSymmetry, LinearModes, NaturalMode};
 
 /// Warnings of a kind that needs an excitation.
 pub(crate) fn excitation_warnings(cases: &[SurveyedCase]) -> Vec<String> {
@@ -65,7 +65,7 @@ fn no_excitation(cases: &[SurveyedCase], initial_states: InitialStates) -> Optio
 pub(crate) fn undamped_resonance(cases: &[SurveyedCase]) -> Option<String> {
     let found = |one: &SurveyedCase| {
         let (from, to) = frequency_range(&one.case)?;
-        one.survey.undamped(from, to).first().copied()
+        one.survey.undamped_resonances(from, to).first().copied()
     };
     // the warning must be true for every case
     let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
@@ -89,17 +89,18 @@ fn no_resonance(cases: &[SurveyedCase]) -> Option<String> {
             return None; // `no_excitation` reports this
         }
         let (free, stuck) = (one.survey.free(), one.survey.stuck());
-        if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+        if one.survey.is_too_large() || free.unresolved + stuck.unresolved > 0 {
             return None; // the modes are unknown
         }
-        if one.survey.system().joints().iter().any(|joint| joint.law().scale().is_infinite()) {
+        if one.survey.system().joints().iter().any(|joint| joint.law().force_scale().is_infinite()) {
             return None; // a force without a bound shifts resonances beyond those of small motion
         }
         // friction puts the resonance between the frequencies of a mode with the joint free and
         // stuck
         let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
         let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
-        let single = |modes: &Modes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
+        let single =
+            |modes: &LinearModes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
         let intervals: Vec<(f64, f64)> = between.chain(single(free)).chain(single(stuck)).collect();
         for h in harmonics.iter().map(|h| f64::from(*h)) {
             if intervals.iter().any(|(a, b)| a / h <= to && b / h >= from) {
@@ -173,7 +174,7 @@ fn coarse_frequencies(cases: &[SurveyedCase]) -> Option<String> {
 fn narrowest(one: &SurveyedCase) -> Option<NarrowResonance> {
     let Some(Frequencies::Range { from, to, points }) = one.case.frequencies else { return None };
     let (free, stuck) = (one.survey.free(), one.survey.stuck());
-    if one.survey.is_too_large() || free.lost + stuck.lost > 0 {
+    if one.survey.is_too_large() || free.unresolved + stuck.unresolved > 0 {
         return None; // the modes are unknown
     }
     let all = one.survey.harmonics().into_iter().flat_map(|harmonic| resonances(free, stuck, harmonic));
@@ -190,11 +191,11 @@ fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
     };
     let harmonics = one.survey.harmonics();
     let highest = to * f64::from(*harmonics.last()?);
-    let below = |modes: &Modes| modes.elastic.iter().filter(|mode| mode.omega <= highest).count();
+    let below = |modes: &LinearModes| modes.elastic.iter().filter(|mode| mode.omega <= highest).count();
     let most = below(one.survey.free()).max(below(one.survey.stuck()));
     let Ok(Some(waves)) = one.case.model.wave_modes(most) else { return narrowest(one) };
     let met = |harmonic: u32| {
-        let turns = Cyclic { sectors, order }.diameter(harmonic as usize);
+        let turns = CyclicSymmetry { sectors, order }.diameter(harmonic as usize);
         waves.iter().find(|wave| wave.diameter == turns.min(sectors - turns))
     };
     let resonances_of = |harmonic: u32| met(harmonic).map(|wave| resonances(&wave.free, &wave.stuck, harmonic));
@@ -203,11 +204,11 @@ fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
 
 /// Returns the excitation frequencies at which a harmonic meets each mode: the lower and the
 /// higher one (joints free and stuck), and the width, rad/s.
-fn resonances(free: &Modes, stuck: &Modes, harmonic: u32) -> Vec<(f64, f64, f64)> {
-    let width = |mode: &LinearMode| 2.0 * mode.damping * mode.omega;
+fn resonances(free: &LinearModes, stuck: &LinearModes, harmonic: u32) -> Vec<(f64, f64, f64)> {
+    let width = |mode: &NaturalMode| 2.0 * mode.damping * mode.omega;
     let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
     let h = f64::from(harmonic);
-    let between = |(free, stuck): (&LinearMode, &LinearMode)| {
+    let between = |(free, stuck): (&NaturalMode, &NaturalMode)| {
         let width = width(free).max(width(stuck));
         (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h, width / h)
     };
@@ -265,7 +266,7 @@ fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {
         let number = values.count("mode").unwrap_or(1) as usize - 1;
         let to = values.table("amplitude")?.quantity("to")?;
         // the range is that of the place with the largest motion in the mode without joints
-        let slip = one.survey.slip_amplitude(number)? / unit(one.survey.system(), number).ok()??;
+        let slip = one.survey.slip_amplitude(number)? / unit_amplitude(one.survey.system(), number).ok()??;
         if slip * NO_SLIP_FRACTION <= to {
             return None;
         }

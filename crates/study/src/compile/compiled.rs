@@ -356,10 +356,10 @@ fn law(
             numbers.get(key).copied().or_else(default)
         };
         // with an exponent that is not a whole number: a plain number in SI
-        let dimension = parameter.dimension_under(value).unwrap_or(Dimension::NONE);
+        let dimension = parameter.dimension_for(value).unwrap_or(Dimension::NONE);
         let expected = Expected { dimension, within: *within };
         match quantity.number(parameter.key, expected, example, environment) {
-            Ok(value) if !parameter.range.has(value) => {
+            Ok(value) if !parameter.range.contains(value) => {
                 let Parameter { key, range, .. } = *parameter;
                 let error = LawError::Value { law: row.name, key, dimension, range, value };
                 problems.push(quantity.problem(key, error.to_string()));

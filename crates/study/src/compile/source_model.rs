@@ -11,7 +11,7 @@ use crate::syntax::suggest::{alternatives, suggest};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};
-use stickslip::structure::{Component, Node, Reduction, ReductionKind};
+use stickslip::structure::{Component, NodeCoordinates, Reduction, ReductionKind};
 use stickslip_numerics::sparse::SparseMatrix;
 
 /// The statement of a model: lists of the study file or of a template, and matrices.
@@ -209,7 +209,7 @@ pub(crate) struct DiskSource {
     /// Pairs of nodes on the low and the high side of a sector given by matrices.
     pub boundary: Option<Vec<(String, String)>>,
     /// Coordinates of its nodes.
-    pub nodes: Option<Vec<Node>>,
+    pub nodes: Option<Vec<NodeCoordinates>>,
     /// Names of the nodes of its blade.
     pub blade: Option<Vec<String>>,
 }

@@ -68,7 +68,7 @@ impl<'a> FigureInput<'a> {
     ///
     /// Rotations are left out, because the axis has lengths.
     pub(crate) fn displacements(&self, system: &System) -> Vec<(String, usize)> {
-        let places = system.places().iter().zip(system.seen()).enumerate();
+        let places = system.places().iter().zip(system.place_axes()).enumerate();
         let shown = places.filter(|(_, (name, along))| !along.is_rotation() && self.shows(name));
         shown.map(|(place, (name, _))| (name.clone(), place)).collect()
     }

@@ -7,7 +7,7 @@ use crate::syntax::format::format_significant;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::law::Piece;
+use stickslip::law::IdealElement;
 use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, JointMotion, Orbit};
 use stickslip::structure::Reduction;
@@ -135,14 +135,14 @@ impl Note {
     /// instability if it is known ([`Orbit::is_stable`]). They also state the accuracy of the
     /// series, other possible orbits and the limits of the reduced model.
     pub(crate) fn for_orbit(model: &Model, orbit: &Orbit, stable: Option<bool>) -> Vec<Note> {
-        let early = || usize::from(orbit.periods > 1 && orbit.repeats() < orbit.periods);
+        let early = || usize::from(orbit.periods > 1 && orbit.minimal_periods() < orbit.periods);
         let unstable = (stable == Some(false)).then(|| Note::Unstable(1, early()));
         let accuracy = match orbit.evidence.accuracy {
-            Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.truncation.unwrap_or(0.0))),
+            Accuracy::Truncated => Some(Note::Truncated(1, orbit.evidence.error_estimate.unwrap_or(0.0))),
             Accuracy::Unchecked => Some(Note::UnknownError(1)),
             Accuracy::Converged => None,
         };
-        let instead = orbit.evidence.instead_of.map(|chosen| Note::OtherMethod {
+        let instead = orbit.evidence.fallback_from.map(|chosen| Note::OtherMethod {
             points: 1,
             chosen: chosen.to_owned(),
             found: orbit.method.to_owned(),
@@ -171,10 +171,11 @@ impl Note {
     /// Returns a note if the orbit is one of several. Their amplitudes differ if the stiffness
     /// of another joint depends on the positions of the bodies.
     fn stuck_offset_note(model: &Model, orbit: &Orbit) -> Option<Note> {
-        let stuck = orbit.evidence.history.first()?.clone();
+        let stuck = orbit.evidence.history_dependent.first()?.clone();
         let joint_of = |name: &str| model.joints.iter().find(|joint| joint.name == name);
-        let is_rigid = |piece: &Piece| matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
-        let holds = |joint: &Joint| joint.law.pieces().unwrap_or_default().iter().any(is_rigid);
+        let is_rigid =
+            |piece: &IdealElement| matches!(piece, IdealElement::Slider(slider) if slider.stiffness.is_none());
+        let holds = |joint: &Joint| joint.law.ideal_elements().unwrap_or_default().iter().any(is_rigid);
         let rigid = orbit.evidence.stuck.iter().any(|name| joint_of(name).is_some_and(holds));
         // An elastic stuck joint relaxes near the mean of the motion. A contact that stays
         // closed has a constant stiffness there.
@@ -417,9 +418,9 @@ impl Note {
 
 /// Returns whether a law without memory has another stiffness at a larger amplitude.
 fn is_curved(joint: &Joint, motion: &JointMotion) -> bool {
-    let is_elastic = joint.law.rate().is_some_and(|rate| rate.states() == 0) && joint.law.scale().is_infinite();
+    let is_elastic = joint.law.rate().is_some_and(|rate| rate.states() == 0) && joint.law.force_scale().is_infinite();
     let (low, high) = motion.displacement.first().copied().unwrap_or_default();
-    let stiffness = |amplitude: f64| joint.law.linearised(amplitude, 1.0).re;
+    let stiffness = |amplitude: f64| joint.law.describing_function(amplitude, 1.0).re;
     is_elastic && high > low && stiffness(high - low) != stiffness(0.5 * (high - low))
 }
 

@@ -4,7 +4,7 @@
 use crate::case::study::Case;
 use crate::results::columns::REDUCTION_ERROR;
 use crate::results::dataset::{CellValues, Column, Table, column_name};
-use stickslip::model::ReductionEvidence;
+use stickslip::model::ReductionAccuracy;
 
 /// Columns that grow row by row. All rows write their columns in the same order.
 #[derive(Debug, Default)]
@@ -73,8 +73,8 @@ impl TableBuilder {
 
     /// Adds the error of the reduced model at the places, for a row with an orbit or a
     /// frequency. Without a reduction it adds nothing.
-    pub fn reduction_error(&mut self, reduction: Option<ReductionEvidence>) {
-        if let Some(ReductionEvidence { error, .. }) = reduction {
+    pub fn reduction_error(&mut self, reduction: Option<ReductionAccuracy>) {
+        if let Some(ReductionAccuracy { error, .. }) = reduction {
             self.number(REDUCTION_ERROR, error);
         }
     }

@@ -100,7 +100,7 @@ impl SlipReductionCheck {
     pub(crate) fn from_orbit(orbit: &Orbit, up_to: f64) -> Option<SlipReductionCheck> {
         let highest = orbit.evidence.harmonics.map(|h| h as f64 * orbit.omega / orbit.periods as f64);
         let slips = orbit.joints.iter().any(|joint| joint.slip_fraction > 0.0);
-        let amplitudes = orbit.places.iter().map(|place| place.size()).collect();
+        let amplitudes = orbit.places.iter().map(|place| place.length_amplitude()).collect();
         let all = vec![CurvePoint { omega: orbit.omega, amplitudes }];
         let counts = slips && highest.is_none_or(|highest| highest > up_to);
         counts.then_some(SlipReductionCheck { points: 1, up_to, candidates: all, again: None })
@@ -207,9 +207,10 @@ fn larger_basis_system(model: &Model, system: &System) -> Option<System> {
     if own.component.dofs() > MAX_ROWS {
         return None;
     }
-    let counted = |times: &f64| own.component.modes_below(times * few.serves()).is_some_and(|count| count <= MAX_MODES);
+    let counted =
+        |times: &f64| own.component.modes_below(times * few.intended_up_to()).is_some_and(|count| count <= MAX_MODES);
     let times = BASIS_FACTORS.into_iter().find(counted)?;
-    let model = Model { substructure: Some(own.farther(few, times)), ..model.clone() };
+    let model = Model { substructure: Some(own.with_extended_range(few, times)), ..model.clone() };
     model.assemble().ok()
 }
 
@@ -217,9 +218,10 @@ fn larger_basis_system(model: &Model, system: &System) -> Option<System> {
 fn compare_point(farther: &System, method: &dyn Method, point: &CurvePoint) -> Option<BasisDifference> {
     let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
     let reduced = farther.reduced()?;
-    let differences = orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.size() - here).abs());
+    let differences =
+        orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.length_amplitude() - here).abs());
     let (worst, difference) = differences.enumerate().fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-    let error = difference / orbit.places.iter().map(|place| place.size()).fold(0.0, f64::max);
+    let error = difference / orbit.places.iter().map(|place| place.length_amplitude()).fold(0.0, f64::max);
     error.is_finite().then(|| BasisDifference {
         error,
         place: orbit.places[worst].name.clone(),

@@ -80,8 +80,8 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         doc: "half the peak-to-peak value of the velocity of every place",
         columns: |system| place_columns(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
-            let places = prepared.system.seen().iter();
-            places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.velocity)))).collect()
+            let places = prepared.system.place_axes().iter();
+            places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.velocity)))).collect()
         },
     },
     OutputColumns {
@@ -89,15 +89,15 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         doc: "half the peak-to-peak value of the acceleration of every place",
         columns: |system| place_columns(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
-            let places = prepared.system.seen().iter();
-            places.map(|place| half_range(samples.iter().map(|sample| place.along(&sample.acceleration)))).collect()
+            let places = prepared.system.place_axes().iter();
+            places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.acceleration)))).collect()
         },
     },
     OutputColumns {
         name: "harmonics",
         doc: "amplitudes of harmonics 1 to 5 of the displacement of every place",
         columns: |system| {
-            let places = system.places().iter().zip(system.seen());
+            let places = system.places().iter().zip(system.place_axes());
             let all = |(place, along): (&String, &Axis)| {
                 (1..=HARMONICS).map(|h| format!("{place}_harmonic{h}_{}", along.unit())).collect::<Vec<_>>()
             };
@@ -130,7 +130,7 @@ fn joint_columns(system: &System, quantity: &str) -> Vec<String> {
 }
 
 fn place_columns(system: &System, quantity: fn(&str) -> String) -> Vec<String> {
-    let places = system.places().iter().zip(system.seen());
+    let places = system.places().iter().zip(system.place_axes());
     places.map(|(place, along)| format!("{place}_{}", quantity(along.unit()))).collect()
 }
 
@@ -173,7 +173,7 @@ pub(crate) fn values(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
         return Vec::new();
     }
     let mut times: Vec<f64> = (0..INSTANTS).map(|i| orbit.period() * i as f64 / INSTANTS as f64).collect();
-    times.extend(orbit.switch_times());
+    times.extend(orbit.transition_times());
     let samples: Vec<Sample> = times.iter().map(|time| orbit.sample(*time)).collect();
     selected(&prepared.case).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
 }

@@ -56,13 +56,13 @@ impl PointRow {
             stable,
             residual: orbit.evidence.residual,
             energy_gap: orbit.evidence.energy_gap,
-            truncation: orbit.evidence.truncation.unwrap_or(f64::NAN),
+            truncation: orbit.evidence.error_estimate.unwrap_or(f64::NAN),
             return_defect: orbit.evidence.return_defect.unwrap_or(f64::NAN),
             iterations: orbit.evidence.iterations as u64,
             found_by: orbit.evidence.found_by,
             status: orbit.evidence.accuracy.status().to_owned(),
             failure: None,
-            stuck: orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod,
+            stuck: orbit.is_in_continuum() && orbit.symmetry == Symmetry::HalfPeriod,
             extra: output_columns::values(prepared, orbit),
         }
     }
@@ -90,7 +90,9 @@ impl PointRow {
     /// Writes the cells of the row that follow the varied parameters and the frequency.
     pub fn write(&self, prepared: &PreparedCase, rows: &mut TableBuilder) {
         let system = &prepared.system;
-        for ((place, along), [amplitude, mean, phase]) in system.places().iter().zip(system.seen()).zip(&self.places) {
+        for ((place, along), [amplitude, mean, phase]) in
+            system.places().iter().zip(system.place_axes()).zip(&self.places)
+        {
             rows.number(&columns::amplitude_in(place, along.unit()), *amplitude);
             rows.number(&format!("{place}_mean_{}", along.unit()), *mean);
             rows.number(&columns::phase_of(place), *phase);

@@ -61,7 +61,7 @@ pub fn markdown() -> String {
     let described = crate::syntax::expression::dimension_text;
     book.push_str("## Laws\n\n");
     for row in law::TABLE {
-        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc)).collect();
+        let keys: Vec<_> = row.parameters.iter().map(|p| (p.key, p.describe_values(), p.doc)).collect();
         named(&mut book, row.name, row.summary, &keys);
     }
     book.push_str("\n## Methods\n\n");

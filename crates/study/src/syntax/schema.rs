@@ -803,7 +803,8 @@ fn takes_schema(takes: &ValueType) -> Value {
         }),
         ValueType::Law => {
             let one = |row: &&law::LawInfo| {
-                let parameters = row.parameters.iter().map(|p| (p.key, p.takes(), p.doc, p.default.is_none()));
+                let parameters =
+                    row.parameters.iter().map(|p| (p.key, p.describe_values(), p.doc, p.default.is_none()));
                 kind_object(row.name, row.summary, parameters)
             };
             json!({ "oneOf": law::TABLE.iter().map(one).collect::<Vec<_>>() })

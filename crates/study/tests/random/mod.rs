@@ -131,7 +131,7 @@ fn law_text(chance: &mut Chance, scales: &Scales, smooth: bool) -> String {
     // pieces
     let fits = |row: &&law::LawInfo| {
         let law = row.sample();
-        law.directions() == 1 && if smooth { law.rate().is_some() } else { law.pieces().is_some() }
+        law.directions() == 1 && if smooth { law.rate().is_some() } else { law.ideal_elements().is_some() }
     };
     let rows: Vec<&law::LawInfo> = law::TABLE.iter().copied().filter(fits).collect();
     let row = chance.of(&rows);

@@ -1,49 +1,49 @@
 //! The search for peaks between three points of a curve, with orbits that all quantities share.
 
-use super::shrink::{Shrink, form, parabola};
-use super::{Peak, PeakOf, Point, Unsettled};
+use super::bracket_reduction::{BracketReduction, negative_inverse_square, parabola};
+use super::{CurvePoint, Peak, QuantityPeak, UnresolvedPeak};
 use crate::method::Solver;
 use crate::orbit::Orbit;
 use std::collections::BTreeMap;
 
 /// Maximum number of repetitions if the search for another quantity finds a higher point.
-const OVERTAKEN: usize = 3;
+const MAX_REPETITIONS: usize = 3;
 /// Maximum number of failed orbits in the search for one peak, because a failed search costs
 /// most.
-const FAILURES: usize = 2;
+const MAX_FAILURES: usize = 2;
 /// Distance from the neighbour, relative to the initial bracket, beyond which a failed search is
 /// repeated with all fallbacks.
-const AWAY: f64 = 1e-3;
+const FALLBACK_DISTANCE: f64 = 1e-3;
 /// A missing orbit does not matter to a peak if the predicted relative rise towards it is below
 /// this value.
-const SETTLED: f64 = 1e-5;
+const NEGLIGIBLE_RISE: f64 = 1e-5;
 /// Relative fall of a quantity next to its highest point that shows an unfinished search. At the
-/// final bracket width ([`CLOSEST`]) the fall is 1e-7 at a kink, 1e-3 at a fold, and one half at
-/// an unbounded peak.
-const STEEP: f64 = 1e-2;
+/// final bracket width ([`MIN_DISTANCE`]) the fall is 1e-7 at a kink, 1e-3 at a fold, and one
+/// half at an unbounded peak.
+const STEEP_FALL: f64 = 1e-2;
 /// Criteria of an unbounded curve, see [`Bracket::is_cut_off`]. `1/a²` falls in a straight line
-/// and would reach zero within `REACH` times the initial bracket. It counts as straight if its
-/// slope to the nearest point is less than `BENT` times the slope to a distant point. The second
-/// constant is the ratio of both distances.
-const REACH: f64 = 0.5;
-const FARTHER: f64 = 4.0;
-const BENT: f64 = 1.5;
+/// and would reach zero within `UNBOUNDED_WITHIN` times the initial bracket. It counts as
+/// straight if its slope to the nearest point is less than `MAX_SLOPE_RATIO` times the slope to a
+/// distant point. The second constant is the ratio of both distances.
+const UNBOUNDED_WITHIN: f64 = 0.5;
+const DISTANCE_RATIO: f64 = 4.0;
+const MAX_SLOPE_RATIO: f64 = 1.5;
 /// Largest distance between the neighbours of the highest point, relative to the initial
 /// bracket, if a search has ended at a jump. A larger distance means an unfinished search. The
-/// value is [`CLOSEST`] on both sides, doubled by the last step.
-const OPEN: f64 = 4.0 * CLOSEST;
+/// value is [`MIN_DISTANCE`] on both sides, doubled by the last step.
+const CLOSED_WIDTH: f64 = 4.0 * MIN_DISTANCE;
 /// Orbits closer than this fraction of the initial bracket differ by rounding only.
-pub(super) const CLOSEST: f64 = 1e-7;
+pub(super) const MIN_DISTANCE: f64 = 1e-7;
 /// Maximum number of orbits for the peak of one quantity, in addition to the orbits of other
 /// quantities. Smooth peaks take 3 to 6, kinks up to 15.
-pub(super) const ORBITS: usize = 40;
+pub(super) const MAX_ORBITS: usize = 40;
 /// Work limit of the search for one peak, relative to the work limit of a point.
-const EFFORT: f64 = 1.0;
+const WORK_LIMIT: f64 = 1.0;
 
 /// Three points of a curve, with a maximum of some quantities in the middle, and the orbits that
 /// the searches added between them.
 pub(super) struct Bracket {
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<CurvePoint>,
     /// Initial distance of the ends, rad/s.
     width: f64,
     /// For each quantity, the frequency at which its last search ended (rad/s), and whether it
@@ -52,25 +52,25 @@ pub(super) struct Bracket {
 }
 
 impl Bracket {
-    pub(super) fn new(near: &[Point]) -> Self {
+    pub(super) fn new(near: &[CurvePoint]) -> Self {
         Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new() }
     }
 
     /// Returns the vertex value of the parabola at the highest point of a quantity.
-    pub(super) fn reach(&self, quantity: usize) -> f64 {
-        let top = best(&self.points, quantity);
-        reach(&self.points[top - 1..=top + 1], quantity)
+    pub(super) fn vertex_value(&self, quantity: usize) -> f64 {
+        let top = highest_inner(&self.points, quantity);
+        vertex_value(&self.points[top - 1..=top + 1], quantity)
     }
 
     /// Computes orbits until the peak of a quantity is found.
     pub(super) fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
         let points = &mut self.points;
-        let mut shrink = Shrink::default();
+        let mut shrink = BracketReduction::default();
         let (mut failures, mut effort) = (0, 0.0);
-        for _ in 0..ORBITS {
-            let best = best(points, quantity);
-            let Some(omega) = shrink.next(points, best, quantity, CLOSEST * self.width) else { break };
-            if failures == FAILURES || effort > EFFORT {
+        for _ in 0..MAX_ORBITS {
+            let best = highest_inner(points, quantity);
+            let Some(omega) = shrink.next(points, best, quantity, MIN_DISTANCE * self.width) else { break };
+            if failures == MAX_FAILURES || effort > WORK_LIMIT {
                 break;
             }
             // The highest point is a sufficient initial guess on either side.
@@ -80,30 +80,32 @@ impl Bracket {
             let found = match solver.between(omega, start) {
                 // Far from the neighbour, all fallbacks are tried; close to it they gain
                 // nothing.
-                Err(_) if (omega - points[best].omega).abs() > AWAY * self.width => solver.orbit(omega, start),
+                Err(_) if (omega - points[best].omega).abs() > FALLBACK_DISTANCE * self.width => {
+                    solver.orbit(omega, start)
+                }
                 found => found,
             };
             effort += solver.effort();
             let point = match found {
-                Ok(orbit) => Point { omega, error, ..Point::new(&orbit, quantities) },
+                Ok(orbit) => CurvePoint { omega, error, ..CurvePoint::new(&orbit, quantities) },
                 Err(_) => {
                     failures += 1;
-                    Point::failed(omega)
+                    CurvePoint::failed(omega)
                 }
             };
             let at = points.partition_point(|point| point.omega < omega);
             points.insert(at, point);
         }
-        let top = best(points, quantity);
+        let top = highest_inner(points, quantity);
         self.ended.insert(quantity, (points[top].omega, shrink.found));
     }
 
     /// Repeats the search for quantities if another search has found a higher point since. There
     /// may be several maxima between two points of a curve.
-    pub(super) fn refine_overtaken(&mut self, solver: &mut dyn Solver, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
-        for _ in 0..OVERTAKEN {
+    pub(super) fn repeat_overtaken(&mut self, solver: &mut dyn Solver, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
+        for _ in 0..MAX_REPETITIONS {
             let moved = |(quantity, (omega, _)): (&usize, &(f64, bool))| {
-                (self.points[best(&self.points, *quantity)].omega != *omega).then_some(*quantity)
+                (self.points[highest_inner(&self.points, *quantity)].omega != *omega).then_some(*quantity)
             };
             let overtaken: Vec<usize> = self.ended.iter().filter_map(moved).collect();
             if overtaken.is_empty() {
@@ -115,7 +117,7 @@ impl Bracket {
 
     /// Tells whether the highest point of a quantity is a peak that its search has found.
     fn found(&self, quantity: usize) -> bool {
-        let omega = self.points[best(&self.points, quantity)].omega;
+        let omega = self.points[highest_inner(&self.points, quantity)].omega;
         self.ended.get(&quantity) == Some(&(omega, true))
     }
 
@@ -128,18 +130,19 @@ impl Bracket {
     fn is_cut_off(&self, top: usize, quantity: usize) -> bool {
         let here = &self.points[top];
         let value = here.value(quantity);
-        let jumps = |point: &Point| value - point.value(quantity) > STEEP * value;
-        let straight = |side: &mut dyn Iterator<Item = &Point>| {
+        let jumps = |point: &CurvePoint| value - point.value(quantity) > STEEP_FALL * value;
+        let straight = |side: &mut dyn Iterator<Item = &CurvePoint>| {
             let slopes = side.map(|point| {
                 let run = (here.omega - point.omega).abs();
-                (run, (form(value) - form(point.value(quantity))) / run)
+                (run, (negative_inverse_square(value) - negative_inverse_square(point.value(quantity))) / run)
             });
             let slopes: Vec<(f64, f64)> = slopes.collect();
             let Some(&(nearest, slope)) = slopes.first() else { return false };
-            let farther = slopes.iter().find(|(run, _)| *run >= FARTHER * nearest);
-            slope * REACH * self.width > -form(value) && farther.is_some_and(|(_, other)| slope < BENT * other)
+            let distant = slopes.iter().find(|(run, _)| *run >= DISTANCE_RATIO * nearest);
+            slope * UNBOUNDED_WITHIN * self.width > -negative_inverse_square(value)
+                && distant.is_some_and(|(_, other)| slope < MAX_SLOPE_RATIO * other)
         };
-        let at_end = |end: &Point| (here.omega - end.omega).abs() <= OPEN * self.width && jumps(end);
+        let at_end = |end: &CurvePoint| (here.omega - end.omega).abs() <= CLOSED_WIDTH * self.width && jumps(end);
         let (left, right) = self.points.split_at(top);
         (jumps(&right[1]) && straight(&mut left.iter().rev()))
             || (jumps(&left[top - 1]) && straight(&mut right[1..].iter()))
@@ -148,29 +151,29 @@ impl Bracket {
 
     /// Tells whether the search ended although the neighbours of the highest point predict a
     /// higher value.
-    fn is_open(&self, top: usize, quantity: usize) -> bool {
+    fn is_unfinished(&self, top: usize, quantity: usize) -> bool {
         let near = &self.points[top - 1..=top + 1];
-        near[2].omega - near[0].omega > OPEN * self.width && parabola(near, 1, quantity).0 > SETTLED
+        near[2].omega - near[0].omega > CLOSED_WIDTH * self.width && parabola(near, 1, quantity).0 > NEGLIGIBLE_RISE
     }
 
     /// Returns the peak of a quantity in its present state.
-    pub(super) fn peak(&self, quantity: usize) -> PeakOf {
-        let top = best(&self.points, quantity);
+    pub(super) fn peak(&self, quantity: usize) -> QuantityPeak {
+        let top = highest_inner(&self.points, quantity);
         let point = &self.points[top];
         let near = &self.points[top - 1..=top + 1];
-        let unsettled = if lacks_neighbours(near, quantity) {
-            Some(Unsettled::Neighbours)
+        let unresolved = if lacks_neighbours(near, quantity) {
+            Some(UnresolvedPeak::MissingNeighbours)
         } else if self.found(quantity) {
             None
-        } else if is_needle(near, quantity) {
-            Some(Unsettled::Needle)
+        } else if is_too_narrow(near, quantity) {
+            Some(UnresolvedPeak::TooNarrow)
         } else if self.is_cut_off(top, quantity) {
-            Some(Unsettled::CutOff)
+            Some(UnresolvedPeak::CutOff)
         } else {
-            self.is_open(top, quantity).then_some(Unsettled::Open)
+            self.is_unfinished(top, quantity).then_some(UnresolvedPeak::OrbitLimit)
         };
-        let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unsettled };
-        PeakOf { quantity, peak, values: point.values.clone() }
+        let peak = Peak { omega: point.omega, value: point.value(quantity), at_end: false, unresolved };
+        QuantityPeak { quantity, peak, values: point.values.clone() }
     }
 }
 
@@ -178,20 +181,20 @@ impl Bracket {
 /// of three points.
 pub(super) fn refine(
     solver: &mut dyn Solver,
-    near: &[Point],
+    near: &[CurvePoint],
     wanted: &[usize],
     quantities: &dyn Fn(&Orbit) -> Vec<f64>,
-) -> Vec<PeakOf> {
+) -> Vec<QuantityPeak> {
     let mut bracket = Bracket::new(near);
     wanted.iter().for_each(|&quantity| bracket.refine(solver, quantity, quantities));
-    bracket.refine_overtaken(solver, quantities);
+    bracket.repeat_overtaken(solver, quantities);
     wanted.iter().map(|&quantity| bracket.peak(quantity)).collect()
 }
 
 /// Returns the vertex value of the parabola through three points with the highest in the middle.
 /// It is an upper bound if the points are further apart than the width of the peak. It is
 /// infinite if they do not determine the height.
-pub(super) fn reach(near: &[Point], quantity: usize) -> f64 {
+pub(super) fn vertex_value(near: &[CurvePoint], quantity: usize) -> f64 {
     let value = near[1].value(quantity);
     let (rise, _) = parabola(near, 1, quantity);
     // For small rises, the relative change of 1/a² is twice that of a; the square root is exact
@@ -202,13 +205,13 @@ pub(super) fn reach(near: &[Point], quantity: usize) -> f64 {
 
 /// Tells whether an orbit next to the highest of three points is missing, and the line from the
 /// other side rises towards it.
-fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
+fn lacks_neighbours(near: &[CurvePoint], quantity: usize) -> bool {
     let rises = |other: usize, failed: usize| {
         let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
-        let here = form(near[1].value(quantity));
-        let rise = (here - form(near[other].value(quantity))) * run / (2.0 * here.abs());
+        let here = negative_inverse_square(near[1].value(quantity));
+        let rise = (here - negative_inverse_square(near[other].value(quantity))) * run / (2.0 * here.abs());
         // without an orbit on the other side, the rise is unknown
-        near[failed].values.is_empty() && (near[other].values.is_empty() || rise > SETTLED)
+        near[failed].values.is_empty() && (near[other].values.is_empty() || rise > NEGLIGIBLE_RISE)
     };
     rises(0, 2) || rises(2, 0)
 }
@@ -216,14 +219,14 @@ fn lacks_neighbours(near: &[Point], quantity: usize) -> bool {
 /// Tells whether a quantity falls steeply on both sides of the middle one of three points. Such
 /// a fall is larger than that of a kink or a fold in a closed bracket. Near a fold the fall is
 /// steep on one side only.
-fn is_needle(near: &[Point], quantity: usize) -> bool {
+fn is_too_narrow(near: &[CurvePoint], quantity: usize) -> bool {
     let value = near[1].value(quantity);
-    let falls = |point: &Point| value - point.value(quantity) > STEEP * value;
+    let falls = |point: &CurvePoint| value - point.value(quantity) > STEEP_FALL * value;
     falls(&near[0]) && falls(&near[2])
 }
 
 /// Returns the index of the highest inner point; the first and the last point are not higher.
-pub(super) fn best(points: &[Point], quantity: usize) -> usize {
+pub(super) fn highest_inner(points: &[CurvePoint], quantity: usize) -> usize {
     (1..points.len() - 1)
         .max_by(|&a, &b| points[a].value(quantity).total_cmp(&points[b].value(quantity)))
         .unwrap_or(points.len() / 2)
@@ -246,8 +249,12 @@ mod tests {
     #[test]
     fn orbits_that_fail_leave_the_point_of_the_grid() {
         let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
-        let near = [0.9, 1.01, 1.1].map(|omega| Point { omega, values: vec![curve(omega)], start: None, error: 0.0 });
+        let near =
+            [0.9, 1.01, 1.1].map(|omega| CurvePoint { omega, values: vec![curve(omega)], start: None, error: 0.0 });
         let peak = refine(&mut Nothing, &near, &[0], &|_| Vec::new())[0].peak;
-        assert_eq!((peak.omega, peak.value, peak.unsettled), (1.01, curve(1.01), Some(Unsettled::Neighbours)));
+        assert_eq!(
+            (peak.omega, peak.value, peak.unresolved),
+            (1.01, curve(1.01), Some(UnresolvedPeak::MissingNeighbours))
+        );
     }
 }

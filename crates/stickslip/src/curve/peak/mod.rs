@@ -4,27 +4,27 @@
 //! all others.
 
 mod bracket;
+mod bracket_reduction;
 mod point;
-mod shrink;
 
-use super::onward;
+use super::branch_following;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
-use bracket::{Bracket, reach, refine};
-pub use point::{Peak, PeakOf, Point, Unsettled};
+use bracket::{Bracket, refine, vertex_value};
+pub use point::{CurvePoint, Peak, QuantityPeak, UnresolvedPeak};
 use rayon::prelude::*;
 
 /// A point that exceeds its neighbours by less than this fraction is rounding, not a peak.
-const LEVEL: f64 = 1e-10;
+const MIN_PROMINENCE: f64 = 1e-10;
 /// Number of peaks at one point that share a solver and its stored data. It is small enough to
 /// keep all threads busy, and does not depend on their number.
-const TOGETHER: usize = 12;
+const PEAKS_PER_SOLVER: usize = 12;
 /// A maximum is searched only if the vertex of its parabola reaches this fraction of the highest
 /// value. Other maxima cannot contain the highest peak, unless the points are far too few. The
 /// second value applies after other quantities have added orbits.
-const CANDIDATE: f64 = 0.8;
-const LIKELY: f64 = 0.95;
+const CANDIDATE_RATIO: f64 = 0.8;
+const REFINED_CANDIDATE_RATIO: f64 = 0.95;
 
 /// Returns the highest peak of the first `wanted` quantities over a curve. `points` are in order
 /// of frequency; `solver` refines the peak between its neighbours. Each quantity is searched
@@ -35,7 +35,7 @@ const LIKELY: f64 = 0.95;
 ///
 /// # Example
 /// ```
-/// use stickslip::curve::peak::{Point, highest};
+/// use stickslip::curve::peak::{CurvePoint, highest_peak};
 /// use stickslip::method::{Method, event_driven::EventDriven};
 /// use stickslip::orbit::Orbit;
 /// let mut couple = stickslip::model::example::blade_couple();
@@ -44,27 +44,28 @@ const LIKELY: f64 = 0.95;
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
 /// let omegas = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i)));
-/// let points: Vec<Point> = omegas.map(|w| Point::new(&solver.orbit(w, None).unwrap(), &amplitude)).collect();
-/// let peak = highest(&mut *solver, &points, 1, &amplitude).unwrap();
+/// let points: Vec<CurvePoint> = omegas.map(|w| CurvePoint::new(&solver.orbit(w, None).unwrap(), &amplitude)).collect();
+/// let peak = highest_peak(&mut *solver, &points, 1, &amplitude).unwrap();
 /// assert!((peak.value - 0.032_338).abs() < 1e-6);
 /// ```
-pub fn highest(
+pub fn highest_peak(
     solver: &mut dyn Solver,
-    points: &[Point],
+    points: &[CurvePoint],
     wanted: usize,
     quantities: &dyn Fn(&Orbit) -> Vec<f64>,
 ) -> Option<Peak> {
-    let largest = |point: &Point| (0..wanted).map(|quantity| point.value(quantity)).fold(f64::NEG_INFINITY, f64::max);
+    let largest =
+        |point: &CurvePoint| (0..wanted).map(|quantity| point.value(quantity)).fold(f64::NEG_INFINITY, f64::max);
     let finite = (0..points.len()).filter(|&i| largest(&points[i]).is_finite());
     let best = finite.max_by(|&a, &b| largest(&points[a]).total_cmp(&largest(&points[b])))?;
     let at_end = best == 0 || best + 1 == points.len();
-    let mut peak = Peak { omega: points[best].omega, value: largest(&points[best]), at_end, unsettled: None };
+    let mut peak = Peak { omega: points[best].omega, value: largest(&points[best]), at_end, unresolved: None };
     let mut tops: Vec<(f64, usize, Vec<usize>)> = (1..points.len().saturating_sub(1))
         .filter_map(|i| {
             let near = &points[i - 1..=i + 1];
             let mut here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-            here.sort_by(|&a, &b| reach(near, b).total_cmp(&reach(near, a)));
-            Some((reach(near, *here.first()?), i, here))
+            here.sort_by(|&a, &b| vertex_value(near, b).total_cmp(&vertex_value(near, a)));
+            Some((vertex_value(near, *here.first()?), i, here))
         })
         .collect();
     // The most promising maximum comes first, because its value excludes other maxima.
@@ -73,13 +74,13 @@ pub fn highest(
         let mut bracket = Bracket::new(&points[i - 1..=i + 1]);
         for quantity in here {
             // orbits that others added predict the peak better than the points of the curve
-            let share = if bracket.points.len() > 3 { LIKELY } else { CANDIDATE };
-            if bracket.reach(quantity) >= share * peak.value {
+            let share = if bracket.points.len() > 3 { REFINED_CANDIDATE_RATIO } else { CANDIDATE_RATIO };
+            if bracket.vertex_value(quantity) >= share * peak.value {
                 bracket.refine(solver, quantity, quantities);
                 peak = higher(peak, bracket.peak(quantity).peak);
             }
         }
-        bracket.refine_overtaken(solver, quantities);
+        bracket.repeat_overtaken(solver, quantities);
         let refined: Vec<usize> = bracket.ended.keys().copied().collect();
         peak = refined.into_iter().map(|quantity| bracket.peak(quantity).peak).fold(peak, higher);
     }
@@ -93,16 +94,16 @@ fn higher(one: Peak, other: Peak) -> Peak {
 
 /// Amplitudes below this fraction of the response of a single mass to the loads are rounding:
 /// friction holds the mass.
-const HELD: f64 = 1e-10;
+const HELD_RATIO: f64 = 1e-10;
 
 /// Returns the amplitude (m) below which a place counts as held at a frequency: a fraction of
 /// the largest `F / (k + Ω²m)`.
-pub fn held(system: &System, omega: f64) -> f64 {
+pub fn held_amplitude(system: &System, omega: f64) -> f64 {
     let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
     let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
     let loads = system.excitation(omega);
     let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
-    HELD * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
+    HELD_RATIO * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }
 
 /// Returns all local maxima of the first `wanted` quantities among the inner `points`, refined,
@@ -113,35 +114,35 @@ pub fn held(system: &System, omega: f64) -> f64 {
 ///
 /// # Example
 /// ```
-/// use stickslip::curve::peak::{Point, all};
+/// use stickslip::curve::peak::{CurvePoint, local_peaks};
 /// use stickslip::method::{Method, event_driven::EventDriven};
 /// use stickslip::orbit::Orbit;
 /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect();
 /// let mut solver = EventDriven.solver(&system).unwrap();
-/// let points: Vec<Point> = (0..9)
+/// let points: Vec<CurvePoint> = (0..9)
 ///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i)), None).unwrap())
-///     .map(|orbit| Point::new(&orbit, &amplitudes))
+///     .map(|orbit| CurvePoint::new(&orbit, &amplitudes))
 ///     .collect();
-/// let peaks = all(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
+/// let peaks = local_peaks(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
 /// assert_eq!(peaks.iter().filter(|peak| peak.quantity == 0).count(), 1);
 /// ```
-pub fn all(
+pub fn local_peaks(
     method: &dyn Method,
     system: &System,
-    points: &[Point],
+    points: &[CurvePoint],
     wanted: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
-) -> Result<Vec<PeakOf>, MethodError> {
+) -> Result<Vec<QuantityPeak>, MethodError> {
     let tops = (1..points.len().saturating_sub(1)).flat_map(|i| {
         let near = &points[i - 1..=i + 1];
         let here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-        here.chunks(TOGETHER).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
+        here.chunks(PEAKS_PER_SOLVER).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
     });
-    let tops: Vec<(&[Point], Vec<usize>)> = tops.collect();
-    let found: Vec<Result<Vec<PeakOf>, MethodError>> = tops
+    let tops: Vec<(&[CurvePoint], Vec<usize>)> = tops.collect();
+    let found: Vec<Result<Vec<QuantityPeak>, MethodError>> = tops
         .par_iter()
-        .map(|(near, wanted)| Ok(refine(&mut *onward::solver(method, system)?, near, wanted, quantities)))
+        .map(|(near, wanted)| Ok(refine(&mut *branch_following::solver(method, system)?, near, wanted, quantities)))
         .collect();
     let mut peaks = Vec::new();
     for some in found {
@@ -154,22 +155,22 @@ pub fn all(
 
 /// Tells whether the middle one of three points is a maximum. Among two equal points, the second
 /// one counts.
-fn is_maximum(near: &[Point], quantity: usize) -> bool {
+fn is_maximum(near: &[CurvePoint], quantity: usize) -> bool {
     let [left, here, right] = [0, 1, 2].map(|i| near[i].value(quantity));
     let known = near.iter().all(|point| !point.values.is_empty());
-    known && here >= left && here > right && here - left.min(right) > LEVEL * here.abs()
+    known && here >= left && here > right && here - left.min(right) > MIN_PROMINENCE * here.abs()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::shrink::RISE;
+    use super::bracket_reduction::MIN_RISE;
     use super::*;
     use crate::method::event_driven::EventDriven;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 
     #[test]
     fn level_curves_and_failed_neighbours_have_no_peak() {
-        let point = |values: &[f64]| Point { omega: 1.0, values: values.to_vec(), start: None, error: 0.0 };
+        let point = |values: &[f64]| CurvePoint { omega: 1.0, values: values.to_vec(), start: None, error: 0.0 };
         assert!(!is_maximum(&[point(&[1.0]), point(&[1.0 + 1e-13]), point(&[1.0])], 0));
         assert!(!is_maximum(&[point(&[]), point(&[2.0]), point(&[1.0])], 0));
         assert!(is_maximum(&[point(&[1.0]), point(&[2.0]), point(&[1.0])], 0));
@@ -179,7 +180,7 @@ mod tests {
     /// narrow one of 9.1 mm. The 13 points, five half-widths apart, show the narrow one as 1.8
     /// mm, below the wide one.
     #[test]
-    fn a_narrow_top_between_two_points_counts_beside_a_wide_one() {
+    fn a_narrow_peak_between_points_is_found() {
         let mut model = Model::default();
         for (name, stiffness, damping) in [("wide", 1e4, 4.0), ("narrow", 1.21e4, 1.0)] {
             model.masses.push(Mass::new(name, 1.0));
@@ -189,18 +190,18 @@ mod tests {
         let system = model.assemble().unwrap();
         let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
         let mut solver = EventDriven.solver(&system).unwrap();
-        let mut point = |i: i32| Point::new(&solver.orbit(82.5 + 5.0 * f64::from(i), None).unwrap(), &amplitudes);
-        let points: Vec<Point> = (0..13).map(&mut point).collect();
-        let peak = highest(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
+        let mut point = |i: i32| CurvePoint::new(&solver.orbit(82.5 + 5.0 * f64::from(i), None).unwrap(), &amplitudes);
+        let points: Vec<CurvePoint> = (0..13).map(&mut point).collect();
+        let peak = highest_peak(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
         // F / (c √(k/m - c²/4m²))
         let expected = 1.0 / f64::sqrt(1.21e4 - 0.25);
-        assert!((peak.value / expected - 1.0).abs() < RISE && peak.unsettled.is_none(), "{peak:?}");
+        assert!((peak.value / expected - 1.0).abs() < MIN_RISE && peak.unresolved.is_none(), "{peak:?}");
     }
 
     /// Without damping, a slider of 2 N cannot bound the response to 10 N, since 4/π·2 N < 10 N.
     /// With sufficient damping the peak is found.
     #[test]
-    fn a_peak_without_a_bound_is_open() {
+    fn an_unbounded_peak_is_unresolved() {
         let peak = |damping: f64| {
             let mut model = Model::default();
             model.masses.push(Mass::new("m", 1.0));
@@ -211,16 +212,18 @@ mod tests {
             let system = model.assemble().unwrap();
             let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
             let mut solver = EventDriven.solver(&system).unwrap();
-            let points: Vec<Point> = (0..9)
+            let points: Vec<CurvePoint> = (0..9)
                 .map(|i| 95.3 + 1.1 * f64::from(i))
                 .map(|omega| {
-                    solver.orbit(omega, None).map_or(Point::failed(omega), |orbit| Point::new(&orbit, &amplitude))
+                    solver
+                        .orbit(omega, None)
+                        .map_or(CurvePoint::failed(omega), |orbit| CurvePoint::new(&orbit, &amplitude))
                 })
                 .collect();
-            highest(&mut *solver, &points, 1, &amplitude).unwrap()
+            highest_peak(&mut *solver, &points, 1, &amplitude).unwrap()
         };
-        assert!(peak(0.0).unsettled.is_some(), "{:?}", peak(0.0));
-        assert_eq!(peak(0.5).unsettled, None);
+        assert!(peak(0.0).unresolved.is_some(), "{:?}", peak(0.0));
+        assert_eq!(peak(0.5).unresolved, None);
     }
 
     /// A one-sided stop bends the resonance to higher frequencies. Without damping, the response
@@ -228,7 +231,7 @@ mod tests {
     /// off and `ω'` on the stop. The branch is lost before. With damping the curve has a maximum
     /// before its fold.
     #[test]
-    fn a_peak_that_is_lost_on_its_way_up_is_open() {
+    fn a_peak_whose_branch_is_lost_is_unresolved() {
         let peak = |damping: f64, points: usize| {
             let mut model = Model::default();
             model.masses.push(Mass::new("m", 1.0));
@@ -238,19 +241,19 @@ mod tests {
             model.joints.push(Joint { name: "j".to_owned(), between: ["m".to_owned(), GROUND.to_owned()], law });
             let system = model.assemble().unwrap();
             let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
-            let (mut solver, mut found) = (EventDriven.solver(&system).unwrap(), Vec::<Point>::new());
+            let (mut solver, mut found) = (EventDriven.solver(&system).unwrap(), Vec::<CurvePoint>::new());
             for i in 0..=points {
                 let start = found.last().and_then(|point| point.start.as_deref());
                 let omega = 100.0 + 30.0 * i as f64 / points as f64;
                 let orbit = solver.orbit(omega, start);
-                found.push(orbit.map_or(Point::failed(omega), |orbit| Point::new(&orbit, &amplitude)));
+                found.push(orbit.map_or(CurvePoint::failed(omega), |orbit| CurvePoint::new(&orbit, &amplitude)));
             }
-            highest(&mut *solver, &found, 1, &amplitude).unwrap()
+            highest_peak(&mut *solver, &found, 1, &amplitude).unwrap()
         };
         for points in [10, 31, 310, 1000] {
             let open = peak(0.0, points);
-            assert!(open.unsettled.is_some() && open.omega < 117.158, "{points}: {open:?}");
-            assert_eq!(peak(2.0, points).unsettled, None, "{points}");
+            assert!(open.unresolved.is_some() && open.omega < 117.158, "{points}: {open:?}");
+            assert_eq!(peak(2.0, points).unresolved, None, "{points}");
         }
     }
 }

@@ -12,41 +12,41 @@ pub struct Peak {
     /// True if the largest value is at an end of the range; the actual peak may lie beyond.
     pub at_end: bool,
     /// Why the actual peak may be higher; `None` if the search found it.
-    pub unsettled: Option<Unsettled>,
+    pub unresolved: Option<UnresolvedPeak>,
 }
 
 /// Why a search left the height of a peak undetermined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unsettled {
+pub enum UnresolvedPeak {
     /// Orbits next to the highest one were not found.
-    Neighbours,
+    MissingNeighbours,
     /// The curve still rises steeply from both sides at the end of the search.
-    Needle,
+    TooNarrow,
     /// The curve still rises steeply at a jump to another orbit.
     CutOff,
     /// The search reached its maximum number of orbits, and the neighbours predict a higher
     /// value.
-    Open,
+    OrbitLimit,
 }
 
-impl std::fmt::Display for Unsettled {
+impl std::fmt::Display for UnresolvedPeak {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Unsettled::Neighbours => {
+            UnresolvedPeak::MissingNeighbours => {
                 "orbits next to this peak were not found; the actual peak may be higher: much higher with little or \
                  no damping, or if friction cannot bound the motion; use a finer range or another method"
             }
-            Unsettled::Needle => {
+            UnresolvedPeak::TooNarrow => {
                 "this peak is narrower than the resolution of the search; the actual peak is higher or unbounded: \
                  without damping, friction bounds a resonance only up to a certain force; add the damping of the \
                  structure, or use a narrower range"
             }
-            Unsettled::CutOff => {
+            UnresolvedPeak::CutOff => {
                 "the curve still rises steeply to this peak at a jump to another orbit, so the actual peak is higher \
                  or unbounded; follow the curve with kind `branch`, and if the model has no damping, add the damping \
                  of the structure"
             }
-            Unsettled::Open => {
+            UnresolvedPeak::OrbitLimit => {
                 "the search for this peak reached its maximum number of orbits, and the actual peak is higher; use a \
                  finer range, or follow the curve with kind `branch`"
             }
@@ -56,7 +56,7 @@ impl std::fmt::Display for Unsettled {
 
 /// A point of a curve for the peak search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct CurvePoint {
     /// Frequency, rad/s.
     pub omega: f64,
     /// The quantities; empty if there is no orbit.
@@ -67,16 +67,16 @@ pub struct Point {
     pub error: f64,
 }
 
-impl Point {
+impl CurvePoint {
     /// Extracts the data of an orbit that a curve needs.
     pub fn new(orbit: &Orbit, quantities: &dyn Fn(&Orbit) -> Vec<f64>) -> Self {
-        let error = orbit.evidence.truncation.unwrap_or(0.0);
-        Point { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.start.clone()), error }
+        let error = orbit.evidence.error_estimate.unwrap_or(0.0);
+        CurvePoint { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.initial_state.clone()), error }
     }
 
     /// Creates a point without an orbit.
     pub fn failed(omega: f64) -> Self {
-        Point { omega, values: Vec::new(), start: None, error: 0.0 }
+        CurvePoint { omega, values: Vec::new(), start: None, error: 0.0 }
     }
 
     /// Returns a quantity; negative infinity if there is no orbit.
@@ -87,7 +87,7 @@ impl Point {
 
 /// A peak of one of several quantities.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PeakOf {
+pub struct QuantityPeak {
     /// Index of the quantity.
     pub quantity: usize,
     /// The peak.

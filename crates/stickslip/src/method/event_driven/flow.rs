@@ -7,7 +7,7 @@ use super::memory::Memory;
 use super::pattern::{Beginning, Driven, Pattern, Work};
 use super::tolerances::NEAR_REST;
 use crate::law::Contact;
-use crate::method::Breakdown;
+use crate::method::IntegrationError;
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -146,7 +146,7 @@ impl SegmentedMotion {
         start: f64,
         duration: f64,
         mut sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         self.used = 0;
         self.switches = 0;
         let n = self.mechanics.n;
@@ -161,7 +161,7 @@ impl SegmentedMotion {
         let mut time = start;
         let (mut at_once, mut idle, mut bytes) = (0, 0, 0);
         if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
-            return Err(Breakdown::Undecidable { time });
+            return Err(IntegrationError::NoContactState { time });
         }
         loop {
             interrupt::check();
@@ -169,8 +169,8 @@ impl SegmentedMotion {
                 .memory
                 .pattern(&self.mechanics, &self.drive, &self.decision.contacts)
                 .map_err(|defective| match defective.lambda.norm() {
-                    lambda if lambda.is_finite() => Breakdown::Defective { time, lambda },
-                    _ => Breakdown::OutOfRange { time },
+                    lambda if lambda.is_finite() => IntegrationError::Defective { time, lambda },
+                    _ => IntegrationError::OutOfRange { time },
                 })?;
             self.start_segment(time, &pattern, driven, state);
             let eased = idle > EASED_AFTER * (1 + self.mechanics.parts.len());
@@ -182,7 +182,7 @@ impl SegmentedMotion {
             let (length, event) = match zero {
                 FirstZero::None => (rest, None),
                 FirstZero::Found { index, time } => (time, Some(self.watched[index])),
-                FirstZero::TooManySteps => return Err(Breakdown::TooFast { time }),
+                FirstZero::TooManySteps => return Err(IntegrationError::TooFast { time }),
             };
             self.finish_segment(&pattern, length, state, sensitivity.as_deref_mut());
             let Some(part) = event else { return Ok(()) };
@@ -195,13 +195,13 @@ impl SegmentedMotion {
             if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.parts.len()) {
                 let joint = self.mechanics.names[self.mechanics.parts[part].joint].clone();
                 if pattern.redundant {
-                    return Err(Breakdown::Redundant { time, joint });
+                    return Err(IntegrationError::Redundant { time, joint });
                 }
-                return Err(Breakdown::Chatter { time, switches: self.switches, joint });
+                return Err(IntegrationError::Chatter { time, switches: self.switches, joint });
             }
             self.snap(part, state);
             if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
-                return Err(Breakdown::Undecidable { time });
+                return Err(IntegrationError::NoContactState { time });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
                 self.jump(part, &pattern, time, state, sensitivity);

@@ -6,9 +6,9 @@
 //! them different contacts, and the friction problem would not have a unique solution. Each
 //! joint receives a [`Share`] of the part's force.
 
-use crate::law::{Contact, Law, Piece};
+use crate::law::{Contact, IdealElement, Law};
 use crate::method::{MethodError, Refusal};
-use crate::model::{Line, System};
+use crate::model::{CollinearAxis, System};
 use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
@@ -143,7 +143,7 @@ impl Share {
 /// A rigid slider of a joint, before those along one line are combined.
 struct Slider {
     joint: usize,
-    line: Line,
+    line: CollinearAxis,
     direction: DVector<f64>,
     limit: f64,
     static_limit: f64,
@@ -152,7 +152,7 @@ struct Slider {
 /// Rigid sliders along one line, with their common part.
 struct Group {
     part: usize,
-    line: Line,
+    line: CollinearAxis,
     members: Vec<Member>,
 }
 
@@ -192,7 +192,7 @@ impl Gathered {
 
     fn push_rigid(&mut self, slider: Slider) {
         let (share, limits) = (self.shares.len(), (slider.limit, slider.static_limit));
-        let found = self.groups.iter().enumerate().find_map(|(i, group)| Some((i, slider.line.along(&group.line)?)));
+        let found = self.groups.iter().enumerate().find_map(|(i, group)| Some((i, slider.line.ratio_to(&group.line)?)));
         let (group, factor) = found.unwrap_or((self.groups.len(), 1.0));
         if let Some(group) = self.groups.get(group) {
             self.shares.push(Share::whole(slider.joint, group.part));
@@ -223,8 +223,10 @@ impl Gathered {
 
 /// Returns the reason why the method does not support a law.
 fn refusal(law: &dyn Law) -> Option<&'static str> {
-    let Some(pieces) = law.pieces() else { return Some("it does not consist of ideal sliders, springs and stops") };
-    let drops = |piece: &Piece| matches!(piece, Piece::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
+    let Some(pieces) = law.ideal_elements() else {
+        return Some("it does not consist of ideal sliders, springs and stops");
+    };
+    let drops = |piece: &IdealElement| matches!(piece, IdealElement::Slider(s) if s.stiffness.is_some() && s.static_limit > s.limit);
     if law.directions() != 1 {
         Some("it acts along several directions")
     } else if pieces.iter().any(drops) {
@@ -265,7 +267,7 @@ pub(crate) struct Mechanics {
 /// adjacent mass.
 fn light(system: &System, parts: &[Part], method: &'static str) -> Option<MethodError> {
     let rigid = || parts.iter().filter(|part| matches!(part.kind, Kind::Rigid { .. }));
-    let mass = |row: usize| system.structure().own_mass(row);
+    let mass = |row: usize| system.structure().diagonal_mass(row);
     rigid().find_map(|part| {
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
@@ -311,7 +313,7 @@ impl Mechanics {
         if let Some(error) = MethodError::too_large(method, system) {
             return Err(error);
         }
-        if let Some(i) = (0..n).find(|&i| system.structure().own_mass(i) <= 0.0) {
+        if let Some(i) = (0..n).find(|&i| system.structure().diagonal_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(method, system, i));
         }
         let mut gathered = Gathered::default();
@@ -321,15 +323,15 @@ impl Mechanics {
                 return Err(MethodError::law(method, joint, misses));
             }
             let axis = &joint.axes()[0];
-            for piece in joint.law().pieces().unwrap_or_default() {
+            for piece in joint.law().ideal_elements().unwrap_or_default() {
                 let direction = axis.dense(n);
                 let kind = match piece {
-                    Piece::Slider(slider) if slider.static_limit == 0.0 => continue,
-                    Piece::Stop { stiffness: 0.0, .. } => continue,
-                    Piece::Slider(slider) => match slider.stiffness {
+                    IdealElement::Slider(slider) if slider.static_limit == 0.0 => continue,
+                    IdealElement::Stop { stiffness: 0.0, .. } => continue,
+                    IdealElement::Slider(slider) => match slider.stiffness {
                         None => {
                             let (limit, static_limit) = (slider.limit, slider.static_limit);
-                            let line = Line::of(axis);
+                            let line = CollinearAxis::of(axis);
                             gathered.push_rigid(Slider { joint: j, line, direction, limit, static_limit });
                             continue;
                         }
@@ -339,7 +341,7 @@ impl Mechanics {
                         }
                     },
                     // the position of a stop includes the mean of the imposed motion
-                    Piece::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
+                    IdealElement::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
                 };
                 gathered.push(Part { joint: j, direction, kind });
             }

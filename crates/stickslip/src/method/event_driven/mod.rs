@@ -37,7 +37,7 @@ use super::periodic::{Aim, Closed, ReturnMap, Search, approached};
 use super::repeated::Afresh;
 use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
 use super::static_equilibrium::{StaticEquilibrium, states_at};
-use super::{Breakdown, Method, MethodError, MethodInfo, OrbitError, Solver, vibration};
+use super::{IntegrationError, Method, MethodError, MethodInfo, OrbitError, Solver, vibration};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -122,7 +122,7 @@ pub(crate) struct Exact<'a> {
 }
 
 impl ReturnMap for Exact<'_> {
-    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), Breakdown> {
+    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         self.flow.run(state, 0.0, self.duration, derivative)
     }
     fn weights(&self) -> &[f64] {
@@ -184,7 +184,7 @@ impl<'a> Exact<'a> {
             weights,
             duration: 0.0,
             periods,
-            contracts: system.contracts(),
+            contracts: system.is_incrementally_stable(),
             equilibrium: StaticEquilibrium::under_load(system),
         })
     }
@@ -261,15 +261,15 @@ impl Solver for Exact<'_> {
             let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
             let (mut taken, at) = (1.0, (symmetry, orbit.period()));
             let share = |exact: &Self, orbit: &Orbit| {
-                vibration::share(orbit.path.as_ref(), at, &orbit.start, (&exact.weights, aim.rest))
+                vibration::share(orbit.path.as_ref(), at, &orbit.initial_state, (&exact.weights, aim.rest))
             };
             while let Some(share) = vibration::next(taken, share(self, &orbit)).map_err(broke)? {
                 taken = share;
-                orbit = self.found(Some(&orbit.start), search.of_share(share), aim)?;
+                orbit = self.found(Some(&orbit.initial_state), search.of_share(share), aim)?;
             }
         }
         // an estimated distance from the settled motion causes a proportional energy gap
-        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.truncation.unwrap_or(0.0);
+        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });
         }
@@ -296,7 +296,7 @@ mod tests {
         let mut orbit = |hertz: f64, start: Option<&[f64]>| solver.orbit(std::f64::consts::TAU * hertz, start).unwrap();
         let cold = orbit(121.0, None);
         for neighbour in [120.9875, 121.0125] {
-            let start = orbit(neighbour, None).start;
+            let start = orbit(neighbour, None).initial_state;
             let warm = orbit(121.0, Some(&start));
             assert!(warm.evidence.iterations <= 5, "{} iterations from {neighbour} Hz", warm.evidence.iterations);
             for (one, other) in warm.places.iter().zip(&cold.places) {

@@ -4,12 +4,12 @@ use super::flow::{Segment, SegmentedMotion};
 use super::mechanics::{Part, Share};
 use super::tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
 use crate::law::Contact;
-use crate::method::Breakdown;
+use crate::method::IntegrationError;
 use crate::method::periodic::{Closed, norm};
 use crate::method::vibration;
 use crate::model::{Axis, System};
-use crate::orbit::measure::{Faces, NO_WORK, Shares, Signals, measure};
-use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
+use crate::orbit::postprocess::{CONSERVATIVE_WORK, ContactFractions, ContactSummary, PathSignals, results};
+use crate::orbit::{Accuracy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws};
 use num_complex::Complex64;
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -53,10 +53,10 @@ pub(super) fn orbit(
     (omega, periods): (f64, usize),
     symmetry: Symmetry,
     (closed, weights): (Closed, &[f64]),
-) -> Result<Orbit, Breakdown> {
+) -> Result<Orbit, IntegrationError> {
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
-    let measured = measure(system, &Measuring::new(&path), omega, (symmetry, period))?;
+    let measured = results(system, &Measuring::new(&path), omega, (symmetry, period))?;
     let rest = NEAR_REST * flow.energy_scale;
     let share = vibration::share(&path, (symmetry, period), &closed.state, (weights, rest));
     let stored = share * norm(weights, &closed.state).powi(2);
@@ -65,21 +65,21 @@ pub(super) fn orbit(
         omega,
         periods,
         symmetry,
-        start: closed.state,
+        initial_state: closed.state,
         evidence: Evidence {
             residual: closed.residual,
-            energy_gap: measured.energy_gap(f64::max(NO_WORK * rest * rest, STORED * stored)),
+            energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, STORED * stored)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             harmonics: None,
-            truncation: closed.missing,
+            error_estimate: closed.missing,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
-            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+            history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
             found_by: NAME,
-            instead_of: None,
+            fallback_from: None,
         },
         places: measured.places,
         joints: measured.joints,
@@ -164,7 +164,7 @@ impl ExactPath {
     /// Returns displacement and velocity of a moved place as signals.
     fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
         let mut motion = vec![ZERO; piece.basis().len()];
-        self.add_imposed(piece, &self.system.moved()[m].motion, &mut motion);
+        self.add_imposed(piece, &self.system.moved_places()[m].motion, &mut motion);
         let mut speed = motion.clone();
         piece.basis().differentiate(&motion, &mut speed);
         (motion, speed)
@@ -172,7 +172,7 @@ impl ExactPath {
 
     /// Returns the force that moves a place, as a signal.
     fn reaction(&self, piece: &Piece, m: usize) -> Vec<Complex64> {
-        let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved()[m]);
+        let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved_places()[m]);
         let mut force = vec![ZERO; nb];
         let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
             if factor != 0.0 {
@@ -277,7 +277,7 @@ impl<'a> Measuring<'a> {
     }
 
     /// Returns the least and the largest value of a signal.
-    fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), Breakdown> {
+    fn range_of(&self, signal: &[Complex64]) -> Result<(f64, f64), IntegrationError> {
         let mut memory = self.memory.borrow_mut();
         let mut range = ValueRange::new(self.path.symmetry == Symmetry::HalfPeriod);
         // values known from all pieces reduce the search in each of them
@@ -290,7 +290,7 @@ impl<'a> Measuring<'a> {
             piece
                 .basis()
                 .extend_range(&mut range, segment, &mut memory)
-                .map_err(|_| Breakdown::TooFast { time: *start })?;
+                .map_err(|_| IntegrationError::TooFast { time: *start })?;
         }
         Ok((range.low, range.high))
     }
@@ -308,9 +308,9 @@ impl<'a> Measuring<'a> {
 
 /// A signal is the list of its coefficients, piece by piece. Each law acts along one axis, so
 /// that axes and joints have the same indices.
-impl Signals for Measuring<'_> {
+impl PathSignals for Measuring<'_> {
     type Signal = Vec<Complex64>;
-    type Error = Breakdown;
+    type Error = IntegrationError;
 
     fn displacement(&self, row: usize) -> Vec<Complex64> {
         self.kept(row, |piece| &piece.segment.displacement)
@@ -355,10 +355,10 @@ impl Signals for Measuring<'_> {
         }
         sum
     }
-    fn range(&self, place: &Axis) -> Result<(f64, f64), Breakdown> {
-        self.range_of(&self.seen(place))
+    fn range(&self, place: &Axis) -> Result<(f64, f64), IntegrationError> {
+        self.range_of(&self.place_displacement(place))
     }
-    fn relative_range(&self, axis: usize) -> Result<(f64, f64), Breakdown> {
+    fn relative_range(&self, axis: usize) -> Result<(f64, f64), IntegrationError> {
         self.range_of(&self.relative(axis))
     }
     /// Returns the dissipation of the sliders alone, because springs and stops return all their
@@ -376,14 +376,18 @@ impl Signals for Measuring<'_> {
         }
         sum
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let path = self.path;
         if path.of_joint(joint).next().is_none() {
             // a joint without force slips all the time
-            return Faces { shares: Shares { slip: 1.0, ..Shares::default() }, switches: 0, rests: false };
+            return ContactSummary {
+                shares: ContactFractions { slip: 1.0, ..ContactFractions::default() },
+                switches: 0,
+                sticks_throughout: false,
+            };
         }
         let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
-        let shares = Shares::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
+        let shares = ContactFractions::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
         let slips = |segment: &Segment| path.of_joint(joint).any(|share| segment.contacts[share.part].slips());
         let pairs = path.pieces.windows(2).map(|pair| (&pair[0].segment.contacts, &pair[1].segment.contacts));
         let parts = || path.of_joint(joint).map(|share| share.part);
@@ -392,8 +396,8 @@ impl Signals for Measuring<'_> {
             let (first, last) = (&first.segment.contacts, &last.segment.contacts);
             switches += parts().filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
-        let rests = !path.pieces.iter().any(|piece| slips(&piece.segment));
-        Faces { shares, switches, rests }
+        let sticks_throughout = !path.pieces.iter().any(|piece| slips(&piece.segment));
+        ContactSummary { shares, switches, sticks_throughout }
     }
 }
 
@@ -437,7 +441,7 @@ impl Path for ExactPath {
                 self.add_imposed(piece, joint.axes()[0].imposed(), &mut imposed);
                 let mut speed = vec![ZERO; nb];
                 piece.basis().differentiate(&imposed, &mut speed);
-                let along = |v: &[f64]| joint.axes()[0].along(v);
+                let along = |v: &[f64]| joint.axes()[0].component(v);
                 let joint_velocity = along(&velocity) + sign * real_dot(&speed, &values);
                 let contact = match self.contact_of(j, &piece.segment) {
                     None => Contact::slip(joint_velocity),
@@ -447,20 +451,20 @@ impl Path for ExactPath {
                 let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
                 let of_share = |s: &Share| s.of(piece.segment.contacts[s.part]) * row(&piece.segment.force, s.part);
                 let force = self.of_joint(j).map(of_share).sum();
-                JointSample::along(joint_displacement, joint_velocity, force, contact)
+                JointSample::one_dimensional(joint_displacement, joint_velocity, force, contact)
             })
             .collect();
-        let moved = (0..self.system.moved().len())
+        let moved = (0..self.system.moved_places().len())
             .map(|m| {
                 let (motion, _) = self.moved_motion(piece, m);
                 let reaction = self.reaction(piece, m);
                 (sign * real_dot(&motion, &values), sign * real_dot(&reaction, &values))
             })
             .collect();
-        Sample { acceleration, displacement, velocity, joints, moved }
+        Sample { acceleration, displacement, velocity, joints, imposed: moved }
     }
 
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         let inner = self.pieces.iter().skip(1).map(|piece| piece.segment.start);
         // a switch can also coincide with the start of the return
         let at_cut = self.pieces.first().zip(self.pieces.last()).is_some_and(|(first, last)| {

@@ -1,7 +1,7 @@
 //! Cost estimate of an orbit, before any computation.
 
 use super::mechanics::takes;
-use crate::law::Piece;
+use crate::law::IdealElement;
 use crate::model::System;
 
 /// Multiplications for the decomposition of a pattern, per cube of the number of degrees of
@@ -40,9 +40,9 @@ pub fn orbit_work(system: &System) -> Option<f64> {
         if !takes(law) {
             return None;
         }
-        for piece in law.pieces().unwrap_or_default().iter().filter(|piece| !piece.is_nothing()) {
+        for piece in law.ideal_elements().unwrap_or_default().iter().filter(|piece| !piece.carries_no_force()) {
             match piece {
-                Piece::Slider(slider) if slider.stiffness.is_some() => springs += 1.0,
+                IdealElement::Slider(slider) if slider.stiffness.is_some() => springs += 1.0,
                 _ => others += 1.0,
             }
         }

@@ -17,7 +17,7 @@ use crate::method::evidence::Judge;
 use crate::method::guess::Guess;
 use crate::method::{MethodError, OrbitError, Solver};
 use crate::model::System;
-use crate::orbit::{Course, Orbit};
+use crate::orbit::{ObservedMotion, Orbit};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, VecDeque};
@@ -79,7 +79,7 @@ pub(super) struct Balance {
     pub(super) begun: Option<(f64, Vec<f64>)>,
     /// Frequencies (rad/s) without an orbit at which the motion was integrated in time, and how
     /// that motion behaved and ended.
-    pub(super) followed: Vec<(f64, Course, Vec<f64>)>,
+    pub(super) followed: Vec<(f64, ObservedMotion, Vec<f64>)>,
     /// Number of time integrations that were made to find an orbit.
     pub(super) tried_in_time: usize,
     /// By highest harmonic, in systems with many contacts: the last solution whose error was
@@ -115,7 +115,7 @@ impl Balance {
         {
             ports.begin_at(&states);
             around.iter_mut().for_each(|around| around.begin_at(&states));
-            static_start = Some(orbit.start);
+            static_start = Some(orbit.initial_state);
         }
         Ok(Balance {
             method,
@@ -272,8 +272,8 @@ impl Balance {
             omega: self.drive,
             iterations: lost.iterations,
             residual: lost.residual,
-            spent: self.is_spent(),
-            instead: String::new(),
+            work_limit_reached: self.is_spent(),
+            advice: String::new(),
         }
     }
 
@@ -298,7 +298,7 @@ impl Balance {
     ) -> Result<Orbit, OrbitError> {
         let orbit = self.orbit_of(top, omega, &motion, x, truncation)?;
         self.recent.truncate(RECENT - 1);
-        self.recent.push_front(Recent { start: orbit.start.clone(), omega, top, motion });
+        self.recent.push_front(Recent { start: orbit.initial_state.clone(), omega, top, motion });
         Ok(orbit)
     }
 
@@ -506,7 +506,7 @@ mod tests {
         let mut starts: Vec<Vec<f64>> = Vec::new();
         for i in 0..21 {
             let start = starts.last().map(Vec::as_slice);
-            starts.push(solver.orbit(rate(12.0 + 0.35 * f64::from(i)), start).unwrap().start);
+            starts.push(solver.orbit(rate(12.0 + 0.35 * f64::from(i)), start).unwrap().initial_state);
         }
         solver.begin_at(rate(15.85), &starts[11]);
         let between = solver.between(rate(15.7276), Some(&starts[11])).unwrap();

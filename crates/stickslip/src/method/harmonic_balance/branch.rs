@@ -179,7 +179,7 @@ impl<'a> BranchEquations<'a> {
             let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
             let steep = self.ports.has_steep() || self.level.jumps(&self.ports, &self.motion);
             let at = (self.kept, self.omega, steep);
-            Some(estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
+            Some(estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
         let setting = path::Setting {
             system: &self.system,

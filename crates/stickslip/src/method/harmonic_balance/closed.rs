@@ -129,7 +129,7 @@ mod tests {
     use super::*;
     use crate::law::{FrictionContact, SharedLaw};
     use crate::method::{Method, OrbitError};
-    use crate::model::{Axis, Cyclic, System};
+    use crate::model::{Axis, CyclicSymmetry, System};
     use crate::orbit::Orbit;
     use crate::structure::Structure;
 
@@ -437,13 +437,13 @@ mod tests {
                 stiffness[(r, c)] += k;
             }
         }
-        let cyclic = Cyclic { sectors, order };
+        let cyclic = CyclicSymmetry { sectors, order };
         let mut builder = System::builder(structure(DMatrix::identity(n, n) * 0.5, stiffness));
         for i in 0..sectors {
             let axes = vec![Axis::new(vec![(2 * i, 1.0)]), Axis::new(vec![(2 * i + 1, 1.0)])];
             builder = builder.joint(format!("contact{i}"), contact(10.0), axes).force(2 * i + 1, 0, pressed(1));
-            builder = builder.force(2 * i, 1, cyclic.lead(1, i) * 0.2);
+            builder = builder.force(2 * i, 1, cyclic.phase_factor(1, i) * 0.2);
         }
-        stands("ring", &builder.build().unwrap().travelling(cyclic).unwrap(), 300.0);
+        stands("ring", &builder.build().unwrap().with_cyclic_symmetry(cyclic).unwrap(), 300.0);
     }
 }

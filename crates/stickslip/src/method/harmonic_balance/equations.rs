@@ -36,7 +36,7 @@ use super::ports::{Alternation, Beginning, Port, Ports, block, blocks};
 use super::receptance::{Formed, Receptance};
 use super::sparse::Sparse;
 use super::window::Settling;
-use crate::model::Cyclic;
+use crate::model::CyclicSymmetry;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
@@ -262,10 +262,10 @@ impl Level {
     /// Extends a motion of one sector to the whole ring, for postprocessing:
     /// the returned level cannot be solved. `ports` are those of the ring.
     /// Every sector moves with the phase of the travelling wave.
-    pub fn around(&self, cyclic: Cyclic, ports: &Ports, motion: &Solution) -> (Level, Solution) {
+    pub fn around(&self, cyclic: CyclicSymmetry, ports: &Ports, motion: &Solution) -> (Level, Solution) {
         let (nh, own) = (self.harmonics().len(), motion.c.len());
         let all = |values: &[Complex64]| -> Vec<Complex64> {
-            let lead = |s: usize, i: usize| cyclic.lead(self.harmonics()[i % nh], s);
+            let lead = |s: usize, i: usize| cyclic.phase_factor(self.harmonics()[i % nh], s);
             (0..cyclic.sectors).flat_map(|s| (0..own).map(move |i| values[i] * lead(s, i))).collect()
         };
         let motion = Solution { c: all(&motion.c), force: all(&motion.force), ..*motion };

@@ -82,7 +82,7 @@ pub(super) fn estimate(
 
 /// Returns the motion of a place as a length, m.
 fn length(place: &Axis, motion: &DVector<Complex64>) -> Complex64 {
-    place.along_complex(motion) * place.length()
+    place.complex_component(motion) * place.length_scale()
 }
 
 /// Returns the motions of the places at the resonances above the harmonics of a solution, under

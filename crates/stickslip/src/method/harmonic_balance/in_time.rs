@@ -9,7 +9,7 @@ use crate::method::OrbitError;
 use crate::method::course::course;
 use crate::method::guess::Guess;
 use crate::method::periodic::APPROACH;
-use crate::orbit::{Course, JointSample, Orbit, Path};
+use crate::orbit::{JointSample, ObservedMotion, Orbit, Path};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -109,7 +109,8 @@ impl Balance {
             return None;
         }
         let drive = self.drive;
-        let no_orbit = |course, state| Some(Err(OrbitError::NoOrbit { method: NAME, omega: drive, course, state }));
+        let no_orbit =
+            |course, state| Some(Err(OrbitError::NoOrbit { method: NAME, omega: drive, observed: course, state }));
         if let Some((_, course, state)) = self.followed.iter().find(|(at, ..)| *at == omega) {
             return no_orbit(course.clone(), state.clone());
         }
@@ -117,7 +118,7 @@ impl Balance {
             return None;
         }
         let (course, path, state) = course(&self.system, omega, self.standing())?;
-        if matches!(course, Course::Settles | Course::Settling { .. }) {
+        if matches!(course, ObservedMotion::Settles | ObservedMotion::Settling { .. }) {
             // contacts that open and close may have no solution with few harmonics
             let mut top = top;
             for _ in 0..LONGER {

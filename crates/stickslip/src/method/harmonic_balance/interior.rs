@@ -205,7 +205,9 @@ mod tests {
     use super::super::sparse::Sparse;
     use super::*;
     use crate::law::{Coulomb, Jenkins};
-    use crate::model::{Around, Disk, Force, GROUND, Joint, Mass, Model, Spring, System, normal_pattern};
+    use crate::model::{
+        Disk, Force, GROUND, Joint, Mass, Model, SectorDistribution, Spring, System, normal_deviations,
+    };
     use std::f64::consts::TAU;
     use std::sync::Arc;
 
@@ -214,8 +216,8 @@ mod tests {
 
     /// Returns a ring of blades at 16 Hz, 1 % mistuned, with rigid friction between neighbours.
     fn ring(blades: usize, limit: f64) -> System {
-        let deviations = normal_pattern(blades, 0.01, 7);
-        let disk = Disk { sectors: blades, forces: vec![Around::EngineOrder(3)], motions: vec![] };
+        let deviations = normal_deviations(blades, 0.01, 7);
+        let disk = Disk { sectors: blades, forces: vec![SectorDistribution::EngineOrder(3)], motions: vec![] };
         let ring = disk.ring(|s| {
             let between = |other: &str| ["b".to_owned(), other.to_owned()];
             let own = 1e4 * (1.0 + deviations[s]);

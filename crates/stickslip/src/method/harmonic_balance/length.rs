@@ -85,7 +85,7 @@ impl Balance {
         let finer = self.levels.get_mut(&double).expect("solved");
         let coarse = Compared { harmonics: &few, places: x, along: &motion.c };
         let at = (self.kept, omega, self.steep);
-        let error = estimate(self.system.seen(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
+        let error = estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
         Ok((error, better))
     }
 
@@ -172,8 +172,8 @@ impl Balance {
             let shown = top > first || !(self.steep && self.ports.has_falling());
             if error <= tolerance && shown {
                 let orbit = self.finish(top, omega, motion.clone(), x.clone(), Some(error))?;
-                let judged = orbit.evidence.truncation.unwrap_or(error);
-                let before = returned.as_ref().and_then(|orbit| orbit.evidence.truncation);
+                let judged = orbit.evidence.error_estimate.unwrap_or(error);
+                let before = returned.as_ref().and_then(|orbit| orbit.evidence.error_estimate);
                 let closer = before.is_none_or(|before| judged <= 0.5 * before);
                 if judged <= tolerance || !closer || !self.can_go_on(top) {
                     return Ok(orbit);
@@ -198,7 +198,8 @@ impl Balance {
             x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
         }
         let harmonics = checked / self.periods;
-        let state = self.orbit_of(top, omega, &motion, x, None).map_or_else(|_| Vec::new(), |orbit| orbit.start);
+        let state =
+            self.orbit_of(top, omega, &motion, x, None).map_or_else(|_| Vec::new(), |orbit| orbit.initial_state);
         Err(OrbitError::Truncation {
             method: NAME,
             omega: self.drive,
@@ -207,7 +208,7 @@ impl Balance {
             estimate,
             tolerance,
             state,
-            instead: String::new(),
+            advice: String::new(),
         })
     }
 }

@@ -98,7 +98,7 @@ impl<'a> ModeEquations<'a> {
         if let Some(error) = MethodError::too_large("modes", system) {
             return Err(error);
         }
-        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().own_mass(i) == 0.0) {
+        if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().diagonal_mass(i) == 0.0) {
             return Err(MethodError::needs_mass(super::NAME, system, massless));
         }
         if system.structure().mass().clone().cholesky().is_none() {

@@ -40,7 +40,7 @@ pub(super) const LEFT: f64 = 0.05;
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// let method = HarmonicBalance { harmonics: Some(15), ..HarmonicBalance::default() };
 /// let orbit = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap();
-/// assert!(orbit.evidence.truncation.unwrap() < 1e-4);
+/// assert!(orbit.evidence.error_estimate.unwrap() < 1e-4);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct HarmonicBalance {

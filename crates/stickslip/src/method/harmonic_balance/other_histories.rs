@@ -23,10 +23,10 @@ impl Balance {
     /// was found. With all joints stuck the equations are linear, and nothing changes.
     pub(super) fn history_spread(&mut self, orbit: &Orbit, omega: f64) -> Option<f64> {
         let sticks = orbit.joints.iter().all(|joint| joint.slip_fraction == 0.0 && joint.open_fraction == 0.0);
-        if orbit.evidence.history.is_empty() || sticks {
+        if orbit.evidence.history_dependent.is_empty() || sticks {
             return None;
         }
-        let found = self.recent.front().filter(|recent| recent.start == orbit.start)?;
+        let found = self.recent.front().filter(|recent| recent.start == orbit.initial_state)?;
         let (top, motion) = (found.top, found.motion.clone());
         let own = self.places(top, omega, &motion).ok()?;
         let states = self.ports.static_states();
@@ -58,8 +58,8 @@ impl Balance {
         let moving: Vec<usize> = (0..one.len()).filter(|k| harmonics[*k] > 0).collect();
         let vibration = |of: &dyn Fn(usize) -> Complex64| moving.iter().map(|k| of(*k).norm_sqr()).sum::<f64>().sqrt();
         let (mut apart, mut size) = (0.0f64, 0.0f64);
-        for axis in self.system.seen() {
-            let (a, b) = (|k: usize| axis.along_complex(&one[k]), |k: usize| axis.along_complex(&other[k]));
+        for axis in self.system.place_axes() {
+            let (a, b) = (|k: usize| axis.complex_component(&one[k]), |k: usize| axis.complex_component(&other[k]));
             size = size.max(vibration(&a));
             apart = apart.max((vibration(&a) - vibration(&b)).abs());
         }

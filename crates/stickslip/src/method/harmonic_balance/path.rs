@@ -3,11 +3,13 @@
 use super::equations::{Level, Solution};
 use super::ports::{Member, Ports};
 use super::rest::Rest;
-use crate::law::{Contact, MOST_DIRECTIONS};
+use crate::law::{Contact, MAX_DIRECTIONS};
 use crate::method::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::measure::{Faces, Shares, Signals, measure, sticks};
-use crate::orbit::{Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history, laws};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results, sticks};
+use crate::orbit::{
+    Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws,
+};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -99,7 +101,7 @@ struct Series {
     harmonics: Vec<usize>,
     x: Vec<DVector<Complex64>>,
     /// Forces along the axes, per joint and sample, N.
-    force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
+    force: Vec<Vec<[f64; MAX_DIRECTIONS]>>,
     /// Contact state per joint and sample.
     contact: Vec<Vec<Contact>>,
 }
@@ -151,9 +153,9 @@ pub(super) fn orbit(
         halves: if odd { 2 } else { 1 },
         level: RefCell::new(level),
     };
-    let Ok(mut measured) = measure(system, &measuring, omega, (symmetry, period));
-    for (place, axis) in measured.places.iter_mut().zip(system.seen()) {
-        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| axis.along_complex(&x[k]));
+    let Ok(mut measured) = results(system, &measuring, omega, (symmetry, period));
+    for (place, axis) in measured.places.iter_mut().zip(system.place_axes()) {
+        place.first_harmonic = harmonics.binary_search(&first).map_or(ZERO, |k| axis.complex_component(&x[k]));
     }
     let n = system.dofs();
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
@@ -177,25 +179,25 @@ pub(super) fn orbit(
         omega,
         periods: 1,
         symmetry,
-        start,
+        initial_state: start,
         evidence: Evidence {
             residual: motion.residual,
             energy_gap: measured.energy_gap(still(system, omega)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: motion.iterations,
             harmonics: top,
-            truncation,
+            error_estimate: truncation,
             return_defect: defect,
             accuracy: match truncation {
                 Some(error) if error <= tolerance => Accuracy::Converged,
                 Some(_) => Accuracy::Truncated,
                 None => Accuracy::Unchecked,
             },
-            history: history(laws(system), &measured.joints, &measured.stuck, symmetry),
+            history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
             stuck: measured.stuck,
             history_spread: None,
             found_by: motion.found_by.name(),
-            instead_of: None,
+            fallback_from: None,
         },
         places: measured.places,
         joints: measured.joints,
@@ -209,7 +211,7 @@ pub(super) fn orbit(
 /// Joint forces and contact states at the samples of a period, and the internal states at
 /// t = 0.
 struct Samples {
-    force: Vec<Vec<[f64; MOST_DIRECTIONS]>>,
+    force: Vec<Vec<[f64; MAX_DIRECTIONS]>>,
     contact: Vec<Vec<Contact>>,
     states: Vec<f64>,
 }
@@ -218,7 +220,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
     let Setting { system, ports, omega, .. } = *setting;
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
-    let mut force = vec![vec![[0.0; MOST_DIRECTIONS]; samples]; system.joints().len()];
+    let mut force = vec![vec![[0.0; MAX_DIRECTIONS]; samples]; system.joints().len()];
     let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
     let mut states = Vec::new();
     for (j, joint) in system.joints().iter().enumerate() {
@@ -246,8 +248,8 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
                     let mut z = vec![0.0; rate.states()];
                     // the sampled force is within the bounds of the law; the truncated series
                     // may exceed them
-                    let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
-                    rate.state_under(&now[..port.axes], &mut z);
+                    let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
+                    rate.state_from_force(&now[..port.axes], &mut z);
                     states.extend(z);
                 }
                 _ if port.is_force() => {}
@@ -268,8 +270,8 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
             })
             .collect();
         for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
-            let now: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
-            *contact = joint.law().contact(&now[..axes.len()], &force[..axes.len()]);
+            let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
+            *contact = joint.law().contact_state(&now[..axes.len()], &force[..axes.len()]);
         }
     }
     Samples { force, contact, states }
@@ -277,7 +279,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
 
 /// Returns the harmonics of the relative displacement along an axis.
 fn relative(axis: &Axis, harmonics: &[usize], x: &[DVector<Complex64>]) -> Vec<Complex64> {
-    harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.along_complex(x)).collect()
+    harmonics.iter().zip(x).map(|(&h, x)| axis.imposed_at(h as u32) + axis.complex_component(x)).collect()
 }
 
 /// Returns the unknowns along each axis, by their numbers among all ports, with the share of
@@ -340,7 +342,7 @@ impl Measuring<'_> {
 
 /// Signals are lists of harmonics. If the motion has a half-period symmetry, all harmonics are
 /// odd and orthogonal over half a period too.
-impl Signals for Measuring<'_> {
+impl PathSignals for Measuring<'_> {
     type Signal = Vec<Complex64>;
     type Error = Infallible;
 
@@ -348,8 +350,8 @@ impl Signals for Measuring<'_> {
         self.x.iter().map(|x| x[row]).collect()
     }
     // with modal coordinates, there is one row for each mode
-    fn seen(&self, place: &Axis) -> Vec<Complex64> {
-        self.x.iter().map(|x| place.along_complex(x)).collect()
+    fn place_displacement(&self, place: &Axis) -> Vec<Complex64> {
+        self.x.iter().map(|x| place.complex_component(x)).collect()
     }
     fn velocity(&self, row: usize) -> Vec<Complex64> {
         self.derivative(self.displacement(row))
@@ -391,19 +393,19 @@ impl Signals for Measuring<'_> {
         self.harmonic(omega).map_or(ZERO, |k| signal[k] * (share * self.length()))
     }
     fn range(&self, place: &Axis) -> Result<(f64, f64), Infallible> {
-        Ok(self.range_of(&self.seen(place)))
+        Ok(self.range_of(&self.place_displacement(place)))
     }
     fn relative_range(&self, axis: usize) -> Result<(f64, f64), Infallible> {
         Ok(self.range_of(&relative(self.axes[axis], self.harmonics, self.x)))
     }
-    fn faces(&self, joint: usize) -> Faces {
+    fn faces(&self, joint: usize) -> ContactSummary {
         let contact = &self.contact[joint];
         let runs: Vec<_> = contact.chunk_by(PartialEq::eq).map(|run| (run[0], run.len() as f64)).collect();
         let changes = runs.len() - usize::from(contact.first() == contact.last());
-        Faces {
-            shares: Shares::of(runs.into_iter()),
+        ContactSummary {
+            shares: ContactFractions::of(runs.into_iter()),
             switches: changes / self.halves,
-            rests: sticks(contact.iter().copied()),
+            sticks_throughout: sticks(contact.iter().copied()),
         }
     }
 }
@@ -441,10 +443,10 @@ fn amplitude_at(harmonics: &[(u32, Complex64)], h: usize) -> Complex64 {
 
 /// Returns harmonic `h` of the force that moves a place, without the joint forces.
 fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVector<Complex64>) -> Complex64 {
-    let place = &system.moved()[m];
+    let place = &system.moved_places()[m];
     let mut force = -amplitude_at(&place.force, h);
     for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-        force += moved(&system.moved()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
+        force += moved(&system.moved_places()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
     }
     for i in 0..x.len() {
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
@@ -463,7 +465,7 @@ impl Path for Series {
     fn sample(&self, time: f64) -> Sample {
         let n = self.system.dofs();
         let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let mut moved_now = vec![(0.0, 0.0); self.system.moved().len()];
+        let mut moved_now = vec![(0.0, 0.0); self.system.moved_places().len()];
         for (&h, amplitude) in self.harmonics.iter().zip(&self.x) {
             let s = Complex64::new(0.0, h as f64 * self.omega);
             let turn = Complex64::cis(h as f64 * self.omega * time);
@@ -474,7 +476,7 @@ impl Path for Series {
                 a[i] += (s * s * z).re;
             }
             for (m, now) in moved_now.iter_mut().enumerate() {
-                now.0 += (moved(&self.system.moved()[m], h) * turn).re;
+                now.0 += (moved(&self.system.moved_places()[m], h) * turn).re;
                 now.1 += (linear_reaction(&self.system, m, h, s, amplitude) * turn).re;
             }
         }
@@ -489,10 +491,11 @@ impl Path for Series {
                 let at = time / period * samples as f64;
                 let (low, part) = (at.floor() as usize, at.fract());
                 let (before, after) = (self.force[j][low % samples], self.force[j][(low + 1) % samples]);
-                let mut sample = JointSample::along(0.0, 0.0, 0.0, self.contact[j][(at.round() as usize) % samples]);
+                let mut sample =
+                    JointSample::one_dimensional(0.0, 0.0, 0.0, self.contact[j][(at.round() as usize) % samples]);
                 for (a, axis) in joint.axes().iter().enumerate() {
-                    sample.displacement[a] = axis.along(&x);
-                    sample.velocity[a] = axis.along(&v);
+                    sample.displacement[a] = axis.component(&x);
+                    sample.velocity[a] = axis.component(&v);
                     for &(h, g) in axis.imposed() {
                         let rate = f64::from(h) * self.omega;
                         let z = g * Complex64::cis(rate * time);
@@ -510,12 +513,13 @@ impl Path for Series {
             .flat_map(|(now, joint)| now.force[..joint.axes().len()].to_vec())
             .collect();
         for (m, now) in moved_now.iter_mut().enumerate() {
-            now.1 += forces.iter().zip(&self.system.moved()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
+            now.1 +=
+                forces.iter().zip(&self.system.moved_places()[m].joints).map(|(force, sign)| force * sign).sum::<f64>();
         }
-        Sample { displacement: x, velocity: v, acceleration: a, joints, moved: moved_now }
+        Sample { displacement: x, velocity: v, acceleration: a, joints, imposed: moved_now }
     }
 
-    fn switch_times(&self) -> Vec<f64> {
+    fn transition_times(&self) -> Vec<f64> {
         let period = TAU / self.omega;
         let mut times: Vec<f64> = self
             .contact

@@ -501,7 +501,7 @@ impl Rest {
         let mut force = DVector::from_element(self.n, ZERO);
         let (sectors, size) = self.sectors();
         for sector in 0..sectors {
-            let lead = self.waves.as_ref().map(|waves| waves.cyclic.lead(harmonic, sector));
+            let lead = self.waves.as_ref().map(|waves| waves.cyclic.phase_factor(harmonic, sector));
             for (q, rows) in self.directions.iter().enumerate() {
                 let f = lead.map_or_else(|| along(q), |lead| along(q) * lead);
                 rows.iter().for_each(|&(i, w)| force[(i + sector * size) % self.n] += f * w);
@@ -524,7 +524,8 @@ impl Rest {
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        let factor = self.structure.held_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
+        let factor =
+            self.structure.shifted_dynamic_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
         let bytes = |factor: &Result<Arc<DynamicStiffness>, Resonant>| factor.as_ref().map_or(0, |f| f.bytes());
         while !factors.is_empty()
             && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > KEPT

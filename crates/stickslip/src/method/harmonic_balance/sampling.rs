@@ -289,7 +289,7 @@ mod tests {
                 method.solver(&system).unwrap().orbit(TAU * 17.0, None).unwrap()
             };
             let (found, truth) = (orbit(None), orbit(Some(16_384)));
-            let (error, estimate) = (distance(&found, &truth), found.evidence.truncation.unwrap());
+            let (error, estimate) = (distance(&found, &truth), found.evidence.error_estimate.unwrap());
             assert!(error > 1e-8, "{}: {error:.1e} shows nothing", law.name());
             assert!((0.5..3.0).contains(&(estimate / error)), "{}: {error:.1e}, said {estimate:.1e}", law.name());
         }
@@ -323,7 +323,7 @@ mod tests {
             let found = orbit(HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() });
             let finest = HarmonicBalance { harmonics: Some(255), samples: Some(32_768), tolerance: None };
             let error = distance(&found, &orbit(finest));
-            assert!(found.evidence.truncation.unwrap() <= 1e-6 && error < 1e-6, "{}: {error:.1e}", law.name());
+            assert!(found.evidence.error_estimate.unwrap() <= 1e-6 && error < 1e-6, "{}: {error:.1e}", law.name());
         }
     }
 }

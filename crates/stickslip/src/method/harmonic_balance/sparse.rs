@@ -464,7 +464,7 @@ mod tests {
         let method = HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() };
         let orbit = method.solver(&system).unwrap().orbit(TAU * 110.1, None).unwrap();
         assert!(orbit.places.iter().all(|place| place.amplitude() < 1e-15), "{:?}", orbit.places);
-        assert!(orbit.evidence.truncation.unwrap() < 1e-6, "{:?}", orbit.evidence);
+        assert!(orbit.evidence.error_estimate.unwrap() < 1e-6, "{:?}", orbit.evidence);
     }
 
     /// The factor of the band would take 600 GB.

@@ -50,7 +50,7 @@ impl Method for Subharmonic {
         u32::try_from(times(highest)).map_err(too_high)?;
         let HarmonicBalance { harmonics, samples, tolerance } = self.balance;
         let balance = HarmonicBalance { harmonics: harmonics.map(times), samples: samples.map(times), tolerance };
-        let slowed = system.slowed(u32::try_from(period).map_err(too_high)?);
+        let slowed = system.subharmonic(u32::try_from(period).map_err(too_high)?);
         Ok(Box::new(Afresh(Balance::new(slowed, balance, period)?)))
     }
 }

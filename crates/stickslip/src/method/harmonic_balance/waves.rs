@@ -2,8 +2,8 @@
 
 use super::hold::soft_spring;
 use super::uncoupled::Resonant;
-use crate::model::Cyclic;
-use crate::structure::{DynamicStiffness, Sector, Structure, Wave, WaveStiffness, turn};
+use crate::model::CyclicSymmetry;
+use crate::structure::{DynamicStiffness, RingSector, Structure, Wave, WaveStiffness, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -24,15 +24,15 @@ pub(super) struct Factored<F = DynamicStiffness> {
 /// Waves on a ring: one for each nodal diameter that a harmonic has used.
 #[derive(Debug, Clone)]
 pub(super) struct Waves {
-    pub cyclic: Cyclic,
-    pub sector: Sector,
+    pub cyclic: CyclicSymmetry,
+    pub sector: RingSector,
     met: RefCell<BTreeMap<usize, Result<Arc<Wave>, Resonant>>>,
     factors: RefCell<Vec<(usize, Factored<WaveStiffness>)>>,
 }
 
 impl Waves {
-    pub fn new(structure: &Structure, cyclic: Cyclic) -> Option<Self> {
-        let sector = Sector::of(structure, cyclic.sectors)?;
+    pub fn new(structure: &Structure, cyclic: CyclicSymmetry) -> Option<Self> {
+        let sector = RingSector::from_ring(structure, cyclic.sectors)?;
         Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
     }
 
@@ -74,7 +74,7 @@ impl Waves {
 
     /// Returns the phase of a sector in a wave.
     fn phase(&self, diameter: usize, sector: usize) -> Complex64 {
-        turn((diameter * sector) as i64, self.cyclic.sectors)
+        unit_root((diameter * sector) as i64, self.cyclic.sectors)
     }
 
     /// Returns the receptance of the axes in a wave, q × q.

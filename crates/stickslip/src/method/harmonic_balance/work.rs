@@ -7,7 +7,7 @@ use super::kept::Kept;
 use super::options::FIRST;
 use super::ports::Ports;
 use super::sparse::Sparse;
-use crate::law::Piece;
+use crate::law::IdealElement;
 use crate::model::System;
 use num_complex::Complex64;
 
@@ -87,11 +87,11 @@ const PER_PIECE: f64 = 7e5;
 /// assert!(harmonic_balance::orbit_work(&system) > event_driven::orbit_work(&system).unwrap());
 /// ```
 pub fn orbit_work(system: &System) -> f64 {
-    let pieces = system.joints().iter().flat_map(|joint| joint.law().pieces().unwrap_or_default());
+    let pieces = system.joints().iter().flat_map(|joint| joint.law().ideal_elements().unwrap_or_default());
     let (mut count, mut rigid) = (0.0, false);
-    for piece in pieces.filter(|piece| !piece.is_nothing()) {
+    for piece in pieces.filter(|piece| !piece.carries_no_force()) {
         count += 1.0;
-        rigid |= matches!(piece, Piece::Slider(slider) if slider.stiffness.is_none());
+        rigid |= matches!(piece, IdealElement::Slider(slider) if slider.stiffness.is_none());
     }
     let searched = if rigid { STEPS * doubling_work(system, USUAL) } else { 0.0 };
     PER_DOF * system.dofs() as f64 + PER_PIECE * count + searched

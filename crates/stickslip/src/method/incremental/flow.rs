@@ -3,7 +3,7 @@
 use super::carried::Carried;
 use super::law;
 use super::step::{Eliminated, Step};
-use crate::law::Piece;
+use crate::law::IdealElement;
 use crate::method::assembly::{Assembly, NEAR_REST};
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -11,7 +11,7 @@ use crate::method::periodic::norm;
 use crate::method::residual_traction::ElasticSlider;
 use crate::method::stepped::SteppedPath;
 use crate::method::steps::{Steps, extrapolate};
-use crate::method::{Breakdown, MethodError};
+use crate::method::{IntegrationError, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -71,8 +71,13 @@ impl IncrementalFlow {
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),
-                None if chosen.pieces().is_some_and(|pieces| pieces.iter().any(Piece::drops)) => Err(DROPS),
-                None if chosen.pieces().is_some() => Err("its slider is rigid; it needs a spring in series"),
+                None if chosen
+                    .ideal_elements()
+                    .is_some_and(|pieces| pieces.iter().any(IdealElement::has_force_drop)) =>
+                {
+                    Err(DROPS)
+                }
+                None if chosen.ideal_elements().is_some() => Err("its slider is rigid; it needs a spring in series"),
                 None => Err("it defines neither a step view nor a rate view"),
             }
         })?;
@@ -117,7 +122,7 @@ impl IncrementalFlow {
     }
 
     /// Runs from `state` and returns the end state with the record of the run.
-    fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), Breakdown> {
+    fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), IntegrationError> {
         let mut end = state.to_vec();
         self.run(&mut end, duration, None)?;
         let empty = Steps::new(self.steps.nodes.clone(), &self.assembly);
@@ -176,13 +181,13 @@ impl Flow for IncrementalFlow {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         let count = (self.count as f64 * self.share).ceil();
         let h = duration / count;
         if self.eliminated.as_ref().is_none_or(|eliminated| eliminated.length != h) {
             self.eliminated = Eliminated::new(&self.assembly, h);
         }
-        let eliminated = self.eliminated.take().ok_or(Breakdown::OutOfRange { time: 0.0 })?;
+        let eliminated = self.eliminated.take().ok_or(IntegrationError::OutOfRange { time: 0.0 })?;
         self.steps.clear();
         self.step.start(&self.assembly, state, &self.drive);
         let mut carried =
@@ -198,11 +203,11 @@ impl Flow for IncrementalFlow {
             if !self.step.advance(&self.assembly, &eliminated, &self.drive, (time, state), scale) {
                 return Err(match self.step.without_number(&self.assembly) {
                     Some(joint) => joint.no_number(time),
-                    None => Breakdown::Stalled { time, step: h },
+                    None => IntegrationError::Stalled { time, step: h },
                 });
             }
             if state.iter().any(|z| !z.is_finite()) {
-                return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(state) });
+                return Err(IntegrationError::Unbounded { time, place: self.assembly.farthest(state) });
             }
             if let Some(carried) = &mut carried {
                 carried.advance(&self.assembly, &eliminated, &self.step.laws, &self.step.lu);
@@ -218,12 +223,14 @@ impl Flow for IncrementalFlow {
         Ok(())
     }
 
-    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), Breakdown> {
+    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
         let (weights, rest) = (self.weights(), NEAR_REST * self.energy_scale());
         let mut coarse = loop {
             match self.tried(state, duration) {
                 // steps that are too large for the states of a law are halved
-                Err(Breakdown::Stalled { .. } | Breakdown::NoNumber { .. }) if self.count < MOST => self.count *= 2,
+                Err(IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. }) if self.count < MOST => {
+                    self.count *= 2
+                }
                 found => break found?,
             }
         };
@@ -246,7 +253,11 @@ impl Flow for IncrementalFlow {
                     return Ok(());
                 }
                 if self.count >= MOST {
-                    return Err(Breakdown::Unresolved { steps: self.count, estimate: error, tolerance: TOLERANCE });
+                    return Err(IntegrationError::Unresolved {
+                        steps: self.count,
+                        estimate: error,
+                        tolerance: TOLERANCE,
+                    });
                 }
             }
             (before, coarse) = (Some(end), fine);

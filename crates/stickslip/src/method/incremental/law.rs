@@ -6,7 +6,7 @@
 //! displacement up to its limit; a stop depends on the displacement alone. A law with a rate
 //! view is integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
 
-use crate::law::{Contact, MOST_DIRECTIONS, Piece, RatePoint, Relative, SharedLaw, StepPoint};
+use crate::law::{Contact, IdealElement, MAX_DIRECTIONS, RatePoint, RelativeMotion, SharedLaw, StepPoint};
 use crate::method::assembly::PlacedLaw;
 use stickslip_numerics::small_lu::SmallLu;
 
@@ -20,13 +20,13 @@ enum View {
 
 /// Returns the view of a law, if it has one: pieces without rigid sliders, a step, or a rate.
 fn view(law: &SharedLaw) -> Option<View> {
-    let steps = |piece: &Piece| match piece {
-        Piece::Slider(slider) => {
+    let steps = |piece: &IdealElement| match piece {
+        IdealElement::Slider(slider) => {
             slider.static_limit == 0.0 || (slider.stiffness.is_some() && slider.static_limit == slider.limit)
         }
-        Piece::Stop { .. } => true,
+        IdealElement::Stop { .. } => true,
     };
-    if law.pieces().is_some_and(|pieces| pieces.iter().all(steps)) {
+    if law.ideal_elements().is_some_and(|pieces| pieces.iter().all(steps)) {
         return Some(View::Pieces);
     }
     match (law.step(), law.rate()) {
@@ -37,9 +37,9 @@ fn view(law: &SharedLaw) -> Option<View> {
 }
 
 /// Returns the pieces with a nonzero force.
-fn pieces(law: &SharedLaw) -> Vec<Piece> {
-    let carries = |piece: &Piece| !matches!(piece, Piece::Slider(slider) if slider.static_limit == 0.0);
-    law.pieces().unwrap_or_default().into_iter().filter(carries).collect()
+fn pieces(law: &SharedLaw) -> Vec<IdealElement> {
+    let carries = |piece: &IdealElement| !matches!(piece, IdealElement::Slider(slider) if slider.static_limit == 0.0);
+    law.ideal_elements().unwrap_or_default().into_iter().filter(carries).collect()
 }
 
 /// Returns stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law
@@ -48,9 +48,9 @@ pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
     if view(law) != Some(View::Pieces) {
         return Vec::new();
     }
-    let slider = |piece: Piece| match piece {
-        Piece::Slider(slider) => Some((slider.stiffness?, slider.limit)),
-        Piece::Stop { .. } => None,
+    let slider = |piece: IdealElement| match piece {
+        IdealElement::Slider(slider) => Some((slider.stiffness?, slider.limit)),
+        IdealElement::Stop { .. } => None,
     };
     pieces(law).into_iter().filter_map(slider).collect()
 }
@@ -62,8 +62,8 @@ pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
 pub(crate) fn moved(
     law: &SharedLaw,
     (directions, state_scale): (usize, f64),
-    (from, states): ([f64; MOST_DIRECTIONS], &[f64]),
-    to: [f64; MOST_DIRECTIONS],
+    (from, states): ([f64; MAX_DIRECTIONS], &[f64]),
+    to: [f64; MAX_DIRECTIONS],
 ) -> Vec<f64> {
     let placed = PlacedLaw {
         joint: String::new(),
@@ -76,7 +76,7 @@ pub(crate) fn moved(
     };
     let mut follower = Follower::new(&placed);
     let steps = if follower.view == View::Rate { SLOW_STEPS } else { 1 };
-    let at = |step: usize| Relative {
+    let at = |step: usize| RelativeMotion {
         displacement: std::array::from_fn(|a| from[a] + (to[a] - from[a]) * step as f64 / steps as f64),
         velocity: std::array::from_fn(|a| to[a] - from[a]),
     };
@@ -100,8 +100,8 @@ const SLOW_STEPS: usize = 2000;
 pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     match view(law)? {
         View::Pieces => {
-            let sliders = pieces(law).iter().filter(|piece| matches!(piece, Piece::Slider(_))).count();
-            let scale = law.scale();
+            let sliders = pieces(law).iter().filter(|piece| matches!(piece, IdealElement::Slider(_))).count();
+            let scale = law.force_scale();
             Some((sliders, if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }))
         }
         View::Step => law.step().map(|step| (step.states(), step.state_scale())),
@@ -112,7 +112,7 @@ pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
 /// Motion and states of a law at one instant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct At<'a> {
-    pub motion: Relative<f64>,
+    pub motion: RelativeMotion<f64>,
     pub z: &'a [f64],
 }
 
@@ -120,12 +120,12 @@ pub(super) struct At<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct Follower {
     view: View,
-    pieces: Vec<Piece>,
+    pieces: Vec<IdealElement>,
     directions: usize,
     states: usize,
     state_scale: f64,
     /// Force (N) and states at the end of the step.
-    pub force: [f64; MOST_DIRECTIONS],
+    pub force: [f64; MAX_DIRECTIONS],
     pub state: Vec<f64>,
     /// Derivatives of the forces, then of the states, with respect to (u₀, u₀', z₀, u₁, u₁').
     slopes: Vec<f64>,
@@ -159,7 +159,7 @@ impl Follower {
             directions,
             states,
             state_scale: joint.state_scale,
-            force: [0.0; MOST_DIRECTIONS],
+            force: [0.0; MAX_DIRECTIONS],
             state: vec![0.0; states],
             slopes: vec![0.0; (directions + states) * (4 * directions + states)],
             slipping: None,
@@ -175,7 +175,7 @@ impl Follower {
     /// Sets the limits of its sliders from the next values of the iterator, N.
     pub fn limit(&mut self, limits: &mut impl Iterator<Item = f64>) {
         for piece in &mut self.pieces {
-            if let (View::Pieces, Piece::Slider(slider)) = (self.view, piece)
+            if let (View::Pieces, IdealElement::Slider(slider)) = (self.view, piece)
                 && let Some(limit) = limits.next()
             {
                 (slider.limit, slider.static_limit) = (limit, limit);
@@ -205,7 +205,7 @@ impl Follower {
             Some(sign) => Contact::slip(sign),
             // a slider below its limit sticks
             None if self.view == View::Pieces && self.states > 0 => Contact::Stick,
-            None => law.contact(velocity, &self.force[..self.directions]),
+            None => law.contact_state(velocity, &self.force[..self.directions]),
         }
     }
 
@@ -216,7 +216,7 @@ impl Follower {
             self.slopes.fill(0.0);
             let (directions, states, width) = (self.directions, self.states, self.arguments());
             if let Some(rate) = law.rate() {
-                rate.linearise(directions, &at.motion, at.z, &mut self.after);
+                rate.evaluate_with_derivatives(directions, &at.motion, at.z, &mut self.after);
             }
             self.force = self.after.force;
             self.state.copy_from_slice(at.z);
@@ -236,13 +236,13 @@ impl Follower {
     pub fn begin(&mut self, law: &SharedLaw, from: At) {
         self.state.copy_from_slice(from.z);
         if let (View::Rate, Some(rate)) = (self.view, law.rate()) {
-            rate.linearise(self.directions, &from.motion, from.z, &mut self.before);
+            rate.evaluate_with_derivatives(self.directions, &from.motion, from.z, &mut self.before);
         }
     }
 
     /// Evaluates the step of size `h` (s) from `from` to `to`. Returns false if the states at
     /// its end are not found.
-    pub fn advance(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>, h: f64) -> bool {
+    pub fn advance(&mut self, law: &SharedLaw, from: At, to: &RelativeMotion<f64>, h: f64) -> bool {
         self.slopes.fill(0.0);
         match self.view {
             View::Pieces => {
@@ -258,11 +258,11 @@ impl Follower {
     }
 
     /// Evaluates one step of a law with a step view; in a plane, also two half steps.
-    fn step_over(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>) {
+    fn step_over(&mut self, law: &SharedLaw, from: At, to: &RelativeMotion<f64>) {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(step) = law.step() else { return };
         let (start, end) = (&from.motion.displacement, &to.displacement);
-        step.linearise(directions, start, end, from.z, &mut self.step);
+        step.advance_with_derivatives(directions, start, end, from.z, &mut self.step);
         let (z, after) = (2 * directions, 2 * directions + states);
         let row_of = |point: &StepPoint, row: usize, argument: usize| {
             let slope = if row < directions { point.force_slope(row) } else { point.state_slope(row - directions) };
@@ -281,8 +281,8 @@ impl Follower {
         }
         let middle = std::array::from_fn(|d| 0.5 * (start[d] + end[d]));
         let [first, second] = &mut self.halves;
-        step.linearise(directions, start, &middle, from.z, first);
-        step.linearise(directions, &middle, end, &first.state, second);
+        step.advance_with_derivatives(directions, start, &middle, from.z, first);
+        step.advance_with_derivatives(directions, &middle, end, &first.state, second);
         for d in 0..directions {
             self.force[d] = 2.0 * second.force[d] - self.step.force[d];
         }
@@ -308,16 +308,16 @@ impl Follower {
     }
 
     /// Evaluates stops and ideal sliders in series with springs, whose forces are the states.
-    fn slide(&mut self, from: At, to: &Relative<f64>) {
+    fn slide(&mut self, from: At, to: &RelativeMotion<f64>) {
         let (states, width) = (self.states, self.arguments());
         let (u0, u1) = (from.motion.displacement[0], to.displacement[0]);
         let (z, after) = (2, 2 + states); // arguments: u₀, u₀', z₀, u₁, u₁'
-        self.force = [0.0; MOST_DIRECTIONS];
+        self.force = [0.0; MAX_DIRECTIONS];
         self.slipping = None;
         let mut s = 0;
         for piece in &self.pieces {
             match *piece {
-                Piece::Slider(slider) => {
+                IdealElement::Slider(slider) => {
                     let stiffness = slider.stiffness.unwrap_or(0.0);
                     let stuck = from.z[s] + stiffness * (u1 - u0);
                     let force = stuck.clamp(-slider.limit, slider.limit);
@@ -335,7 +335,7 @@ impl Follower {
                     self.state[s] = force;
                     s += 1;
                 }
-                Piece::Stop { gap, stiffness } => {
+                IdealElement::Stop { gap, stiffness } => {
                     if u1 > gap {
                         self.force[0] += stiffness * (u1 - gap);
                         self.slopes[after] += stiffness;
@@ -346,13 +346,13 @@ impl Follower {
     }
 
     /// Solves `z₁ = z₀ + h/2 (g₀ + g₁)` by Newton's method, and computes the derivatives.
-    fn integrate(&mut self, law: &SharedLaw, from: At, to: &Relative<f64>, h: f64) -> bool {
+    fn integrate(&mut self, law: &SharedLaw, from: At, to: &RelativeMotion<f64>, h: f64) -> bool {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(rate) = law.rate() else { return false };
         let half = 0.5 * h;
         let (mut found, mut previous) = (states == 0, f64::INFINITY);
         for _ in 0..ITERATIONS {
-            rate.linearise(directions, to, &self.state, &mut self.after);
+            rate.evaluate_with_derivatives(directions, to, &self.state, &mut self.after);
             let matrix = self.lu.zeros(states);
             for s in 0..states {
                 let slope = &self.after.rate_slope(s)[2 * directions..];

@@ -6,7 +6,7 @@
 //! per axis, for any number of masses.
 
 use super::law::{At, Follower};
-use crate::law::Relative;
+use crate::law::RelativeMotion;
 use crate::method::assembly::{Assembly, PlacedLaw};
 use crate::method::drive::Drive;
 use nalgebra::{DMatrix, DVector};
@@ -55,7 +55,7 @@ impl Eliminated {
 }
 
 /// The motion along the axes at an instant.
-type Relatives = Vec<Relative<f64>>;
+type Relatives = Vec<RelativeMotion<f64>>;
 
 /// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
@@ -94,7 +94,7 @@ const ENOUGH: f64 = 1e-9;
 impl Step {
     pub fn new(assembly: &Assembly) -> Self {
         let (n, j) = (assembly.n, assembly.axes.len());
-        let still = vec![Relative::along(0.0, 0.0); assembly.joints.len()];
+        let still = vec![RelativeMotion::along(0.0, 0.0); assembly.joints.len()];
         Step {
             laws: assembly.joints.iter().map(Follower::new).collect(),
             before: DVector::zeros(j),
@@ -150,8 +150,8 @@ impl Step {
         self.sum.gemv(1.0, &eliminated.from_force, &self.before, 1.0);
         self.z.copy_from_slice(&state[2 * n..]);
         for (axis, along) in assembly.axes.iter().enumerate() {
-            self.free[axis] = along.along(self.sum.as_slice());
-            self.unknown[axis] = along.along(&state[n..2 * n]);
+            self.free[axis] = along.component(self.sum.as_slice());
+            self.unknown[axis] = along.component(&state[n..2 * n]);
         }
         for (q, joint) in assembly.joints.iter().enumerate() {
             let at = At { motion: self.from[q], z: &self.z[joint.internal()] };
@@ -218,7 +218,7 @@ impl Step {
             for (d, axis) in joint.axes().enumerate() {
                 let (g, speed) = drive.relative_at(axis, time + h);
                 let (before, _) = drive.relative_at(axis, time);
-                let travel = 0.5 * h * (assembly.axes[axis].along(v) + self.unknown[axis]);
+                let travel = 0.5 * h * (assembly.axes[axis].component(v) + self.unknown[axis]);
                 self.to[q].displacement[d] = self.from[q].displacement[d] + travel + g - before;
                 self.to[q].velocity[d] = self.unknown[axis] + speed;
             }
@@ -243,8 +243,8 @@ impl Step {
 }
 
 /// Returns the motion of a joint in a state.
-fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f64) -> Relative<f64> {
-    let mut motion = Relative::along(0.0, 0.0);
+fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f64) -> RelativeMotion<f64> {
+    let mut motion = RelativeMotion::along(0.0, 0.0);
     for (d, axis) in assembly.joints[q].axes().enumerate() {
         (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, drive, time);
     }

@@ -5,8 +5,8 @@
 //! the same interval ends exactly at its end.
 
 use super::step::{Eliminated, StageLoads, Step, points};
-use crate::law::{RatePoint, Relative};
-use crate::method::Breakdown;
+use crate::law::{RatePoint, RelativeMotion};
+use crate::method::IntegrationError;
 use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -182,13 +182,13 @@ impl SmoothFlow {
     fn set_laws(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (joint, point) in self.assembly.joints.iter().zip(&mut self.laws) {
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
-                rate.linearise(joint.directions, &motion, &state[first..first + joint.states], point);
+                rate.evaluate_with_derivatives(joint.directions, &motion, &state[first..first + joint.states], point);
             }
         }
     }
@@ -275,7 +275,7 @@ impl SmoothFlow {
                     raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
                 }
                 // the reference of an unbounded law is its present force
-                let limit = joint.law.scale();
+                let limit = joint.law.force_scale();
                 let force = if limit.is_finite() { limit } else { self.step.force.amax().max(point.force[d].abs()) };
                 if raw != 0.0 {
                     largest = largest.max((raw * h / REAL_EIGENVALUE).abs() / (force * travel * self.tolerance));
@@ -302,7 +302,7 @@ impl SmoothFlow {
             let (velocity, force) =
                 (&self.step.unknown[i * j..(i + 1) * j], &self.step.force.as_slice()[i * j..(i + 1) * j]);
             let joints = self.assembly.joints.iter();
-            let contact = joints.map(|joint| joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]));
+            let contact = joints.map(|joint| joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]));
             let of = i * n..(i + 1) * n;
             self.steps.keep_node([&x[of.clone()], &v[of]], [velocity, force], contact);
         }
@@ -318,15 +318,15 @@ impl SmoothFlow {
     /// The motion diverges (in finite time if a force grows faster than the displacement), a
     /// law returns NaN, or the equations are too stiff. `speed` is the velocity scale at the
     /// start, m/s.
-    fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> Breakdown {
+    fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> IntegrationError {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
         if fastest > ESCAPED * speed {
-            return Breakdown::Unbounded { time, place: self.assembly.farthest(state) };
+            return IntegrationError::Unbounded { time, place: self.assembly.farthest(state) };
         }
         match self.step.without_number(&self.assembly) {
             Some(joint) => joint.no_number(time),
-            None => Breakdown::Stalled { time, step },
+            None => IntegrationError::Stalled { time, step },
         }
     }
 
@@ -431,7 +431,7 @@ impl Flow for SmoothFlow {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         if self.stretch != duration {
             self.stretch = duration;
             self.eliminated.fill(None);
@@ -473,7 +473,7 @@ impl Flow for SmoothFlow {
             self.set_loads(time, h);
             self.predict(state, h, last, time);
             let Some(eliminated) = &self.eliminated[self.level] else {
-                return Err(Breakdown::Stalled { time, step: h });
+                return Err(IntegrationError::Stalled { time, step: h });
             };
             let how = (scale.1, sensitivity.is_some());
             let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, how);
@@ -490,11 +490,11 @@ impl Flow for SmoothFlow {
                 continue;
             }
             let Some(eliminated) = &self.eliminated[self.level] else {
-                return Err(Breakdown::Stalled { time, step: h });
+                return Err(IntegrationError::Stalled { time, step: h });
             };
             self.step.end(&self.assembly, eliminated, &self.loads, &mut self.next);
             if self.next.iter().any(|z| !z.is_finite()) {
-                return Err(Breakdown::Unbounded { time, place: self.assembly.farthest(&self.next) });
+                return Err(IntegrationError::Unbounded { time, place: self.assembly.farthest(&self.next) });
             }
             if let Some(sensitivity) = sensitivity.as_deref() {
                 self.step.carry(&self.assembly, eliminated, &mut self.derivative, sensitivity.ncols());

@@ -7,7 +7,7 @@
 //! times a tick, so that a few eliminations serve a whole orbit. The filter of the error
 //! estimate is eliminated in the same way.
 
-use crate::law::{RatePoint, Relative};
+use crate::law::{RatePoint, RelativeMotion};
 use crate::method::assembly::{Assembly, PlacedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
@@ -238,7 +238,7 @@ impl Step {
             *free += velocity;
         }
         for (structural, axis) in self.structural.iter_mut().zip(&assembly.axes) {
-            *structural = axis.along(&state[..n]);
+            *structural = axis.component(&state[..n]);
         }
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
@@ -299,7 +299,7 @@ impl Step {
         }
         for stage in 0..STAGES {
             for (q, joint) in assembly.joints.iter().enumerate() {
-                let mut motion = Relative::along(0.0, 0.0);
+                let mut motion = RelativeMotion::along(0.0, 0.0);
                 for (d, axis) in joint.axes().enumerate() {
                     // structural displacement from the collocation of structural velocities,
                     // without imposed motion
@@ -313,7 +313,7 @@ impl Step {
                 let z = &self.unknown[first..first + joint.states];
                 let point = &mut self.points[stage * assembly.joints.len() + q];
                 if let Some(rate) = joint.law.rate() {
-                    rate.linearise(joint.directions, &motion, z, point);
+                    rate.evaluate_with_derivatives(joint.directions, &motion, z, point);
                 }
                 for (d, axis) in joint.axes().enumerate() {
                     self.force[stage * j + axis] = point.force[d];
@@ -674,8 +674,8 @@ impl Filter {
         // the forces t of the laws at zero velocity of the axes
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
             let (directions, states) = (joint.directions, joint.states);
-            let mut u = [0.0; crate::law::MOST_DIRECTIONS];
-            joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].along(x) / rate);
+            let mut u = [0.0; crate::law::MAX_DIRECTIONS];
+            joint.axes().enumerate().for_each(|(d, axis)| u[d] = assembly.axes[axis].component(x) / rate);
             for (s, own) in joint.internal().enumerate() {
                 let slope = point.rate_slope(s);
                 self.z[s] = internal[own] + (0..directions).map(|e| slope[e] * u[e]).sum::<f64>();
@@ -690,7 +690,8 @@ impl Filter {
             }
         }
         for (row, (w, axis)) in self.w.iter_mut().zip(&assembly.axes).enumerate() {
-            *w = axis.along(self.v.as_slice()) - g.row(row).iter().zip(&self.force).map(|(g, t)| g * t).sum::<f64>();
+            *w =
+                axis.component(self.v.as_slice()) - g.row(row).iter().zip(&self.force).map(|(g, t)| g * t).sum::<f64>();
         }
         self.axes.solve(&mut self.w);
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {

@@ -12,7 +12,7 @@
 
 use super::mode::{Mode, in_mode};
 use super::switch::{decide, mobility, saltate, stop};
-use crate::law::{RatePoint, Relative, SharedLaw};
+use crate::law::{RatePoint, RelativeMotion, SharedLaw};
 use crate::method::assembly::Assembly;
 use crate::method::drive::Drive;
 use crate::method::flow::Flow;
@@ -20,7 +20,7 @@ use crate::method::smooth::flow::{onward, slope};
 use crate::method::smooth::step::{Eliminated, StageLoads, Step, points};
 use crate::method::stepped::SteppedPath;
 use crate::method::steps::Steps;
-use crate::method::{Breakdown, MethodError};
+use crate::method::{IntegrationError, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -177,7 +177,7 @@ impl SwitchedFlow {
     /// Returns the relative acceleration along an axis for the present time derivative, m/s².
     fn acceleration(&self, axis: usize, time: f64) -> f64 {
         let n = self.assembly.n;
-        self.assembly.axes[axis].along(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
+        self.assembly.axes[axis].component(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
     }
 
     fn held(&self) -> impl Iterator<Item = &Friction> {
@@ -207,9 +207,9 @@ impl SwitchedFlow {
         let Some(force) = mobility(&self.assembly, &held).lu().solve(&DVector::from_vec(free)) else { return false };
         let each: Vec<(usize, f64)> = self.held().zip(force.iter()).map(|(own, f)| (own.joint, f / own.unit)).collect();
         for (joint, unknown) in each {
-            let motion = Relative::along(0.0, unknown);
+            let motion = RelativeMotion::along(0.0, unknown);
             if let Some(rate) = self.assembly.joints[joint].law.rate() {
-                rate.linearise(1, &motion, &[], &mut self.laws[joint]);
+                rate.evaluate_with_derivatives(1, &motion, &[], &mut self.laws[joint]);
             }
         }
         self.set_motion(state, time);
@@ -221,17 +221,17 @@ impl SwitchedFlow {
     fn answer(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (q, (joint, point)) in self.assembly.joints.iter().zip(&mut self.laws).enumerate() {
-            let mut motion = Relative::along(0.0, 0.0);
+            let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
             let holds = |friction: &Friction| friction.joint == q && friction.mode == Mode::Held;
             if self.frictions.iter().any(holds) {
-                motion = Relative::along(0.0, 0.0);
+                motion = RelativeMotion::along(0.0, 0.0);
             }
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
-                rate.linearise(joint.directions, &motion, &state[first..first + joint.states], point);
+                rate.evaluate_with_derivatives(joint.directions, &motion, &state[first..first + joint.states], point);
             }
         }
         self.set_motion(state, time);
@@ -245,7 +245,7 @@ impl SwitchedFlow {
 
     /// Determines the modes at the start of a run: moving joints slip, and joints at rest are
     /// decided.
-    fn begin(&mut self, state: &mut [f64], scale: f64) -> Result<(), Breakdown> {
+    fn begin(&mut self, state: &mut [f64], scale: f64) -> Result<(), IntegrationError> {
         let mut resting = Vec::new();
         for k in 0..self.frictions.len() {
             let friction = &self.frictions[k];
@@ -262,7 +262,7 @@ impl SwitchedFlow {
     }
 
     /// Decides on joints at rest. Sets the velocity of stuck ones exactly to zero.
-    fn rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), Breakdown> {
+    fn rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), IntegrationError> {
         if !resting.is_empty() {
             let axes: Vec<usize> = resting.iter().map(|&k| self.frictions[k].axis).collect();
             let limits: Vec<f64> = resting.iter().map(|&k| self.frictions[k].limit).collect();
@@ -271,7 +271,7 @@ impl SwitchedFlow {
             self.answer(state, time);
             let free: Vec<f64> = axes.iter().map(|&axis| self.acceleration(axis, time)).collect();
             let modes = decide(&mobility(&self.assembly, &axes), &free, &limits);
-            let modes = modes.ok_or(Breakdown::Undecidable { time })?;
+            let modes = modes.ok_or(IntegrationError::NoContactState { time })?;
             resting.iter().zip(modes).for_each(|(&k, mode)| self.frictions[k].mode = mode);
         }
         self.enter_modes();
@@ -282,9 +282,9 @@ impl SwitchedFlow {
         if stopped && self.set_slope(state, time) { Ok(()) } else { Err(self.redundant(time)) }
     }
 
-    fn redundant(&self, time: f64) -> Breakdown {
+    fn redundant(&self, time: f64) -> IntegrationError {
         let joint = self.held().next().map_or(0, |friction| friction.joint);
-        Breakdown::Redundant { time, joint: self.assembly.joints[joint].joint.clone() }
+        IntegrationError::Redundant { time, joint: self.assembly.joints[joint].joint.clone() }
     }
 
     /// Projects the sensitivity at a stop of velocities.
@@ -504,7 +504,7 @@ impl SwitchedFlow {
         state: &mut [f64],
         (time, scale): (f64, f64),
         columns: usize,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         let friction = &mut self.frictions[switch.friction];
         if friction.mode == Mode::Held {
             // the force and all other quantities are continuous
@@ -558,7 +558,7 @@ impl SwitchedFlow {
             let contact = self.assembly.joints.iter().enumerate().map(|(q, joint)| {
                 let own = self.frictions.iter().find(|friction| friction.joint == q);
                 own.map_or_else(
-                    || joint.law.contact(&velocity[joint.axes()], &force[joint.axes()]),
+                    || joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]),
                     |friction| friction.mode.contact(),
                 )
             });
@@ -580,10 +580,10 @@ impl SwitchedFlow {
         (end as f64 * tick - begin.time, end)
     }
 
-    fn stalled(&self, (time, step): (f64, f64)) -> Breakdown {
+    fn stalled(&self, (time, step): (f64, f64)) -> IntegrationError {
         match self.step.without_number(&self.assembly) {
             Some(joint) => joint.no_number(time),
-            None => Breakdown::Stalled { time, step },
+            None => IntegrationError::Stalled { time, step },
         }
     }
 
@@ -610,7 +610,7 @@ impl SwitchedFlow {
         (begin, last): (Begin, Option<f64>),
         scale: (f64, f64),
         columns: usize,
-    ) -> Result<(Begin, Option<f64>, bool), Breakdown> {
+    ) -> Result<(Begin, Option<f64>, bool), IntegrationError> {
         loop {
             let (h, end) = self.length(begin);
             if self.tried >= STEP_LIMIT || self.level > LEVELS {
@@ -661,7 +661,7 @@ impl SwitchedFlow {
         state: &mut [f64],
         (before, time): (f64, f64),
         columns: usize,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         if columns > 0 {
             let mut derivative = std::mem::take(&mut self.derivative);
             self.step.carry(&self.assembly, eliminated, &mut derivative, columns);
@@ -713,7 +713,7 @@ impl Flow for SwitchedFlow {
         state: &mut [f64],
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), Breakdown> {
+    ) -> Result<(), IntegrationError> {
         if self.stretch != duration {
             self.stretch = duration;
             self.eliminated.fill(None);
@@ -740,7 +740,7 @@ impl Flow for SwitchedFlow {
             if switches > SWITCH_LIMIT {
                 let joint = self.frictions.first().map_or(0, |friction| friction.joint);
                 let joint = self.assembly.joints[joint].joint.clone();
-                return Err(Breakdown::Chatter { time: next.time, switches, joint });
+                return Err(IntegrationError::Chatter { time: next.time, switches, joint });
             }
             (begin, last) = (next, length);
         }

@@ -1,6 +1,6 @@
 //! A joint in one mode, as a smooth law: it sticks, or it slips in one direction.
 
-use crate::law::{Contact, Law, LawInfo, MOST_DIRECTIONS, Rate, RateLaw, Relative, SharedLaw};
+use crate::law::{Contact, Law, LawInfo, MAX_DIRECTIONS, RateLaw, RateView, RelativeMotion, SharedLaw};
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
@@ -45,19 +45,19 @@ impl Law for InMode {
     fn values(&self) -> Vec<f64> {
         self.law.values()
     }
-    fn scale(&self) -> f64 {
-        self.law.scale()
+    fn force_scale(&self) -> f64 {
+        self.law.force_scale()
     }
     fn is_odd(&self) -> bool {
         false
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         Some(self)
     }
 }
 
 impl RateLaw for InMode {
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, _z: &[S], _rate: &mut [S]) -> [S; MOST_DIRECTIONS] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; MAX_DIRECTIONS] {
         let v = motion.velocity[0];
         let force = match self.mode {
             Mode::Held => v * self.unit,

@@ -21,7 +21,7 @@ pub(super) fn mobility(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
     for (b, &other) in axes.iter().enumerate() {
         let moved = &assembly.inverse_mass * assembly.directions.column(other);
         for (a, &axis) in axes.iter().enumerate() {
-            out[(a, b)] = assembly.axes[axis].along(moved.as_slice());
+            out[(a, b)] = assembly.axes[axis].component(moved.as_slice());
         }
     }
     out

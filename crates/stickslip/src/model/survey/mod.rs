@@ -8,37 +8,37 @@
 //! two, because springs and constraints only raise the frequency of every mode (Courant,
 //! Fischer).
 
-mod hold;
-mod known;
-mod linear;
-mod loose;
-mod onset;
+mod linear_modes;
 mod preload;
-mod waves;
+mod results;
+mod rigid_body;
+mod slip_onset;
+mod stuck_joint;
+mod wave_modes;
 
-pub use known::{FirstSlip, LinearMode, Loose, Modes, Onset, Unpressed};
-pub use waves::WaveModes;
+pub use results::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, UnloadedContacts};
+pub use wave_modes::WaveModes;
 
 use super::{Model, ModelError, System, SystemJoint};
-use crate::law::{MOST_DIRECTIONS, SharedLaw};
-use hold::{Hold, Stuck};
-use linear::{LARGEST, Linear, Link};
+use crate::law::{MAX_DIRECTIONS, SharedLaw};
+use linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
 use std::collections::HashMap;
+use stuck_joint::{StuckAxis, StuckState};
 
 /// Linear properties of a model: modes, onset of slip, loose bodies, preload.
 #[derive(Debug, Clone)]
 pub struct Survey {
     system: System,
-    joints: Vec<Stuck>,
-    free: Linear,
-    stuck: Linear,
+    joints: Vec<StuckAxis>,
+    free: LinearStructure,
+    stuck: LinearStructure,
     /// Modes with open faces closed, if any faces are apart in static equilibrium.
-    closed: Option<Linear>,
+    closed: Option<LinearStructure>,
     /// Contact forces in static equilibrium without rigid friction, N; see
-    /// [`FirstSlip::at_rest`].
+    /// [`FirstSlip::equilibrium_force`].
     at_rest: Vec<Option<f64>>,
-    loose: Vec<Loose>,
-    unpressed: Option<Unpressed>,
+    loose: Vec<LooseBody>,
+    unpressed: Option<UnloadedContacts>,
 }
 
 impl Model {
@@ -86,77 +86,82 @@ impl Model {
     /// };
     /// let survey = model.survey_under_load(&|system| Some(StaticEquilibrium::of(system)?.forces())).unwrap();
     /// let slip = survey.first_slip();
-    /// assert!((slip[0].limit - 6.0).abs() < 1e-9 && (slip[1].at_rest.unwrap() - 20.0).abs() < 1e-9);
+    /// assert!((slip[0].limit - 6.0).abs() < 1e-9 && (slip[1].equilibrium_force.unwrap() - 20.0).abs() < 1e-9);
     /// assert_eq!(model.survey().unwrap().first_slip()[0].limit, 0.0);
     /// ```
     pub fn survey_under_load(
         &self,
-        forces: &dyn Fn(&System) -> Option<Vec<[f64; MOST_DIRECTIONS]>>,
+        forces: &dyn Fn(&System) -> Option<Vec<[f64; MAX_DIRECTIONS]>>,
     ) -> Result<Survey, ModelError> {
         let system = self.assemble()?;
-        let forces = if system.dofs() > LARGEST { None } else { forces(&system) };
+        let forces = if system.dofs() > MAX_DOFS { None } else { forces(&system) };
         // contact force and law of joints without preload that the constant loads press
         // together
         let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {
             let force = forces.as_ref()?.get(index)?[joint.law().normal()?];
-            (force > 0.0).then(|| Some((force, joint.law().pressed_by(force)?)))?
+            (force > 0.0).then(|| Some((force, joint.law().with_preload(force)?)))?
         };
         let of_joint = |(index, joint): (usize, &SystemJoint)| {
             let found = pressed(index, joint);
-            Stuck::of_joint((index, joint), found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
+            StuckAxis::of_joint(index, joint, found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
         };
-        let joints: Vec<Stuck> = system.joints().iter().enumerate().flat_map(of_joint).collect();
+        let joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
         let loose = self.loose(&system, &joints);
-        let mut at_rest = preload::carried(&system, &joints);
+        let mut at_rest = preload::equilibrium_forces(&system, &joints);
         for (stuck, carried) in joints.iter().zip(&mut at_rest).filter(|(stuck, _)| stuck.pressed.is_some()) {
             if let Some((force, _)) = pressed(stuck.joint, &system.joints()[stuck.joint]) {
                 *carried = Some(force);
             }
         }
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
-        if system.dofs() > LARGEST {
-            let lost = system.dofs();
-            let unknown = || Linear { modes: Modes { lost, ..Modes::default() }, shapes: None, turning: false };
+        if system.dofs() > MAX_DOFS {
+            let unresolved = system.dofs();
+            let unknown = || LinearStructure {
+                modes: LinearModes { unresolved, ..LinearModes::default() },
+                shapes: None,
+                gyroscopic: false,
+            };
             let (free, stuck) = (unknown(), unknown());
             return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
         }
-        let faces: Vec<Link> = joints
+        let faces: Vec<SpringDamper> = joints
             .iter()
             .filter(|joint| joint.closed > 0.0 && !joint.at.is_empty())
-            .map(|joint| Link { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
+            .map(|joint| SpringDamper { at: joint.at.clone(), stiffness: joint.closed, damping: 0.0 })
             .collect();
         let moving = || joints.iter().filter(|joint| !joint.at.is_empty());
-        let held: Vec<Link> = moving().filter_map(Stuck::held).collect();
-        let dampers: Vec<Link> = moving().filter_map(Stuck::free).collect();
-        let dampers: Vec<&Link> = dampers.iter().collect();
+        let held: Vec<SpringDamper> = moving().filter_map(StuckAxis::stuck_link).collect();
+        let dampers: Vec<SpringDamper> = moving().filter_map(StuckAxis::free_link).collect();
+        let dampers: Vec<&SpringDamper> = dampers.iter().collect();
         let rigid: Vec<&[(usize, f64)]> = joints
             .iter()
-            .filter(|joint| matches!(joint.hold, Hold::Rigid { .. }) && !joint.at.is_empty())
+            .filter(|joint| matches!(joint.state, StuckState::Rigid { .. }) && !joint.at.is_empty())
             .map(|joint| joint.at.as_slice())
             .collect();
         if self.substructure.is_some() || self.moves_bodies() {
-            let free = Linear::of_matrices(system.structure().full(), &dampers, &[]);
-            let stuck = |held: &[&Link]| Linear::of_matrices(system.structure().full(), held, &rigid);
+            let free = LinearStructure::of_matrices(system.structure().full(), &dampers, &[]);
+            let stuck = |held: &[&SpringDamper]| LinearStructure::of_matrices(system.structure().full(), held, &rigid);
             let (stuck, closed) = with_faces(&held, &faces, &stuck);
             return Ok(Survey { free, stuck, closed, at_rest, system, joints, loose, unpressed });
         }
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
             let ends = between.iter().zip([1.0, -1.0]);
-            let rows = ends.filter_map(|(name, sign)| Some((system.seen()[*index.get(name.as_str())?].rows(), sign)));
+            let rows =
+                ends.filter_map(|(name, sign)| Some((system.place_axes()[*index.get(name.as_str())?].rows(), sign)));
             rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
         };
-        let springs: Vec<Link> = self
+        let springs: Vec<SpringDamper> = self
             .springs
             .iter()
-            .map(|s| Link { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
+            .map(|s| SpringDamper { at: ends(&s.between), stiffness: s.stiffness, damping: s.damping })
             .filter(|link| !link.at.is_empty())
             .collect();
-        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().own_mass(i)).collect();
-        let free = Linear::new(&mass, &springs.iter().chain(dampers).collect::<Vec<_>>(), &[]);
-        let stuck = |held: &[&Link]| {
-            let all: Vec<&Link> = springs.iter().chain(held.iter().copied()).collect();
-            Linear::new(&mass, &all, &rigid)
+        let mass: Vec<f64> = (0..system.dofs()).map(|i| system.structure().diagonal_mass(i)).collect();
+        let free = LinearStructure::new(&mass, &springs.iter().chain(dampers).collect::<Vec<_>>(), &[]);
+        let stuck = |held: &[&SpringDamper]| {
+            let all: Vec<&SpringDamper> = springs.iter().chain(held.iter().copied()).collect();
+            LinearStructure::new(&mass, &all, &rigid)
         };
         let (stuck, closed) = with_faces(&held, &faces, &stuck);
         Ok(Survey { system, joints, free, stuck, closed, at_rest, loose, unpressed })
@@ -165,9 +170,13 @@ impl Model {
 
 /// Returns the linear structure with the joints of the stuck state, and the structure with
 /// closed faces if some faces are apart.
-fn with_faces(held: &[Link], faces: &[Link], linear: &dyn Fn(&[&Link]) -> Linear) -> (Linear, Option<Linear>) {
-    let at_rest: Vec<&Link> = held.iter().collect();
-    let closed: Vec<&Link> = held.iter().chain(faces).collect();
+fn with_faces(
+    held: &[SpringDamper],
+    faces: &[SpringDamper],
+    linear: &dyn Fn(&[&SpringDamper]) -> LinearStructure,
+) -> (LinearStructure, Option<LinearStructure>) {
+    let at_rest: Vec<&SpringDamper> = held.iter().collect();
+    let closed: Vec<&SpringDamper> = held.iter().chain(faces).collect();
     (linear(&at_rest), (!faces.is_empty()).then(|| linear(&closed)))
 }
 
@@ -183,49 +192,49 @@ impl Survey {
     }
 
     /// Returns whether the model has too many degrees of freedom for its modes. All modes then
-    /// count as lost.
+    /// count as unresolved.
     pub fn is_too_large(&self) -> bool {
-        self.dofs() > LARGEST
+        self.dofs() > MAX_DOFS
     }
 
     /// Returns the modes with all joints free.
-    pub fn free(&self) -> &Modes {
+    pub fn free(&self) -> &LinearModes {
         &self.free.modes
     }
 
     /// Returns the modes with all joints stuck. All faces are closed, including those that are
     /// apart in static equilibrium.
-    pub fn stuck(&self) -> &Modes {
+    pub fn stuck(&self) -> &LinearModes {
         &self.closed.as_ref().unwrap_or(&self.stuck).modes
     }
 
     /// Returns the bodies that no spring holds.
-    pub fn loose(&self) -> &[Loose] {
+    pub fn loose(&self) -> &[LooseBody] {
         &self.loose
     }
 
     /// Returns preloaded contacts that carry no force in static equilibrium, if a body is
     /// loose. No constant force balances their preload.
-    pub fn unpressed(&self) -> Option<&Unpressed> {
+    pub fn unpressed(&self) -> Option<&UnloadedContacts> {
         self.unpressed.as_ref()
     }
 
     /// Returns the onset of slip of each joint, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
-        let rigid = self.joints.iter().any(|joint| matches!(joint.hold, Hold::Rigid { .. }));
-        let one = |(joint, carried): (&Stuck, &Option<f64>)| {
-            let (limit, displacement) = match joint.hold {
-                Hold::Nothing => (0.0, None),
-                Hold::Spring { limit, displacement, .. } => (limit, Some(displacement)),
-                Hold::Rigid { limit } => (limit, None),
+        let rigid = self.joints.iter().any(|joint| matches!(joint.state, StuckState::Rigid { .. }));
+        let one = |(joint, carried): (&StuckAxis, &Option<f64>)| {
+            let (limit, displacement) = match joint.state {
+                StuckState::Nothing => (0.0, None),
+                StuckState::Spring { limit, displacement, .. } => (limit, Some(displacement)),
+                StuckState::Rigid { limit } => (limit, None),
             };
             FirstSlip {
                 joint: joint.name.clone(),
                 limit,
                 displacement,
                 gradual: joint.gradual,
-                pressed: joint.pressed,
-                at_rest: carried.filter(|_| !rigid),
+                preload: joint.pressed,
+                equilibrium_force: carried.filter(|_| !rigid),
             }
         };
         self.joints.iter().zip(&self.at_rest).map(one).collect()

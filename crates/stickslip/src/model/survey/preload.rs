@@ -4,14 +4,14 @@
 //! `f₀`.
 
 use super::super::System;
-use super::Unpressed;
-use super::hold::{Hold, Stuck};
-use super::linear::LARGEST;
+use super::UnloadedContacts;
+use super::linear_modes::MAX_DOFS;
+use super::stuck_joint::{StuckAxis, StuckState};
 use nalgebra::{DMatrix, DVector};
 
 /// Fraction of the preload below which a contact force is zero. In directions that nothing
 /// holds, it is rounding.
-const NOTHING: f64 = 1e-6;
+const ZERO_FORCE: f64 = 1e-6;
 /// Stiffness of directions that nothing holds, relative to the stiffest contact. It lets them
 /// move without a significant force.
 const SOFT: f64 = 1e-12;
@@ -20,12 +20,12 @@ const SOFT: f64 = 1e-12;
 /// closed and stuck.
 ///
 /// A negative force means that the contact opens. Entries are `None` for other joints, and for
-/// all joints without any preload or beyond [`LARGEST`]. Rigid friction is not included,
+/// all joints without any preload or beyond [`MAX_DOFS`]. Rigid friction is not included,
 /// because its share is undetermined.
-pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
+pub(super) fn equilibrium_forces(system: &System, joints: &[StuckAxis]) -> Vec<Option<f64>> {
     let n = system.dofs();
     let unknown = || vec![None; joints.len()];
-    if n > LARGEST || !joints.iter().any(|joint| joint.pressed.is_some_and(|force| force > 0.0)) {
+    if n > MAX_DOFS || !joints.iter().any(|joint| joint.pressed.is_some_and(|force| force > 0.0)) {
         return unknown();
     }
     let mut load = DVector::zeros(n);
@@ -36,8 +36,8 @@ pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
     for (row, column, [.., k]) in system.structure().entries() {
         stiffness[(row, column)] += k;
     }
-    let springs = |joint: &Stuck| match joint.hold {
-        Hold::Spring { stiffness, .. } => stiffness,
+    let springs = |joint: &StuckAxis| match joint.state {
+        StuckState::Spring { stiffness, .. } => stiffness,
         _ => 0.0,
     };
     let stiffest = joints.iter().map(springs).fold(0.0, f64::max);
@@ -52,17 +52,17 @@ pub(super) fn carried(system: &System, joints: &[Stuck]) -> Vec<Option<f64>> {
     // without free coordinates nothing deforms
     let solved = if n == 0 { Some(load) } else { stiffness.lu().solve(&load) };
     let Some(x) = solved else { return unknown() };
-    let carried = |joint: &Stuck| {
+    let carried = |joint: &StuckAxis| {
         let preload = joint.pressed.filter(|force| *force > 0.0)?;
         let force = preload + springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>();
-        Some(if force.abs() <= NOTHING * preload { 0.0 } else { force })
+        Some(if force.abs() <= ZERO_FORCE * preload { 0.0 } else { force })
     };
     joints.iter().map(carried).collect()
 }
 
 /// Returns the preloaded contacts that carry no force; `None` if each carries some.
-pub(super) fn unpressed(system: &System, joints: &[Stuck], carried: &[Option<f64>]) -> Option<Unpressed> {
-    let mut found = Unpressed { joints: Vec::new(), preload: 0.0 };
+pub(super) fn unpressed(system: &System, joints: &[StuckAxis], carried: &[Option<f64>]) -> Option<UnloadedContacts> {
+    let mut found = UnloadedContacts { joints: Vec::new(), preload: 0.0 };
     for (joint, _) in joints.iter().zip(carried).filter(|(_, carried)| carried.is_some_and(|force| force <= 0.0)) {
         found.joints.push(system.joints()[joint.joint].name().to_owned());
         found.preload += joint.pressed.unwrap_or(0.0);

@@ -7,21 +7,24 @@
 //!
 //! Source: Craig and Bampton (1968), "Coupling of substructures for dynamic analyses".
 
-use super::{MOST_MODES, Reduced, ReductionError, Whole};
+use super::{FullStructure, MAX_MODES, ReducedMatrices, ReductionError};
 use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
 
-impl Whole {
+impl FullStructure {
     /// Reduces the structure to the degrees of freedom of its ports and all fixed-interface
     /// modes up to `omega` (rad/s).
     ///
     /// # Errors
     /// [`ReductionError`]: free motions remain with fixed ports, or the mode computation fails.
-    pub fn craig_bampton(&self, omega: f64) -> Result<Reduced, ReductionError> {
-        self.held(ModeSelection::UpTo { value: omega * omega, most: MOST_MODES })
+    pub fn craig_bampton(&self, omega: f64) -> Result<ReducedMatrices, ReductionError> {
+        self.fixed_interface(ModeSelection::UpTo { value: omega * omega, most: MAX_MODES })
     }
 
     /// Reduces the structure with the modes that `wanted` specifies.
-    pub(in crate::structure) fn held(&self, wanted: ModeSelection) -> Result<Reduced, ReductionError> {
+    pub(in crate::structure) fn fixed_interface(
+        &self,
+        wanted: ModeSelection,
+    ) -> Result<ReducedMatrices, ReductionError> {
         let n = self.dofs();
         let mut boundary: Vec<usize> = self.ports.iter().flatten().map(|(at, _)| *at).collect();
         boundary.sort_unstable();
@@ -40,7 +43,7 @@ impl Whole {
         let analysis = SymbolicAnalysis::new(&[&stiffness, &mass]);
         let modes = NaturalModes::new(&analysis, &stiffness, &mass, wanted)?;
         if modes.rigid_body_count() > 0 {
-            return Err(ReductionError::NotHeld { count: modes.rigid_body_count() });
+            return Err(ReductionError::FreeInterfaceMotion { count: modes.rigid_body_count() });
         }
         let (inner, outer) = (interior.len(), boundary.len());
         let mut answers = vec![0.0; inner * outer];
@@ -50,7 +53,7 @@ impl Whole {
             }
         }
         let factor = analysis.factor(&[(1.0, &stiffness)]);
-        factor.map_err(|_| ReductionError::NotHeld { count: 1 })?.solve(&mut answers);
+        factor.map_err(|_| ReductionError::FreeInterfaceMotion { count: 1 })?.solve(&mut answers);
         let mut basis = vec![0.0; n * (modes.count() + outer)];
         for k in 0..modes.count() + outer {
             let column = &mut basis[k * n..(k + 1) * n];
@@ -63,7 +66,7 @@ impl Whole {
             };
             interior.iter().zip(from).for_each(|(&i, x)| column[i] = *x);
         }
-        Reduced::project(
+        ReducedMatrices::project(
             self,
             format!("Craig-Bampton: {} fixed-interface modes, {outer} interface degrees of freedom", modes.count()),
             basis,

@@ -4,49 +4,49 @@
 //! use only a few displacements. These are its *ports*, weighted sums of rows. `M̂ = Tᵀ M T`,
 //! `Ĉ = Tᵀ C T`, `K̂ = Tᵀ K T` preserve symmetry and definiteness for any columns of `T`:
 //!
-//! - Rubin, MacNeal (`free`): free modes, and the static response of the omitted modes at the
+//! - Rubin, MacNeal (`rubin`): free modes, and the static response of the omitted modes at the
 //!   ports.
 //! - Craig-Bampton (`craig_bampton`): modes with fixed ports, and static responses to unit
 //!   displacements of the ports.
 //!
 //! Harmonic balance needs receptances only and can also use modes and a series of residuals
-//! (`series`). Residual vectors of J orders make the first 2 J terms of this series exact in
-//! any method.
+//! (`residual_series`). Residual vectors of J orders make the first 2 J terms of this series
+//! exact in any method.
 //!
 //! The other files:
 //!
-//! - `evidence` compares a reduction with the whole structure; `mistuned` does this for a
-//!   ring with different blades.
-//! - `choice`: [`Reduce`] uses as many modes as a given error requires.
-//! - `ring` reduces a sector for all waves of its ring at once.
-//! - `between` builds one basis for two stiffnesses and all between them.
-//! - `nominal` transforms a ring with different blades to its own modes.
+//! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does
+//!   this for a ring with different blades.
+//! - `automatic`: [`AutomaticReduction`] uses as many modes as a given error requires.
+//! - `cyclic_basis` reduces a sector for all waves of its ring at once.
+//! - `common_basis` builds one basis for two stiffnesses and all between them.
+//! - `nominal_modes` transforms a ring with different blades to its own modes.
 //!
-//! Damping is a part of the whole structure and is reduced like the other matrices. [`Damping`]
-//! defines a modal damping ratio beyond the retained modes.
+//! Damping is a part of the whole structure and is reduced like the other matrices.
+//! [`StructureDamping`] defines a modal damping ratio beyond the retained modes.
 
-mod between;
-mod choice;
+mod automatic;
+mod common_basis;
 mod craig_bampton;
-mod evidence;
-mod free;
-mod mistuned;
-mod nominal;
+mod cyclic_basis;
+mod mistuning_error;
+mod nominal_modes;
+mod receptance_error;
 mod request;
-mod residual;
-mod ring;
-mod series;
+mod residual_flexibility;
+mod residual_series;
+mod rubin;
 
-pub use choice::{Chosen, Reduce};
-pub use evidence::{Deviation, Reference};
-pub use free::Free;
-pub(in crate::structure) use mistuned::Lacking;
-pub(crate) use nominal::RingModes;
-pub(in crate::structure) use nominal::{EXTENTS, Mixed, NominalRing};
+pub use automatic::{AutomaticReduction, SelectedReduction};
+pub(crate) use cyclic_basis::ReducedSector;
+pub(in crate::structure) use cyclic_basis::STEPS;
+pub(in crate::structure) use mistuning_error::MistuningError;
+pub(crate) use nominal_modes::RingModes;
+pub(in crate::structure) use nominal_modes::{EXTENTS, MistunedModes, NominalRing};
+pub use receptance_error::{ReductionDeviation, ReferenceReceptance};
 pub use request::{Reduction, ReductionKind};
-pub(crate) use ring::ReducedSector;
-pub(in crate::structure) use ring::STEPS;
-pub use series::Series;
+pub use residual_series::ResidualSeries;
+pub use rubin::RubinBasis;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use std::ops::Range;
@@ -62,12 +62,12 @@ pub type Row = Vec<(usize, f64)>;
 
 /// Ratio of a frequency to the highest `√(k_ii/m_ii)` above which the frequency is a mistake:
 /// no mode is near.
-const ABOVE_ALL: f64 = 100.0;
+const MAX_FREQUENCY_RATIO: f64 = 100.0;
 /// Largest number of modes; each needs one number per degree of freedom.
-const MOST_MODES: usize = 600;
+const MAX_MODES: usize = 600;
 /// Number of columns of full length processed at once. More would exhaust the memory for
 /// thousands of columns.
-const AT_ONCE: usize = 64;
+const COLUMN_BLOCK: usize = 64;
 /// Kinetic energy of a reduced mode relative to its stiffness, in units of the largest, below
 /// which the mode has no frequency.
 const MASSLESS: f64 = 1e-14;
@@ -80,7 +80,7 @@ const FREE: f64 = 1e-9;
 
 /// Damping of the whole structure.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Damping {
+pub enum StructureDamping {
     /// Every mode up to a frequency has the same fraction of critical damping.
     ///
     /// Motion above it, and with it the residual and constraint vectors, has damping
@@ -103,7 +103,7 @@ pub enum Damping {
     Matrix(SparseMatrix),
 }
 
-impl Damping {
+impl StructureDamping {
     /// Checks that its parameters are valid.
     fn check(&self) -> Result<(), ReductionError> {
         let number = |what, value: f64, must, holds: bool| match value.is_finite() && holds {
@@ -111,15 +111,15 @@ impl Damping {
             false => Err(ReductionError::Number { what, value, must }),
         };
         match *self {
-            Damping::Ratio { ratio, up_to } => {
+            StructureDamping::Ratio { ratio, up_to } => {
                 number("the damping ratio", ratio, "zero or more", ratio >= 0.0)?;
                 number("the upper end of the frequency range (rad/s)", up_to, "positive", up_to > 0.0)?;
             }
-            Damping::Rayleigh { mass, stiffness } => {
+            StructureDamping::Rayleigh { mass, stiffness } => {
                 number("the mass-proportional damping (1/s)", mass, "zero or more", mass >= 0.0)?;
                 number("the stiffness-proportional damping (s)", stiffness, "zero or more", stiffness >= 0.0)?;
             }
-            Damping::Matrix(_) => {}
+            StructureDamping::Matrix(_) => {}
         }
         Ok(())
     }
@@ -128,16 +128,16 @@ impl Damping {
     /// damping matrix.
     fn proportional(&self) -> Option<(f64, f64)> {
         match *self {
-            Damping::Ratio { ratio, up_to } => Some((0.0, 2.0 * ratio / up_to)),
-            Damping::Rayleigh { mass, stiffness } => Some((mass, stiffness)),
-            Damping::Matrix(_) => None,
+            StructureDamping::Ratio { ratio, up_to } => Some((0.0, 2.0 * ratio / up_to)),
+            StructureDamping::Rayleigh { mass, stiffness } => Some((mass, stiffness)),
+            StructureDamping::Matrix(_) => None,
         }
     }
 
     /// Returns `φᵀ C φ` of a mode of unit mass at ω (rad/s), in 1/s.
     fn of_mode(&self, omega: f64) -> Option<f64> {
         match *self {
-            Damping::Ratio { ratio, up_to } if omega < up_to => Some(2.0 * ratio * omega),
+            StructureDamping::Ratio { ratio, up_to } if omega < up_to => Some(2.0 * ratio * omega),
             _ => self.proportional().map(|(alpha, beta)| alpha + beta * omega * omega),
         }
     }
@@ -145,9 +145,9 @@ impl Damping {
 
 /// A structure before its reduction, with its ports.
 #[derive(Debug, Clone)]
-pub struct Whole {
+pub struct FullStructure {
     pub(super) mass: Arc<SparseMatrix>,
-    pub(super) damping: Damping,
+    pub(super) damping: StructureDamping,
     pub(super) stiffness: Arc<SparseMatrix>,
     ports: Vec<Row>,
     pub(super) analysis: Arc<SymbolicAnalysis>,
@@ -204,7 +204,7 @@ pub enum ReductionError {
         omega / std::f64::consts::TAU,
         highest / std::f64::consts::TAU
     )]
-    AboveAll {
+    FrequencyTooHigh {
         /// Upper end of the requested range, rad/s.
         omega: f64,
         /// The highest `√(k_ii/m_ii)`, rad/s.
@@ -227,7 +227,7 @@ pub enum ReductionError {
          exist; use free modes instead of Craig-Bampton",
         if *count == 1 { "" } else { "s" }
     )]
-    NotHeld {
+    FreeInterfaceMotion {
         /// Number of free motions.
         count: usize,
     },
@@ -243,7 +243,7 @@ pub enum ReductionError {
          vectors, which need fewer coordinates",
         at / std::f64::consts::TAU
     )]
-    OutOfReach {
+    ToleranceNotReached {
         /// Smallest relative error.
         best: f64,
         /// Frequency of that error, rad/s.
@@ -266,7 +266,7 @@ const UNSEEN: f64 = 1e-9;
 /// writes ten digits. It is relative to the largest entry.
 const SYMMETRIC: f64 = 1e-9;
 
-impl Whole {
+impl FullStructure {
     /// Creates a structure from sparse symmetric matrices (kg, N/m), damping, and ports, the
     /// displacements that joints, forces and observers use.
     ///
@@ -275,22 +275,22 @@ impl Whole {
     /// negative damping ratio.
     pub fn new(
         mass: SparseMatrix,
-        damping: Damping,
+        damping: StructureDamping,
         stiffness: SparseMatrix,
         ports: Vec<Row>,
     ) -> Result<Self, ReductionError> {
-        Whole::unseen(mass, damping, stiffness)?.seen_at(ports)
+        FullStructure::without_ports(mass, damping, stiffness)?.with_ports(ports)
     }
 
     /// Creates a structure without ports.
-    pub(super) fn unseen(
+    pub(super) fn without_ports(
         mass: SparseMatrix,
-        damping: Damping,
+        damping: StructureDamping,
         stiffness: SparseMatrix,
     ) -> Result<Self, ReductionError> {
         let n = stiffness.n();
         let own = match &damping {
-            Damping::Matrix(c) => Some(c),
+            StructureDamping::Matrix(c) => Some(c),
             _ => None,
         };
         for (name, matrix) in [("mass", Some(&mass)), ("stiffness", Some(&stiffness)), ("damping", own)] {
@@ -307,14 +307,14 @@ impl Whole {
         damping.check()?;
         let analysed: Vec<&SparseMatrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
         let analysis = Arc::new(SymbolicAnalysis::new(&analysed));
-        Ok(Whole { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
+        Ok(FullStructure { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
     }
 
     /// Returns the same structure with other ports; the matrices are shared.
     ///
     /// # Errors
     /// [`ReductionError`]: no port, or an invalid one.
-    pub fn seen_at(&self, ports: Vec<Row>) -> Result<Self, ReductionError> {
+    pub fn with_ports(&self, ports: Vec<Row>) -> Result<Self, ReductionError> {
         if ports.is_empty() {
             return Err(ReductionError::NoPorts);
         }
@@ -326,7 +326,7 @@ impl Whole {
         if let Some(port) = ports.iter().position(wrong) {
             return Err(ReductionError::Port { port, n });
         }
-        Ok(Whole { ports, ..self.clone() })
+        Ok(FullStructure { ports, ..self.clone() })
     }
 
     /// Returns the number of degrees of freedom.
@@ -341,18 +341,17 @@ impl Whole {
 
     /// Computes all natural modes up to `omega`, rad/s.
     ///
-    /// # Errors
-    /// [`ReductionError::Modes`], or [`ReductionError::AboveAll`] if `omega` is far above all
-    /// modes.
+    /// # Errors [`ReductionError::Modes`], or [`ReductionError::FrequencyTooHigh`] if `omega` is
+    /// far above all modes.
     pub fn modes(&self, omega: f64) -> Result<NaturalModes, ReductionError> {
         let own = |i: usize| (self.stiffness.get(i, i), self.mass.get(i, i));
         let ratios =
             (0..self.dofs()).map(own).filter(|(_, mass)| *mass > 0.0).map(|(stiffness, mass)| stiffness / mass);
         let highest = ratios.fold(0.0, f64::max).sqrt();
-        if highest > 0.0 && omega > ABOVE_ALL * highest {
-            return Err(ReductionError::AboveAll { omega, highest });
+        if highest > 0.0 && omega > MAX_FREQUENCY_RATIO * highest {
+            return Err(ReductionError::FrequencyTooHigh { omega, highest });
         }
-        let wanted = ModeSelection::UpTo { value: omega * omega, most: MOST_MODES };
+        let wanted = ModeSelection::UpTo { value: omega * omega, most: MAX_MODES };
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, wanted)?)
     }
 
@@ -361,20 +360,20 @@ impl Whole {
     /// # Errors
     /// [`ReductionError::Modes`], or [`ReductionError::Number`] for an invalid count.
     pub fn lowest_modes(&self, count: usize) -> Result<NaturalModes, ReductionError> {
-        if !(1..=MOST_MODES).contains(&count) {
+        if !(1..=MAX_MODES).contains(&count) {
             let must = "a whole number from 1 to 600";
             return Err(ReductionError::Number { what: "the number of modes", value: count as f64, must });
         }
         Ok(NaturalModes::new(&self.analysis, &self.stiffness, &self.mass, ModeSelection::Lowest(count))?)
     }
 
-    /// Computes the damping of [`Damping::Ratio`] over all degrees of freedom: `β K + U Uᵀ`.
-    /// Returns β in s, and the columns of U.
+    /// Computes the damping of [`StructureDamping::Ratio`] over all degrees of freedom: `β K + U
+    /// Uᵀ`. Returns β in s, and the columns of U.
     ///
     /// # Errors
     /// [`ReductionError`]: invalid parameters of damping, or a failure of the mode computation.
     pub(super) fn modal_damping(&self, ratio: f64, up_to: f64) -> Result<(f64, Vec<f64>), ReductionError> {
-        let law = Damping::Ratio { ratio, up_to };
+        let law = StructureDamping::Ratio { ratio, up_to };
         law.check()?;
         let beta = law.proportional().map_or(0.0, |(_, beta)| beta);
         let modes = self.modes(up_to)?;
@@ -393,7 +392,7 @@ impl Whole {
 
     /// Returns the displacements of the ports for columns of full length.
     fn rows_of(&self, columns: &[f64]) -> DMatrix<f64> {
-        seen(&self.ports, self.dofs(), columns)
+        evaluate_rows(&self.ports, self.dofs(), columns)
     }
 
     /// Returns unit forces at a range of ports, n × their number.
@@ -409,7 +408,7 @@ impl Whole {
 
 /// A reduced structure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reduced {
+pub struct ReducedMatrices {
     /// Description of the reduction.
     pub kind: String,
     /// `M̂`, r × r.
@@ -426,19 +425,19 @@ pub struct Reduced {
     n: usize,
 }
 
-impl Reduced {
+impl ReducedMatrices {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
-    fn project(whole: &Whole, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
+    fn project(whole: &FullStructure, kind: String, basis: Vec<f64>) -> Result<Self, ReductionError> {
         let n = whole.dofs();
         let square = |matrix: &SparseMatrix| multi_vector::inner_products(n, &basis, &matrix.multiply_columns(&basis));
         let (mass, stiffness) = (symmetric(square(&whole.mass)), symmetric(square(&whole.stiffness)));
         let own = match &whole.damping {
-            Damping::Matrix(c) => Some(square(c)),
+            StructureDamping::Matrix(c) => Some(square(c)),
             _ => None,
         };
         let damping = damping(&whole.damping, &mass, &stiffness, own)?;
         let (ports, weights) = (whole.rows_of(&basis), DMatrix::identity(mass.nrows(), mass.nrows()));
-        Ok(Reduced { kind, mass, damping, stiffness, ports, basis: Arc::new(basis), weights, n })
+        Ok(ReducedMatrices { kind, mass, damping, stiffness, ports, basis: Arc::new(basis), weights, n })
     }
 
     /// Returns the number of coordinates, r.
@@ -451,9 +450,9 @@ impl Reduced {
     /// # Errors
     /// [`ReductionError`]: invalid parameters, or a damping matrix, which must be reduced
     /// together with the other matrices.
-    pub fn damped(&self, by: &Damping) -> Result<Self, ReductionError> {
+    pub fn damped(&self, by: &StructureDamping) -> Result<Self, ReductionError> {
         by.check()?;
-        Ok(Reduced { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })
+        Ok(ReducedMatrices { damping: damping(by, &self.mass, &self.stiffness, None)?, ..self.clone() })
     }
 
     /// Scales the coordinates to displacements in m.
@@ -462,7 +461,7 @@ impl Reduced {
     /// largest degree of freedom if no port moves. Comparisons between coordinates then compare
     /// metres. The displacements of all other rows are dropped.
     #[must_use]
-    pub(super) fn in_metres(mut self) -> Self {
+    pub(super) fn scaled_to_metres(mut self) -> Self {
         let most = |column: &[f64]| column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let sizes: Vec<f64> = self.basis.chunks_exact(self.n.max(1)).map(most).collect();
         for k in 0..self.dofs() {
@@ -497,7 +496,7 @@ impl Reduced {
     /// # Panics
     /// If a row is out of range.
     pub fn rows(&self, rows: &[Row]) -> DMatrix<f64> {
-        product(&seen(rows, self.n, &self.basis), &self.weights)
+        product(&evaluate_rows(rows, self.n, &self.basis), &self.weights)
     }
 
     /// Returns all displacements of the whole structure, n × r.
@@ -581,7 +580,7 @@ fn is_diagonal(matrix: &DMatrix<f64>) -> bool {
 }
 
 /// Evaluates weighted sums of rows over columns of length `n`.
-fn seen(rows: &[Row], n: usize, columns: &[f64]) -> DMatrix<f64> {
+fn evaluate_rows(rows: &[Row], n: usize, columns: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns.len() / n.max(1), |i, k| {
         rows[i].iter().map(|(at, weight)| weight * columns[k * n + at]).sum()
     })
@@ -594,7 +593,7 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
 
 /// Returns the reduced damping, or `own` if the structure has a damping matrix.
 fn damping(
-    by: &Damping,
+    by: &StructureDamping,
     mass: &DMatrix<f64>,
     stiffness: &DMatrix<f64>,
     own: Option<DMatrix<f64>>,
@@ -603,7 +602,7 @@ fn damping(
         return own.ok_or(ReductionError::OutOfRange);
     };
     let mut c = mass * alpha + stiffness * beta;
-    if let Damping::Ratio { up_to, .. } = *by
+    if let StructureDamping::Ratio { up_to, .. } = *by
         && beta > 0.0
     {
         let (values, shapes) = natural(mass, stiffness).ok_or(ReductionError::OutOfRange)?;
@@ -627,7 +626,7 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let r = mass.nrows();
     let moves = |i: usize| mass[(i, i)] > 0.0 || (mass[(i, i)] == 0.0 && stiffness[(i, i)] > 0.0);
     if is_diagonal(mass) && is_diagonal(stiffness) && (0..r).all(moves) {
-        return Some(natural_by_themselves(&mass.diagonal(), &stiffness.diagonal()));
+        return Some(natural_diagonal(&mass.diagonal(), &stiffness.diagonal()));
     }
     let ratio = |i: usize| stiffness[(i, i)] / mass[(i, i)];
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
@@ -651,7 +650,7 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
 }
 
 /// Solves the eigenvalue problem of uncoupled coordinates.
-fn natural_by_themselves(mass: &DVector<f64>, stiffness: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
+fn natural_diagonal(mass: &DVector<f64>, stiffness: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let n = mass.len();
     let value = |i: usize| if mass[i] > 0.0 { stiffness[i] / mass[i] } else { f64::INFINITY };
     let size = |i: usize| if mass[i] > 0.0 { mass[i] } else { stiffness[i] }.sqrt();

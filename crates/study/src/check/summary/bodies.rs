@@ -24,7 +24,7 @@ fn line(body: &Body, model: &Model) -> String {
     let moments = (0..ROTATIONS.len()).filter(turns).map(|axis| {
         format!("{} about {}", quantity_text(body.inertia[axis][axis], Some(Dimension::INERTIA)), ["x", "y", "z"][axis])
     });
-    let points = model.places.iter().filter(|place| place.of.as_ref() == Some(&body.name)).count();
+    let points = model.places.iter().filter(|place| place.view_of.as_ref() == Some(&body.name)).count();
     format!(
         "{}: {}, {}; directions {}; {points} place{}",
         body.name,

@@ -23,7 +23,7 @@ use crate::run::work::WorkUnits;
 use crate::syntax::error::StudyError;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{Modes, Onset, System};
+use stickslip::model::{LinearModes, SlipOnset, System};
 
 /// Summary of a study before it is run.
 #[derive(Debug, Clone)]
@@ -42,9 +42,9 @@ pub struct ModelSummary {
     /// True if the model has too many degrees of freedom for the modes, which are then absent.
     pub too_large: bool,
     /// Modes with all joints free.
-    pub free: Modes,
+    pub free: LinearModes,
     /// Modes with all joints stuck.
-    pub stuck: Modes,
+    pub stuck: LinearModes,
     /// The joints, in the order of the model.
     pub joints: Vec<JointSummary>,
     /// Number of orbits at one frequency, with the reason if there may be several. `None` if
@@ -85,7 +85,7 @@ impl OrbitCount {
             // on a large structure the answer takes three factorizations
             return match system.structure().is_sparse() {
                 true => None,
-                false if system.contracts() => Some(OrbitCount::One),
+                false if system.is_incrementally_stable() => Some(OrbitCount::One),
                 false => Some(OrbitCount::Several("the structure feeds energy into some motion".to_owned())),
             };
         }
@@ -118,7 +118,7 @@ pub struct JointSummary {
     pub normal_force_at_rest: Option<f64>,
     /// Load by the excitation while all joints stick. `None` if the study has no excitation or
     /// the model is too large for a quick answer.
-    pub onset: Option<Onset>,
+    pub onset: Option<SlipOnset>,
 }
 
 /// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
@@ -141,7 +141,7 @@ const ROUNDING_SLIP_FACTOR: f64 = 1e6;
 
 /// Returns the load of a joint by the excitation, relative to its limit; zero if it is due to
 /// rounding.
-fn relative_load(onset: &Onset) -> f64 {
+fn relative_load(onset: &SlipOnset) -> f64 {
     if onset.largest * ROUNDING_SLIP_FACTOR < 1.0 { 0.0 } else { onset.largest }
 }
 
@@ -180,8 +180,8 @@ impl ModelSummary {
             limit: slip.limit,
             displacement: slip.displacement,
             micro_slip: slip.gradual,
-            normal_force: slip.pressed,
-            normal_force_at_rest: slip.at_rest,
+            normal_force: slip.preload,
+            normal_force_at_rest: slip.equilibrium_force,
             onset: onsets.as_ref().map(|onsets| onsets[index].clone()),
         });
         let joints = joints.collect();
@@ -251,12 +251,12 @@ impl ModelSummary {
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.
     pub fn to_json(&self) -> Json {
-        let modes = |modes: &Modes| {
+        let modes = |modes: &LinearModes| {
             json!({
                 "frequencies_Hz": modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>(),
                 "damping_ratios": modes.elastic.iter().map(|mode| mode.damping).collect::<Vec<_>>(),
                 "rigid": modes.rigid,
-                "lost": modes.lost,
+                "lost": modes.unresolved,
             })
         };
         let joint = |joint: &JointSummary| {
@@ -268,9 +268,9 @@ impl ModelSummary {
                 "pressed_at_rest_N": joint.normal_force_at_rest,
                 "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
                 "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / relative_load(onset)).filter(|x| x.is_finite()),
-                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| relative_load(onset) > 0.0).map(|onset| onset.at / TAU),
+                "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| relative_load(onset) > 0.0).map(|onset| onset.omega / TAU),
                 "slips_Hz": joint.onset.as_ref()
-                    .map(|onset| onset.slips.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
+                    .map(|onset| onset.slip_ranges.iter().map(|(a, b)| [a / TAU, b / TAU]).collect::<Vec<_>>()),
             })
         };
         json!({

@@ -5,7 +5,7 @@ use crate::check::survey::SurveyedCase;
 use crate::syntax::format::{format_significant, plural_suffix};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{ReductionEvidence, Substructure};
+use stickslip::model::{ReductionAccuracy, Substructure};
 use stickslip_numerics::sparse::SparseMatrix;
 
 /// Largest number of listed frequencies.
@@ -30,7 +30,7 @@ pub struct StructureSummary {
     /// row name has.
     pub mass: [Option<f64>; 3],
     /// Error of an earlier reduction that produced the files.
-    pub earlier_reduction: Option<ReductionEvidence>,
+    pub earlier_reduction: Option<ReductionAccuracy>,
     /// The reduced model; `None` if all rows are degrees of freedom.
     pub reduced: Option<ReducedSummary>,
 }
@@ -55,22 +55,22 @@ pub struct ReducedSummary {
 
 impl StructureSummary {
     pub(super) fn new(study: &Study, one: &SurveyedCase) -> Option<Self> {
-        let Substructure { component, earlier, .. } = one.case.model.substructure.as_ref()?;
+        let Substructure { component, earlier_reduction, .. } = one.case.model.substructure.as_ref()?;
         let (mass, _, stiffness) = component.matrices();
         let reduced = one.survey.system().reduced().map(|reduced| ReducedSummary {
             coordinates: reduced.dofs(),
             kind: reduced.kind().to_owned(),
             error: reduced.error(),
             up_to: reduced.up_to(),
-            rigid_body_modes: Some(reduced.free()).filter(|_| one.case.model.ring.is_none()),
-            frequencies: reduced.frequencies().iter().skip(reduced.free()).take(MAX_LISTED).copied().collect(),
+            rigid_body_modes: Some(reduced.free_modes()).filter(|_| one.case.model.ring.is_none()),
+            frequencies: reduced.frequencies().iter().skip(reduced.free_modes()).take(MAX_LISTED).copied().collect(),
         });
         Some(StructureSummary {
             rows: component.dofs(),
             constrained_rows: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.constrained_rows),
             entries: [stiffness.len(), mass.len()],
             mass: DIRECTIONS.map(|along| mass_along(component.rows(), component.matrices().0, along)),
-            earlier_reduction: *earlier,
+            earlier_reduction: *earlier_reduction,
             reduced,
         })
     }

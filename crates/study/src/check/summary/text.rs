@@ -5,7 +5,7 @@ use crate::syntax::format::{format_bytes, format_significant, format_with_prefix
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::fmt;
-use stickslip::model::{LinearMode, Modes};
+use stickslip::model::{LinearModes, NaturalMode};
 
 /// Largest number of listed modes and joints.
 const MAX_LISTED: usize = 10;
@@ -15,11 +15,11 @@ const MAX_SLIP_RANGES: usize = 3;
 const WIDTH: usize = 14;
 
 impl ModelSummary {
-    fn modes(&self, modes: &Modes) -> String {
+    fn modes(&self, modes: &LinearModes) -> String {
         if self.too_large {
             return format!("not computed for {} degrees of freedom", self.dofs);
         }
-        let mut order: Vec<&LinearMode> = modes.elastic.iter().collect();
+        let mut order: Vec<&NaturalMode> = modes.elastic.iter().collect();
         let count = order.len();
         if let Some((from, to)) = self.range.filter(|_| count > MAX_LISTED) {
             // the modes nearest to the range, by ascending frequency
@@ -28,7 +28,7 @@ impl ModelSummary {
         }
         order.truncate(MAX_LISTED);
         order.sort_by(|a, b| a.omega.total_cmp(&b.omega));
-        let list = |read: &dyn Fn(&LinearMode) -> String| order.iter().map(|m| read(m)).collect::<Vec<_>>().join(", ");
+        let list = |read: &dyn Fn(&NaturalMode) -> String| order.iter().map(|m| read(m)).collect::<Vec<_>>().join(", ");
         let mut parts = Vec::new();
         if count > MAX_LISTED {
             let which = if self.range.is_some() { "nearest the range" } else { "lowest" };
@@ -48,8 +48,8 @@ impl ModelSummary {
         if modes.rigid > 0 {
             text += &format!("; {} rigid-body motion{}", modes.rigid, plural_suffix(modes.rigid));
         }
-        if modes.lost > 0 {
-            text += &format!("; {} lost in rounding, because other stiffnesses are much higher", modes.lost);
+        if modes.unresolved > 0 {
+            text += &format!("; {} lost in rounding, because other stiffnesses are much higher", modes.unresolved);
         }
         text
     }
@@ -79,7 +79,7 @@ impl ModelSummary {
         let Some(onset) = &joint.onset else { return text };
         let several = self.range.is_some_and(|(from, to)| from < to);
         let hertz = |omega: f64| format_significant(omega / TAU, 7);
-        let at = if several { format!(" at {} Hz", hertz(onset.at)) } else { String::new() };
+        let at = if several { format!(" at {} Hz", hertz(onset.omega)) } else { String::new() };
         if !onset.largest.is_finite() {
             return text + "; the imposed motion makes it slip";
         }
@@ -89,19 +89,19 @@ impl ModelSummary {
             text += "; the excitation does not reach it";
         } else if relative_load(onset) == 0.0 {
             text += "; sticks, even under a million times the excitation";
-        } else if onset.slips.is_empty() && joint.micro_slip {
+        } else if onset.slip_ranges.is_empty() && joint.micro_slip {
             let share = format_significant(100.0 * onset.largest, 3);
             text += &format!("; only micro-slip, up to {share} % of the slip limit{at}");
-        } else if onset.slips.is_empty() {
+        } else if onset.slip_ranges.is_empty() {
             text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
         } else if several {
             let mut ranges: Vec<String> = onset
-                .slips
+                .slip_ranges
                 .iter()
                 .take(MAX_SLIP_RANGES)
                 .map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b)))
                 .collect();
-            if let Some(more @ 1..) = onset.slips.len().checked_sub(MAX_SLIP_RANGES) {
+            if let Some(more @ 1..) = onset.slip_ranges.len().checked_sub(MAX_SLIP_RANGES) {
                 ranges.push(format!("{more} more"));
             }
             let ranges = ranges.join(", ");

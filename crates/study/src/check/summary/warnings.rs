@@ -10,7 +10,7 @@ use crate::syntax::format::format_significant;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
-use stickslip::model::{Axis, FirstSlip, Loose, Modes};
+use stickslip::model::{Axis, FirstSlip, LinearModes, LooseBody};
 use stickslip::structure::ReducedComponent;
 
 /// Largest number of names that a warning lists; for more it states the number.
@@ -44,7 +44,7 @@ fn list_names(names: &[String]) -> String {
 
 fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let pronoun = |count: usize| if count == 1 { "it" } else { "them" };
-    let one = |one: &Loose| {
+    let one = |one: &LooseBody| {
         let names = list_names(&one.masses);
         let them = pronoun(one.masses.len());
         if one.held_by_friction {
@@ -56,8 +56,8 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     // bodies on preloaded faces are correct; bodies between unloaded faces have a separate
     // warning
     let survey = &cases[0].survey;
-    let between = |loose: &&Loose| !loose.held_by_friction && !loose.faces.is_empty();
-    let unpressed: Vec<&Loose> = survey.loose().iter().filter(between).collect();
+    let between = |loose: &&LooseBody| !loose.held_by_friction && !loose.faces.is_empty();
+    let unpressed: Vec<&LooseBody> = survey.loose().iter().filter(between).collect();
     let open = unpressed.first().map(|_| {
         let bodies: Vec<String> = unpressed.iter().flat_map(|one| one.masses.clone()).collect();
         let mut joints: Vec<String> = unpressed.iter().flat_map(|one| one.faces.clone()).collect();
@@ -114,7 +114,7 @@ fn overstiff(one: &SurveyedCase) -> Option<String> {
     if model.substructure.is_some() || survey.is_too_large() {
         return None;
     }
-    let highest = |modes: &Modes| modes.elastic.last().map_or(0.0, |mode| mode.omega) / TAU;
+    let highest = |modes: &LinearModes| modes.elastic.last().map_or(0.0, |mode| mode.omega) / TAU;
     let (free, stuck) = (highest(survey.free()), highest(survey.stuck()));
     if free.max(stuck) <= PLAUSIBLE_FREQUENCIES.1 {
         return None;
@@ -208,7 +208,7 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
 fn coordinates(reduced: &ReducedComponent) -> Vec<String> {
     let mut found = Vec::new();
     let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
-    let lowest = reduced.frequencies().get(reduced.free()).copied();
+    let lowest = reduced.frequencies().get(reduced.free_modes()).copied();
     match lowest {
         Some(lowest) if lowest / TAU < PLAUSIBLE_FREQUENCIES.0 || lowest / TAU > PLAUSIBLE_FREQUENCIES.1 => {
             found.push(format!("the lowest natural frequency of the structure is {}; check `units`", hertz(lowest)));

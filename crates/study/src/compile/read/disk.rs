@@ -12,7 +12,7 @@ use crate::syntax::error::Problem;
 use crate::syntax::key::Key;
 use crate::syntax::suggest::excerpt;
 use std::io::Read;
-use stickslip::structure::Node;
+use stickslip::structure::NodeCoordinates;
 
 /// Largest size of a file in bytes: lines for a million nodes.
 const MAX_BYTES: u64 = 1 << 26;
@@ -43,7 +43,7 @@ impl Reader {
     }
 
     /// Reads the node coordinates of a sector, if a file is named.
-    fn nodes(&mut self, stated: &CompiledTable) -> Option<Vec<Node>> {
+    fn nodes(&mut self, stated: &CompiledTable) -> Option<Vec<NodeCoordinates>> {
         let entry = stated.entry("nodes").filter(|_| !self.study_file_only)?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let read = self.read_text(name).and_then(|text| {
@@ -169,7 +169,7 @@ fn csv<const N: usize>(text: &str, columns: [&str; N]) -> Result<Vec<CsvRow<N>>,
 }
 
 /// Parses a node from the fields of its line.
-fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, String)> {
+fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<NodeCoordinates, (usize, String)> {
     let number = |text: &str| {
         // the exponent letter of Fortran
         let value = text.trim().replace(['d', 'D'], "e").parse::<f64>().ok().filter(|value| value.is_finite());
@@ -181,14 +181,14 @@ fn node_of(line: usize, name: &str, at: [&str; 3]) -> Result<Node, (usize, Strin
 }
 
 /// Parses the nodes of a CSV file. The error is the wrong line and the reason.
-fn csv_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
+fn csv_nodes(text: &str) -> Result<Vec<NodeCoordinates>, (usize, String)> {
     let rows = csv(text, ["node", "x", "y", "z"])?.into_iter();
     rows.map(|(line, [node, x, y, z])| node_of(line, &node, [&x, &y, &z])).collect()
 }
 
 /// Parses the nodes of an Abaqus or CalculiX input deck. The error is the wrong line and the
 /// reason.
-fn deck_nodes(text: &str) -> Result<Vec<Node>, (usize, String)> {
+fn deck_nodes(text: &str) -> Result<Vec<NodeCoordinates>, (usize, String)> {
     let (mut nodes, mut inside) = (Vec::new(), false);
     for (line, text) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
         if text.is_empty() || text.starts_with("**") {

@@ -23,7 +23,7 @@ use crate::run::point_row::PointRow;
 use crate::run::work::{Computed, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{Bounds, END_POINTS_RANGE, ValueType, default, required};
 use std::f64::consts::TAU;
-use stickslip::curve::trace::{Branch, BranchEnd, Trace, TraceError};
+use stickslip::curve::continuation::{Branch, BranchContinuation, BranchEnd, TraceError};
 use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -233,7 +233,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 fn peaks_of(branch: &Branch, places: &[usize]) -> Vec<(f64, f64)> {
     let heights: Vec<f64> = branch.points.iter().map(|point| largest_amplitude(&point.orbit, places)).collect();
     let errors: Vec<f64> =
-        branch.points.iter().map(|point| point.orbit.evidence.truncation.unwrap_or(f64::NAN)).collect();
+        branch.points.iter().map(|point| point.orbit.evidence.error_estimate.unwrap_or(f64::NAN)).collect();
     // a peak lies between the rows before and after its nearest row
     let near = |row: usize, (value, height): (f64, f64)| {
         let [a, b, c] = [row - 1, row, row + 1].map(|row| branch.points[row].value);
@@ -303,8 +303,8 @@ fn follow(work: &UnitTask<'_>, along: Option<&VariedValue>, range: (f64, f64)) -
         Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
     };
     let places = peak_places(prepared);
-    let trace = Trace {
-        at: &at,
+    let trace = BranchContinuation {
+        system_at: &at,
         method: method(values),
         range,
         step: (range.1 - range.0).abs() / values.count("steps").unwrap_or(100) as f64,

@@ -20,7 +20,7 @@ use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResul
 use crate::syntax::key::{SPEED_RANGE, ValueType, default, required};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
-use stickslip::model::{Model, ReductionEvidence};
+use stickslip::model::{Model, ReductionAccuracy};
 
 const TABLE: &str = "campbell";
 const CROSSINGS: &str = "crossings";
@@ -120,7 +120,7 @@ struct NaturalFrequency {
     mode: usize,
     omega: f64,
     /// Reduction error of the structure at that speed.
-    reduction: Option<ReductionEvidence>,
+    reduction: Option<ReductionAccuracy>,
 }
 
 impl NaturalFrequency {
@@ -132,7 +132,7 @@ impl NaturalFrequency {
 /// Returns the natural frequencies of a model.
 fn natural_frequencies(model: &Model, most: usize) -> Result<Vec<NaturalFrequency>, String> {
     let mut found = Vec::new();
-    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::Modes, reduction| {
+    let mut add = |state: usize, diameter: Option<usize>, modes: &stickslip::model::LinearModes, reduction| {
         let all = modes.elastic.iter().take(most).enumerate();
         found.extend(all.map(|(mode, one)| NaturalFrequency { state, diameter, mode, omega: one.omega, reduction }));
     };

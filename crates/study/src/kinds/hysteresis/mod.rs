@@ -24,7 +24,7 @@ use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{ValueType, default, optional};
 use std::collections::BTreeSet;
 use stickslip::dimension::Dimension;
-use stickslip::law::MOST_DIRECTIONS;
+use stickslip::law::MAX_DIRECTIONS;
 use stickslip::model::{Axis as Along, Model};
 use stickslip::orbit::{Orbit, Sample};
 use stickslip_numerics::quadrature::GAUSS_5;
@@ -69,7 +69,7 @@ pub(super) const KIND: Kind = Kind {
 fn cost(inputs: &CostInputs<'_>) -> Cost {
     let (values, points) = (&inputs.case.values, inputs.points());
     let loops = match values.names("loop") {
-        _ if values.flag("sum") == Some(true) => MOST_DIRECTIONS as f64,
+        _ if values.flag("sum") == Some(true) => MAX_DIRECTIONS as f64,
         None if inputs.joints == 0.0 => inputs.case.model.motions.len() as f64,
         _ => requested_loops(values, &inputs.case.model).len() as f64,
     };
@@ -158,9 +158,9 @@ impl LoopSource {
                 let (first, axis) = joints[0];
                 (sample.joints[first].displacement[axis], force)
             }
-            ForceSource::Moved(m) => sample.moved[*m],
+            ForceSource::Moved(m) => sample.imposed[*m],
         };
-        (self.against.as_ref().map_or(displacement, |place| place.along(&sample.displacement)), force)
+        (self.against.as_ref().map_or(displacement, |place| place.component(&sample.displacement)), force)
     }
 }
 
@@ -211,7 +211,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 fn sources(prepared: &PreparedCase) -> Vec<(String, LoopSource)> {
     let (system, values) = (&prepared.system, &prepared.case.values);
     let against = values.text("against").and_then(|name| system.places().iter().position(|place| place == name));
-    let against = against.map(|place| system.seen()[place].clone());
+    let against = against.map(|place| system.place_axes()[place].clone());
     let axes: Vec<(String, (usize, usize))> = system
         .joints()
         .iter()
@@ -220,7 +220,7 @@ fn sources(prepared: &PreparedCase) -> Vec<(String, LoopSource)> {
         .collect();
     let mut names = requested_loops(values, &prepared.case.model);
     if names.is_empty() {
-        let moved = system.moved().iter().filter(|place| !prepared.case.model.is_rotation(&place.name));
+        let moved = system.moved_places().iter().filter(|place| !prepared.case.model.is_rotation(&place.name));
         names = moved.map(|place| place.name.clone()).collect();
     }
     let joint = |name: &String| axes.iter().find(|(label, _)| label == name).map(|(_, at)| *at);
@@ -243,7 +243,7 @@ fn sources(prepared: &PreparedCase) -> Vec<(String, LoopSource)> {
     }
     let find = |name: &String| {
         let joint = joint(name).map(|joint| ForceSource::Joints(vec![joint]));
-        joint.or_else(|| system.moved().iter().position(|place| place.name == *name).map(ForceSource::Moved))
+        joint.or_else(|| system.moved_places().iter().position(|place| place.name == *name).map(ForceSource::Moved))
     };
     names
         .iter()
@@ -271,7 +271,7 @@ fn exact_loss(prepared: &PreparedCase, orbit: &Orbit, source: &LoopSource) -> Op
             None
         }
         ForceSource::Joints(joints) => Some(joints.iter().map(|(j, _)| orbit.joints[*j].dissipation).sum()),
-        ForceSource::Moved(_) if prepared.system.moved().len() == 1 && prepared.case.model.forces.is_empty() => {
+        ForceSource::Moved(_) if prepared.system.moved_places().len() == 1 && prepared.case.model.forces.is_empty() => {
             Some(orbit.energy.work_in)
         }
         ForceSource::Moved(_) => None,

@@ -16,7 +16,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let displacements: Vec<String> = system
         .places()
         .iter()
-        .zip(system.seen())
+        .zip(system.place_axes())
         .filter(|(_, a)| !a.is_rotation())
         .map(|(name, _)| name.clone())
         .collect();

@@ -14,7 +14,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::prefixed_unit;
 use crate::syntax::key::{Bounds, Key, ValueType, default, required};
-use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, mode, unit};
+use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, nonlinear_mode, unit_amplitude};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -108,7 +108,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let mut part = UnitResult::default();
-    let unit = unit(&prepared.system, number(prepared)).map_err(|error| (prepared.case.index, error))?;
+    let unit = unit_amplitude(&prepared.system, number(prepared)).map_err(|error| (prepared.case.index, error))?;
     let Some(unit) = unit else {
         (work.context.finished)();
         part.count(|| location_of(prepared), "failed", Some(NO_SUCH_MODE.to_owned()));
@@ -126,14 +126,15 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let reduction = prepared.system.reduction_evidence();
     for point in &mode.points {
         // the values jump at a turning point of the curve
-        stretch += u64::from(mode.turns.iter().any(|turn| before < turn.at && turn.at <= point.amplitude));
+        stretch +=
+            u64::from(mode.turns.iter().any(|turn| before < turn.amplitude && turn.amplitude <= point.amplitude));
         before = point.amplitude;
         rows.varied(&prepared.case);
         rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
         rows.number("frequency_Hz", hertz(point.omega));
         rows.number("damping_ratio", point.damping);
         let motions = point.places.iter().zip(&point.amplitudes).zip(point.phases());
-        let places = prepared.system.places().iter().zip(prepared.system.seen());
+        let places = prepared.system.places().iter().zip(prepared.system.place_axes());
         for ((place, along), ((x, amplitude), phase)) in places.zip(motions) {
             rows.number(&amplitude_in(place, along.unit()), *amplitude);
             rows.number(&first_harmonic_in(place, along.unit()), x.norm());
@@ -145,7 +146,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     }
     summary.varied(&prepared.case);
     let end = |point: Option<&ModePoint>| point.map_or(f64::NAN, |point| hertz(point.omega));
-    summary.number("small_end_frequency_Hz", end(mode.points.first().filter(|_| mode.lost.is_none())));
+    summary.number("small_end_frequency_Hz", end(mode.points.first().filter(|_| mode.ended.is_none())));
     summary.number("large_end_frequency_Hz", end(mode.points.last()));
     let largest = mode.largest.as_ref();
     summary.number("largest_damping_ratio", largest.map_or(f64::NAN, |point| point.damping));
@@ -174,7 +175,7 @@ fn follow(prepared: &PreparedCase, unit: f64) -> Result<Mode, MethodError> {
     let values = &prepared.case.values;
     let range = values.table("amplitude");
     let end = |key: &str| range.and_then(|t| t.quantity(key)).unwrap_or(0.0) * unit;
-    mode(
+    nonlinear_mode(
         &prepared.system,
         ModeRequest {
             mode: number(prepared),
@@ -203,16 +204,16 @@ fn amplitude(unit: f64, modal: f64) -> String {
 /// Returns the status of a mode, and the reason if it is incomplete or uncertain.
 fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     let words = |modal: f64| amplitude(unit, modal);
-    if let Some(lost) = mode.lost {
+    if let Some(lost) = mode.ended {
         let from = if lost.at.is_finite() { format!("stopped at {}: ", words(lost.at)) } else { String::new() };
         return ("lost", Some(format!("{from}{}", lost.reason)));
     }
-    if let Some(at) = mode.missing.first() {
-        let more = mode.missing.len() - 1;
+    if let Some(at) = mode.not_found.first() {
+        let more = mode.not_found.len() - 1;
         let others = if more == 0 { String::new() } else { format!(" and {more} more amplitudes") };
         return ("incomplete", Some(format!("no solution found at {}{others}; use more harmonics", words(*at))));
     }
-    if let Some(at) = mode.merges.first() {
+    if let Some(at) = mode.coalescences.first() {
         let reason = format!(
             "at {} the mode nearly merges with another mode; below this amplitude, small changes (such as the number \
              of harmonics) decide which of the two is followed; compare another number of harmonics, and the other \
@@ -237,12 +238,12 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
             format!(
                 "the curve turns at {} and again at {}. Between these amplitudes the mode has several solutions; \
                  below the first amplitude the values jump.",
-                amplitude(unit, turn.at),
-                amplitude(unit, turn.up)
+                amplitude(unit, turn.amplitude),
+                amplitude(unit, turn.return_amplitude)
             )
         })
         .collect();
-    if mode.travels {
+    if mode.is_travelling_wave {
         let text = "two modes have this frequency, and any combination of them is a mode while the joints stick. The \
             travelling wave is computed: equal places of all sectors have equal amplitudes with a phase shift. The \
             other mode is the wave in the opposite direction. Standing waves slip differently.";

@@ -87,7 +87,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         summary.varied(&prepared.case);
         summary.number("frequency_Hz", hertz(omega));
         let mut row = PointRow::with_stability(prepared, &orbit, stable);
-        if orbit.start.len() <= MAX_CHECKED_STATES {
+        if orbit.initial_state.len() <= MAX_CHECKED_STATES {
             row.return_defect = orbit.return_defect().unwrap_or(f64::NAN);
         }
         row.write(prepared, &mut summary);
@@ -129,7 +129,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
 ///
 /// It covers orbits with half-period symmetry; [`Note::StuckOffset`] covers the others.
 fn continuum_note(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
-    (orbit.is_one_of_many() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
+    (orbit.is_in_continuum() && orbit.symmetry == Symmetry::HalfPeriod).then(|| {
         let stuck = orbit.evidence.stuck.join(", ");
         let text =
             format!("permanently stuck: {stuck}; the orbit is one of a continuum, and the symmetric orbit is shown.");
@@ -140,10 +140,10 @@ fn continuum_note(prepared: &PreparedCase, orbit: &Orbit) -> Option<Note> {
 /// Writes the cells of one instant.
 pub(super) fn write_sample(prepared: &PreparedCase, sample: &Sample, rows: &mut TableBuilder) {
     let system = &prepared.system;
-    for (place, along) in system.places().iter().zip(system.seen()) {
+    for (place, along) in system.places().iter().zip(system.place_axes()) {
         let (what, unit) = if along.is_rotation() { ("rotation", "rad") } else { ("displacement", "m") };
-        rows.number(&format!("{place}_{what}_{unit}"), along.along(&sample.displacement));
-        rows.number(&format!("{place}_velocity_{unit}_per_s"), along.along(&sample.velocity));
+        rows.number(&format!("{place}_{what}_{unit}"), along.component(&sample.displacement));
+        rows.number(&format!("{place}_velocity_{unit}_per_s"), along.component(&sample.velocity));
     }
     for (joint, state) in prepared.system.joints().iter().zip(&sample.joints) {
         for (a, label) in joint.labels().enumerate() {

@@ -20,9 +20,9 @@ use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVER
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use stickslip::curve::both_ways;
-use stickslip::curve::peak::held;
-use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, Row};
+use stickslip::curve::bidirectional_sweep;
+use stickslip::curve::peak::held_amplitude;
+use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, PerformanceRow};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 use stickslip::model::Model;
@@ -53,7 +53,7 @@ const OPTIMUM: f64 = 35.0;
 
 fn cost(inputs: &CostInputs<'_>) -> Cost {
     let (cases, curves) = (inputs.cases, inputs.curves());
-    let reverse_sweeps = f64::from(u8::from(both_ways::is_followed(inputs.system())));
+    let reverse_sweeps = f64::from(u8::from(bidirectional_sweep::is_followed(inputs.system())));
     let peak = inputs.frequencies * inputs.orbit()
         + (reverse_sweeps * inputs.frequencies + ORBITS_PER_PEAK) * inputs.unchecked_orbit();
     let tried = if inputs.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
@@ -101,7 +101,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     for (&case, row) in listed {
         let prepared = &work.cases[case];
         let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
-        let reason = || match row.peak.and_then(|peak| peak.unsettled) {
+        let reason = || match row.peak.and_then(|peak| peak.unresolved) {
             Some(why) => why.to_string(),
             None => format!("{} of the orbits on the frequency grid did not converge", row.failed),
         };
@@ -118,8 +118,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
         rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
-        if both_ways::is_followed(&prepared.system) {
-            rows.flag(REVERSE_SWEEP, row.peak.map(|_| row.way_back));
+        if bidirectional_sweep::is_followed(&prepared.system) {
+            rows.flag(REVERSE_SWEEP, row.peak.map(|_| row.reverse_sweep_only));
         }
         rows.integer(tables::FAILED, row.failed as u64);
         rows.reduction_error(prepared.system.reduction_evidence());
@@ -171,7 +171,7 @@ fn no_optimum(work: &UnitTask<'_>, curve: &PerformanceCurve, parameter: &str, or
 }
 
 /// Returns the status of the orbits that support a peak.
-fn status(row: &Row) -> &'static str {
+fn status(row: &PerformanceRow) -> &'static str {
     match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
         (true, _) => "some-failed",
         (false, 0) => CONVERGED,
@@ -201,7 +201,7 @@ fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, Method
         range,
         points: frequencies.len(),
         quantities: &|orbit| {
-            let held = held(&first.system, orbit.omega);
+            let held = held_amplitude(&first.system, orbit.omega);
             let amplitudes = places.iter().map(|place| orbit.places[*place].amplitude());
             amplitudes.map(|amplitude| if amplitude > held { amplitude } else { 0.0 }).collect()
         },

@@ -15,8 +15,8 @@ use crate::results::histogram;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::UnitTask;
 use crate::syntax::key::{Key, ValueType, default};
-use stickslip::curve::adaptive::Adaptive;
-use stickslip::curve::peak::{self, Peak, Point};
+use stickslip::curve::adaptive::AdaptiveCurve;
+use stickslip::curve::peak::{self, CurvePoint, Peak};
 use stickslip::method::advised;
 use stickslip::model::Model;
 use stickslip::orbit::Orbit;
@@ -87,9 +87,9 @@ fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
     }
     let quantities = |orbit: &Orbit| vec![largest_amplitude(orbit, &places)];
     let method = &*prepared.method;
-    let points: Vec<Point> = match &case.frequencies {
+    let points: Vec<CurvePoint> = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
-            let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
+            let adaptive = AdaptiveCurve { range: (*from, *to), tolerance: *tolerance };
             let stop = || work.context.stopped();
             let curve =
                 adaptive.curve(method, &system, &quantities, &|_| (), &stop).map_err(|error| error.to_string())?;
@@ -97,20 +97,22 @@ fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
         }
         _ => {
             let mut solver = advised(method, &system).map_err(|error| error.to_string())?;
-            let mut points: Vec<Point> = Vec::new();
+            let mut points: Vec<CurvePoint> = Vec::new();
             for index in work.points.clone().take_while(|_| !work.context.stopped()) {
                 let start = points.last().and_then(|point| point.start.as_deref());
                 let found = solver.orbit(work.omega(index), start);
-                points.push(
-                    found.map_or_else(|_| Point::failed(work.omega(index)), |orbit| Point::new(&orbit, &quantities)),
-                );
+                points.push(found.map_or_else(
+                    |_| CurvePoint::failed(work.omega(index)),
+                    |orbit| CurvePoint::new(&orbit, &quantities),
+                ));
             }
             points
         }
     };
-    let inner = peak::all(method, &system, &points, 1, &quantities).map_err(|error| error.to_string())?;
-    let end =
-        |point: &Point| Some(Peak { omega: point.omega, value: *point.values.first()?, at_end: true, unsettled: None });
+    let inner = peak::local_peaks(method, &system, &points, 1, &quantities).map_err(|error| error.to_string())?;
+    let end = |point: &CurvePoint| {
+        Some(Peak { omega: point.omega, value: *point.values.first()?, at_end: true, unresolved: None })
+    };
     let ends = [points.first(), points.last()].into_iter().flatten().filter_map(end);
     Ok(inner.into_iter().map(|peak| peak.peak).chain(ends).max_by(|a, b| a.value.total_cmp(&b.value)))
 }

@@ -38,9 +38,9 @@ use crate::syntax::key::{Key, ValueType, default};
 use figure_data::MAX_SINGLE_PLACES;
 use peaks::{FoundPeak, PeakQuantities};
 use references::{REFERENCE_POINTS, references};
-use stickslip::curve::adaptive::Adaptive;
-use stickslip::curve::both_ways::{self, BothWays, Other};
-use stickslip::curve::peak::Point;
+use stickslip::curve::adaptive::AdaptiveCurve;
+use stickslip::curve::bidirectional_sweep::{self, BidirectionalSweep, OtherOrbit};
+use stickslip::curve::peak::CurvePoint;
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, OrbitError, advised};
 use stickslip::orbit::Orbit;
@@ -137,7 +137,7 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
         Some(_) => peaks,
         None => 0.0,
     };
-    let reverse_points = if both_ways::is_followed(inputs.system()) { points } else { 0.0 };
+    let reverse_points = if bidirectional_sweep::is_followed(inputs.system()) { points } else { 0.0 };
     let curves = inputs.cases.min(MAX_CURVES as f64) * inputs.places.min(MAX_PANELS as f64 + MAX_SINGLE_PLACES as f64);
     Cost {
         tables: vec![
@@ -181,7 +181,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut builder = ResponseBuilder::new(prepared);
     let found = match &case.frequencies {
         Some(Frequencies::Adaptive { from, to, tolerance }) => {
-            let adaptive = Adaptive { range: (*from, *to), tolerance: *tolerance };
+            let adaptive = AdaptiveCurve { range: (*from, *to), tolerance: *tolerance };
             sweep_adaptive(work, adaptive, &mut builder)
         }
         _ => sweep_given(work, &mut builder),
@@ -196,7 +196,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let mut peaks = TableBuilder::default();
         let all = peaks::all(work, points, &others).map_err(|error| (case.index, error))?;
         for found in &all {
-            if let Some(why) = found.peak.unsettled {
+            if let Some(why) = found.peak.unresolved {
                 let location = || {
                     format!(
                         "peak of {}, {}",
@@ -211,7 +211,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             peaks.number(DRIVE, hertz(found.peak.omega));
             peaks.number(AMPLITUDE, found.peak.value);
             peaks.flag(AT_RANGE_END, Some(found.peak.at_end));
-            if both_ways::is_followed(&prepared.system) {
+            if bidirectional_sweep::is_followed(&prepared.system) {
                 peaks.flag(REVERSE_SWEEP, Some(found.reverse_sweep));
             }
             peaks.reduction_error(prepared.system.reduction_evidence());
@@ -252,7 +252,7 @@ fn orbit_row(prepared: &PreparedCase, omega: f64, summary: &PointRow, rows: &mut
 fn shape(prepared: &PreparedCase, found: &FoundPeak, rows: &mut TableBuilder) {
     rows.varied(&prepared.case);
     rows.number(DRIVE, hertz(found.peak.omega));
-    let places = prepared.system.places().iter().zip(prepared.system.seen());
+    let places = prepared.system.places().iter().zip(prepared.system.place_axes());
     for ((place, along), of) in places.zip(found.shape.chunks_exact(2)) {
         rows.number(&amplitude_in(place, along.unit()), of[0]);
         rows.number(&phase_of(place), of[1]);
@@ -299,15 +299,19 @@ impl<'a> ResponseBuilder<'a> {
 
     /// Adds the other orbits that the reverse sweep finds, and returns them as points for the
     /// peak search.
-    fn compare(&mut self, work: &UnitTask<'_>, ways: Option<BothWays>) -> Result<Vec<Point>, MethodError> {
+    fn compare(
+        &mut self,
+        work: &UnitTask<'_>,
+        ways: Option<BidirectionalSweep>,
+    ) -> Result<Vec<CurvePoint>, MethodError> {
         let Some(ways) = ways else { return Ok(Vec::new()) };
         let (prepared, sought) = (self.prepared, PeakQuantities::new(self.prepared));
-        let others = ways.others(&*prepared.method, &prepared.system, &work.context.stop)?;
-        let points = others.iter().map(|Other { orbit, ratio }| {
+        let others = ways.reverse_sweep(&*prepared.method, &prepared.system, &work.context.stop)?;
+        let points = others.iter().map(|OtherOrbit { orbit, ratio }| {
             let note = Note::OtherOrbit { points: 1, from: orbit.omega, to: orbit.omega, ratios: [*ratio; 2] };
             note.merge_into(&mut self.part.notes);
             orbit_row(prepared, orbit.omega, &PointRow::new(prepared, Ok(orbit)), &mut self.reverse_sweep);
-            Point::new(orbit, &|orbit| sought.quantities(orbit))
+            CurvePoint::new(orbit, &|orbit| sought.quantities(orbit))
         });
         Ok(points.collect())
     }
@@ -322,21 +326,21 @@ fn summary_and_notes(prepared: &PreparedCase, outcome: Result<&Orbit, &OrbitErro
 }
 
 /// The points for the peak search, if requested, and the other points of the reverse sweep.
-type SweepPoints = (Vec<Point>, Vec<Point>);
+type SweepPoints = (Vec<CurvePoint>, Vec<CurvePoint>);
 
 /// Computes the points at the frequencies of the unit.
 fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
     let wanted = wants_peaks(work);
     let sought = PeakQuantities::new(prepared);
-    let point = |orbit: &Orbit| Point::new(orbit, &|orbit| sought.quantities(orbit));
+    let point = |orbit: &Orbit| CurvePoint::new(orbit, &|orbit| sought.quantities(orbit));
     let mut points = Vec::new();
-    let mut ways = BothWays::of(&prepared.system);
+    let mut ways = BidirectionalSweep::for_system(&prepared.system);
     orbit_sweep::sweep(work, &mut |omega, outcome| {
         builder.add(omega, outcome.map(|outcome| summary_and_notes(prepared, outcome)));
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {
-            points.push(outcome.map_or_else(|_| Point::failed(omega), point));
+            points.push(outcome.map_or_else(|_| CurvePoint::failed(omega), point));
         }
     })?;
     let others = builder.compare(work, ways)?;
@@ -349,7 +353,7 @@ fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result
     let mut solver = advised(&*prepared.method, &prepared.system)?;
     let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
         Ok(orbit) => point(&orbit),
-        Err(_) => Point::failed(work.omega(index)),
+        Err(_) => CurvePoint::failed(work.omega(index)),
     };
     if work.points.start > 0 {
         let before = near(work.points.start - 1, points[0].start.as_deref());
@@ -365,7 +369,7 @@ fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result
 /// Computes the points of a curve with adaptive frequencies.
 fn sweep_adaptive(
     work: &UnitTask<'_>,
-    adaptive: Adaptive,
+    adaptive: AdaptiveCurve,
     builder: &mut ResponseBuilder<'_>,
 ) -> Result<SweepPoints, MethodError> {
     let prepared = work.case();
@@ -382,12 +386,12 @@ fn sweep_adaptive(
         builder.add(adaptive.range.1, None);
     }
     let mut points = Vec::with_capacity(curve.len());
-    let mut ways = BothWays::of(&prepared.system);
+    let mut ways = BidirectionalSweep::for_system(&prepared.system);
     for (mut point, (kept, shape)) in curve {
         if let Some(ways) = &mut ways {
-            let places = kept.0.places.iter().zip(prepared.system.seen());
-            let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length());
-            ways.add_point(Point { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
+            let places = kept.0.places.iter().zip(prepared.system.place_axes());
+            let amplitudes = places.map(|([amplitude, ..], along)| amplitude * along.length_scale());
+            ways.add_point(CurvePoint { values: amplitudes.filter(|a| a.is_finite()).collect(), ..point.clone() });
         }
         builder.add(point.omega, Some(kept));
         point.values.extend(shape);

@@ -82,8 +82,8 @@ impl FigureData<'_> {
         panel.series.extend(self.failed_points(case_rows, 1, FAILED_POINT_COLOUR));
         if self.draws_each_place() {
             // the mass is known only for a place that is one row of the structure
-            let mass = |place: usize| match self.system.seen()[place].rows() {
-                [(row, _)] => self.system.structure().own_mass(*row),
+            let mass = |place: usize| match self.system.place_axes()[place].rows() {
+                [(row, _)] => self.system.structure().diagonal_mass(*row),
                 _ => f64::INFINITY,
             };
             let places = 0..self.system.places().len();

@@ -2,8 +2,8 @@
 
 use crate::kinds::shared::peak_of::{largest_amplitude, named_places};
 use crate::run::work::{PreparedCase, UnitTask};
-use stickslip::curve::both_ways::stretches;
-use stickslip::curve::peak::{self, Peak, Point, held};
+use stickslip::curve::bidirectional_sweep::other_intervals;
+use stickslip::curve::peak::{self, CurvePoint, Peak, held_amplitude};
 use stickslip::method::MethodError;
 use stickslip::model::System;
 use stickslip::orbit::{Orbit, PlaceMotion};
@@ -46,7 +46,7 @@ impl PeakQuantities {
         let Self { named, .. } = self;
         if named.is_empty() {
             // rotations have no peaks, because they are not lengths
-            let height = |place: &PlaceMotion| if place.radius.is_some() { 0.0 } else { place.amplitude() };
+            let height = |place: &PlaceMotion| if place.rotation_radius.is_some() { 0.0 } else { place.amplitude() };
             return orbit.places.iter().map(height).collect();
         }
         std::iter::once(largest_amplitude(orbit, named))
@@ -98,7 +98,7 @@ pub(super) struct FoundPeak {
 impl FoundPeak {
     /// Returns true if no place moves more at the peak; the first of equal places counts.
     pub(super) fn is_largest(&self, system: &System) -> bool {
-        let amplitudes = self.shape.iter().step_by(2).zip(system.seen());
+        let amplitudes = self.shape.iter().step_by(2).zip(system.place_axes());
         first_largest(amplitudes.map(|(amplitude, place)| if place.is_rotation() { 0.0 } else { *amplitude }))
             == Some(self.mass)
     }
@@ -106,9 +106,13 @@ impl FoundPeak {
 
 /// Returns the peaks of both sweeps by frequency; `others` are the other orbits of the reverse
 /// sweep.
-pub(super) fn all(work: &UnitTask<'_>, points: Vec<Point>, others: &[Point]) -> Result<Vec<FoundPeak>, MethodError> {
+pub(super) fn all(
+    work: &UnitTask<'_>,
+    points: Vec<CurvePoint>,
+    others: &[CurvePoint],
+) -> Result<Vec<FoundPeak>, MethodError> {
     let mut reverse_peaks = Vec::new();
-    for interval in stretches(&points, others) {
+    for interval in other_intervals(&points, others) {
         let known = |omega: f64| others.iter().any(|other| other.omega == omega);
         let neighbours: Vec<f64> = interval.iter().map(|point| point.omega).filter(|omega| !known(*omega)).collect();
         let found = peaks_of(work, interval)?.into_iter().filter(|found| !neighbours.contains(&found.peak.omega));
@@ -145,18 +149,23 @@ fn is_same_peak(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
 ///
 /// The nearest frequency decides: the peak must be closer to the orbit of the forward sweep
 /// than to that of the reverse sweep, and not higher.
-fn is_jump_to_forward(found: &FoundPeak, points: &[Point], others: &[Point], sought: &PeakQuantities) -> bool {
-    let distance = |point: &&Point| (point.omega - found.peak.omega).abs();
+fn is_jump_to_forward(
+    found: &FoundPeak,
+    points: &[CurvePoint],
+    others: &[CurvePoint],
+    sought: &PeakQuantities,
+) -> bool {
+    let distance = |point: &&CurvePoint| (point.omega - found.peak.omega).abs();
     let Some(own) = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return false };
     let there = points.iter().find(|point| point.omega == own.omega);
-    let value = |point: &Point| point.values.get(sought.quantity(found)).copied();
+    let value = |point: &CurvePoint| point.values.get(sought.quantity(found)).copied();
     let (Some(there), Some(own)) = (there.and_then(value), value(own)) else { return false };
     there >= found.peak.value && there - found.peak.value < (own - found.peak.value).abs()
 }
 
 /// Returns true if a peak is only the jump of the forward sweep to a branch on which the
 /// reverse sweep reaches a higher amplitude.
-fn is_jump_to_branch(found: &FoundPeak, omegas: &[f64], others: &[Point], sought: &PeakQuantities) -> bool {
+fn is_jump_to_branch(found: &FoundPeak, omegas: &[f64], others: &[CurvePoint], sought: &PeakQuantities) -> bool {
     let quantity = sought.quantity(found);
     let Some(other) = others.iter().rfind(|other| other.omega < found.peak.omega) else { return false };
     let next = omegas.iter().find(|omega| **omega > other.omega);
@@ -167,7 +176,7 @@ fn is_jump_to_branch(found: &FoundPeak, omegas: &[f64], others: &[Point], sought
 /// Returns the peaks of a range of a curve by frequency.
 ///
 /// An end of the whole curve is a peak at the range end if the curve falls from it.
-fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, MethodError> {
+fn peaks_of(work: &UnitTask<'_>, points: Vec<CurvePoint>) -> Result<Vec<FoundPeak>, MethodError> {
     let prepared = work.case();
     let sought = PeakQuantities::new(prepared);
     let count = sought.amplitudes_count();
@@ -177,12 +186,12 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
         .as_ref()
         .map_or((0.0, 0.0), |f| (f.get(0).unwrap_or(0.0), f.get(f.len() - 1).unwrap_or(0.0)));
     let wanted = if sought.named.is_empty() { count } else { 1 };
-    let at_end = |end: &Point, neighbour: &Point| -> Vec<FoundPeak> {
+    let at_end = |end: &CurvePoint, neighbour: &CurvePoint| -> Vec<FoundPeak> {
         let falls = |q: &usize| neighbour.values.get(*q).is_some_and(|value| end.values[*q] > *value);
         (0..wanted.min(end.values.len()))
             .filter(falls)
             .map(|q| {
-                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unsettled: None };
+                let peak = Peak { omega: end.omega, value: end.values[q], at_end: true, unresolved: None };
                 FoundPeak { mass: sought.mass(q, &end.values), peak, shape: Vec::new(), reverse_sweep: false }
             })
             .collect()
@@ -200,9 +209,9 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
     }
     // the amplitude of a place held by friction is rounding only
     let largest = points.iter().flat_map(|point| point.values.iter().take(count)).fold(0.0f64, |a, b| a.max(*b));
-    let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held(&prepared.system, peak.omega));
+    let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held_amplitude(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
-    let mut inner = peak::all(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
+    let mut inner = peak::local_peaks(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
     inner.retain(|found| !is_end_of_plateau(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
@@ -214,9 +223,9 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<Point>) -> Result<Vec<FoundPeak>, M
 /// Returns true if a peak is only the end of a level range.
 ///
 /// An example is a mass that moves with its support until a joint slips.
-fn is_end_of_plateau(points: &[Point], quantity: usize, peak: &Peak) -> bool {
+fn is_end_of_plateau(points: &[CurvePoint], quantity: usize, peak: &Peak) -> bool {
     let index = points.partition_point(|point| point.omega < peak.omega);
-    let as_high = |point: &Point| {
+    let as_high = |point: &CurvePoint| {
         point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL_TOLERANCE * peak.value)
     };
     index >= 2 && points[index - 2..index].iter().all(as_high)

@@ -83,7 +83,8 @@ pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, 
         rows.varied(&prepared.case);
         rows.number(DRIVE, hertz(*omega));
         for (what, curve) in &curves {
-            for (place, (name, along)) in prepared.system.places().iter().zip(prepared.system.seen()).enumerate() {
+            for (place, (name, along)) in prepared.system.places().iter().zip(prepared.system.place_axes()).enumerate()
+            {
                 let point = curve.as_ref().and_then(|curve| curve[i].as_ref());
                 let amplitude = point.map_or(f64::NAN, |amplitudes| amplitudes[place]);
                 rows.number(&amplitude_in(&format!("{name}_{what}"), along.unit()), amplitude);

@@ -99,7 +99,7 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, Re
     let frequency = curve.numbers(FREQUENCY)?;
     let system = study.case(0).ok().and_then(|case| case.model.assemble().ok());
     let system = system.ok_or_else(|| curve.foreign_rows())?;
-    let displacements = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
+    let displacements = system.places().iter().zip(system.place_axes()).filter(|(_, along)| !along.is_rotation());
     let places: Vec<String> = displacements.map(|(place, _)| place.clone()).collect();
     let amplitudes =
         places.iter().map(|place| curve.numbers(&amplitude_of(place))).collect::<Result<Vec<&[f64]>, _>>()?;

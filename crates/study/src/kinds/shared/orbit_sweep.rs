@@ -4,7 +4,7 @@ use crate::case::study::{Case, Study};
 use crate::results::notes::Note;
 use crate::run::point_row::describe_location;
 use crate::run::work::{NOT_REACHED, UnitResult, UnitSize, UnitTask};
-use stickslip::curve::sweep::{See, Watch, solver, stretch};
+use stickslip::curve::sweep::{Observer, Watch, solve_sequence, solver};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
 
@@ -24,11 +24,11 @@ pub(in crate::kinds) fn grain(study: &Study) -> UnitSize {
 /// Solves the frequencies of a unit of one case, each with a warm start from the previous one.
 ///
 /// `see` receives each outcome immediately.
-pub(in crate::kinds) fn sweep(work: &UnitTask<'_>, see: &mut See<'_>) -> Result<(), MethodError> {
+pub(in crate::kinds) fn sweep(work: &UnitTask<'_>, see: &mut Observer<'_>) -> Result<(), MethodError> {
     let prepared = work.case();
     let watch = Watch { finished: &*work.context.finished, stop: &work.context.stop };
     let mut omegas = work.points.clone().map(|index| work.omega(index));
-    stretch(&mut *solver(&*prepared.method, &prepared.system)?, &mut omegas, watch, see);
+    solve_sequence(&mut *solver(&*prepared.method, &prepared.system)?, &mut omegas, watch, see);
     Ok(())
 }
 
@@ -93,7 +93,7 @@ fn count_missing(part: &mut UnitResult, case: &Case, omega: f64, point: Option<&
 pub(in crate::kinds) fn times(orbit: &Orbit, samples: usize) -> Vec<f64> {
     let period = orbit.period();
     let mut times: Vec<f64> = (0..=samples).map(|i| period * i as f64 / samples as f64).collect();
-    times.extend(orbit.switch_times());
+    times.extend(orbit.transition_times());
     times.sort_by(f64::total_cmp);
     // a switch at an instant of the grid is kept once
     times.dedup_by(|a, b| (*a - *b).abs() <= 1e-12 * period);

@@ -62,7 +62,7 @@ pub(in crate::kinds) fn peak_places(prepared: &PreparedCase) -> Vec<usize> {
 
 /// Returns the places that are not rotations.
 pub(in crate::kinds) fn displacements(system: &System) -> Vec<usize> {
-    let seen = system.seen().iter().enumerate();
+    let seen = system.place_axes().iter().enumerate();
     seen.filter(|(_, place)| !place.is_rotation()).map(|(place, _)| place).collect()
 }
 

@@ -43,7 +43,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         // draws in one panel share one unit
         let scope = if drawing.study.draws().is_some() { 0..motion.rows() } else { rows.clone() };
         let shown = drawing.displacements(&system);
-        let places = system.places().iter().zip(system.seen()).filter(|(_, along)| !along.is_rotation());
+        let places = system.places().iter().zip(system.place_axes()).filter(|(_, along)| !along.is_rotation());
         let all = places.flat_map(|(place, _)| numbers(motion, &column(place), scope.clone()));
         let highest = all.map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max);
         let (y, factor) = drawing.axis(1, "displacement", highest, "m");

@@ -263,8 +263,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             sampled = true;
             // the turning points are located exactly only for the place that moves most
             let most = largest_range(&decays).filter(|_| excitation == Excitation::Free);
-            for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.seen()).enumerate() {
-                let motion_along = |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.along(x));
+            for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.place_axes()).enumerate() {
+                let motion_along =
+                    |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.component(x));
                 let [x, v] = motion_along(sample);
                 let motion = |time: f64| motion_along(&since(time));
                 decay.add([time, x, v], (Some(i) == most).then_some(&motion as &PlaceMotionFn<'_>));
@@ -276,7 +277,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             !stopped
         });
         // a motion without a sample has no largest displacement
-        let displacements = prepared.system.seen().iter().map(|along| !along.is_rotation());
+        let displacements = prepared.system.place_axes().iter().map(|along| !along.is_rotation());
         let places = prepared.system.places().iter().zip(largest).zip(displacements).filter(|(_, counts)| *counts);
         for (place, (displacement, time)) in places.map(|(of, _)| of).filter(|_| sampled) {
             extremes.varied(case);
@@ -330,7 +331,7 @@ fn write_decay(
     rows: &mut TableBuilder,
     summary: &mut TableBuilder,
 ) -> Option<&'static str> {
-    let displacements = (0..decays.len()).filter(|place| !prepared.system.seen()[*place].is_rotation());
+    let displacements = (0..decays.len()).filter(|place| !prepared.system.place_axes()[*place].is_rotation());
     let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {

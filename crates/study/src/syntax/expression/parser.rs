@@ -224,7 +224,7 @@ impl Parser<'_> {
             || (self.constant)(name).is_some()
             || self.text[end..].trim_start().starts_with('^');
         let unit = units::find(name).filter(|_| !taken)?;
-        Some((unit, unit.dimension.to_the(-1.0)?, end))
+        Some((unit, unit.dimension.pow(-1.0)?, end))
     }
 
     fn name(&mut self) -> Result<(), TextError> {

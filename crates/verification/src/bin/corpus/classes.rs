@@ -9,7 +9,7 @@ use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::{Method, Options, Solver};
 use stickslip::model::System;
 use stickslip::orbit::{Orbit, OrbitError};
-use stickslip_study::dataset::{Column, Table, CellValues};
+use stickslip_study::dataset::{CellValues, Column, Table};
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::{Study, read_file, read_study};
 use stickslip_verification::loose_dampers::loose_damper;
@@ -146,7 +146,7 @@ fn points(name: &str, system: &System, solver: &mut dyn Solver, rates: &[f64]) -
         .iter()
         .map(|omega| {
             let found = solver.orbit(*omega, start.as_deref());
-            start = found.as_ref().ok().map(|orbit| orbit.start.clone());
+            start = found.as_ref().ok().map(|orbit| orbit.initial_state.clone());
             found
         })
         .collect();
@@ -161,7 +161,7 @@ fn points(name: &str, system: &System, solver: &mut dyn Solver, rates: &[f64]) -
     for place in 0..system.places().len() {
         columns.push(number(format!("amplitude_{place}_m"), &|orbit| orbit.places[place].amplitude()));
     }
-    columns.push(number("truncation".to_owned(), &|orbit| orbit.evidence.truncation.unwrap_or(f64::NAN)));
+    columns.push(number("truncation".to_owned(), &|orbit| orbit.evidence.error_estimate.unwrap_or(f64::NAN)));
     let iterations = |found: &Result<Orbit, OrbitError>| found.as_ref().map_or(0, |o| o.evidence.iterations as u64);
     columns.push(Column {
         name: "iterations".to_owned(),

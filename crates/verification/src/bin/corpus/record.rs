@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use stickslip_study::dataset::{Table, CellValues};
+use stickslip_study::dataset::{CellValues, Table};
 
 /// Name of the file with the reason why an item has no tables.
 pub const REFUSED: &str = "refused.txt";

@@ -54,7 +54,7 @@ impl Level {
             }
             for q in 0..ports.count() {
                 let axis = ports.axis(system, q);
-                self.linear[q * nh + k] = axis.along_complex(&free) + axis.imposed_at(h as u32);
+                self.linear[q * nh + k] = axis.complex_component(&free) + axis.imposed_at(h as u32);
             }
             self.free.push(free);
         }
@@ -138,7 +138,7 @@ impl Level {
                         continue; // rigid friction without motion
                     }
                     let axis = ports.axis(system, q);
-                    let moved = axis.along_complex(x) + axis.imposed_at(h as u32);
+                    let moved = axis.complex_component(x) + axis.imposed_at(h as u32);
                     motion.c[q * nh + k] = moved - force * port.series;
                     motion.force[q * nh + k] = force;
                 }

@@ -90,13 +90,13 @@ impl ModeEquations<'_> {
                 harmonics.iter().zip(&series).map(|(h, places)| (*h as f64, places[place])).collect();
             half_range(&terms)
         };
-        (0..self.system.seen().len()).map(of_place).collect()
+        (0..self.system.place_axes().len()).map(of_place).collect()
     }
 
     /// Returns the displacements of the places from the motion of all degrees of freedom.
     pub fn at_places(&self, x: &[Complex64]) -> Vec<Complex64> {
         let at = |place: &Axis| place.rows().iter().map(|(row, weight)| x[*row] * *weight).sum();
-        self.system.seen().iter().map(at).collect()
+        self.system.place_axes().iter().map(at).collect()
     }
 
     /// Returns a measure of how real the shape is: `|X₁ᵀ M X₁| / X₁ᴴ M X₁`.

@@ -3,7 +3,7 @@
 
 use super::memory::REPEATS;
 use super::{Port, StaticState};
-use crate::law::MOST_DIRECTIONS;
+use crate::law::MAX_DIRECTIONS;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::fourier::FourierPlan;
@@ -27,10 +27,10 @@ pub(in super::super) struct Alternation {
     pub signal: Vec<f64>,
     /// Forces of the port evaluated last along its axes, per sample, N. Kernels that do not
     /// sample, such as sliders, set them only in [`Alternation::sample`].
-    pub force: [Vec<f64>; MOST_DIRECTIONS],
+    pub force: [Vec<f64>; MAX_DIRECTIONS],
     /// Displacements and velocities of the port along its axes, for kernels that use them.
-    pub(super) displacement: [Vec<f64>; MOST_DIRECTIONS],
-    pub(super) velocity: [Vec<f64>; MOST_DIRECTIONS],
+    pub(super) displacement: [Vec<f64>; MAX_DIRECTIONS],
+    pub(super) velocity: [Vec<f64>; MAX_DIRECTIONS],
     /// True at the samples that slip, for a port whose kernel tells slip.
     pub slips: Vec<bool>,
     /// Derivative of the force by ω in rad/s, [axis][harmonic], of the motion
@@ -135,7 +135,7 @@ impl Alternation {
     }
 
     /// Returns the static equilibrium of a port: displacements (m) along its axes, and states.
-    pub(super) fn at_rest(&self, port: &Port) -> ([f64; MOST_DIRECTIONS], Vec<f64>) {
+    pub(super) fn at_rest(&self, port: &Port) -> ([f64; MAX_DIRECTIONS], Vec<f64>) {
         let StaticState { displacement, states } = &port.static_state;
         (displacement.map(|u| u * self.static_share), states.iter().map(|z| z * self.static_share).collect())
     }

@@ -7,17 +7,17 @@
 
 use super::sliders::Part;
 use super::{Kernel, Member, Port, Ports, Rigid, StaticState, Times};
-use crate::law::{Piece, Slider};
+use crate::law::{IdealElement, Slider};
 use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
-use crate::model::{Line, PARALLEL, SystemJoint};
+use crate::model::{CollinearAxis, PARALLEL, SystemJoint};
 
 /// The ports of the joints added so far.
 #[derive(Default)]
 pub(super) struct Gathered {
     ports: Ports,
     /// Number of every force port, and the lines of its axes.
-    lines: Vec<(usize, Vec<Line>)>,
+    lines: Vec<(usize, Vec<CollinearAxis>)>,
 }
 
 impl Gathered {
@@ -28,19 +28,19 @@ impl Gathered {
     pub fn push(&mut self, j: usize, joint: &SystemJoint) -> Result<(), MethodError> {
         let law = joint.law();
         let unsupported = |misses| MethodError::law(NAME, joint, misses);
-        if law.is_free() {
+        if law.carries_no_force() {
             return Ok(());
         }
         if joint.axes().len() == 1
-            && let Some(pieces) = law.pieces()
+            && let Some(pieces) = law.ideal_elements()
         {
-            if pieces.iter().any(Piece::drops) {
+            if pieces.iter().any(IdealElement::has_force_drop) {
                 return Err(unsupported("its slip limit drops abruptly at the onset of slip"));
             }
             self.add_pieces(j, joint, &pieces);
             return Ok(());
         }
-        let scale = law.scale();
+        let scale = law.force_scale();
         if joint.axes().len() == 1 && law.masing().is_some() {
             self.add(j, joint, Kernel::Masing(law.clone()), (0.0, scale, 0.0));
             return Ok(());
@@ -49,7 +49,7 @@ impl Gathered {
             if !(scale.is_finite() && scale > 0.0) {
                 return Err(unsupported("its force scale is not finite and positive, which its resolvent needs"));
             }
-            let measures = (prox.compliance(), scale, prox.least_penalty());
+            let measures = (prox.compliance(), scale, prox.minimum_penalty());
             self.add_force(j, joint, Kernel::Prox(Times { law: law.clone(), times: 1.0 }), measures);
         } else if law.step().is_some() {
             self.add(j, joint, Kernel::Step(law.clone()), (0.0, scale, 0.0));
@@ -75,20 +75,20 @@ impl Gathered {
 
     /// Adds one port for elastic sliders and stops, and one for rigid sliders.
     /// Both have the same motion.
-    fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[Piece]) {
+    fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[IdealElement]) {
         let mut parts = Vec::new();
         // parallel rigid sliders act as one
         let (mut rigid, mut scale) = (0.0, 0.0);
         for piece in pieces {
             match *piece {
-                Piece::Slider(Slider { limit: 0.0, .. }) => {}
-                Piece::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
-                Piece::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
+                IdealElement::Slider(Slider { limit: 0.0, .. }) => {}
+                IdealElement::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
+                IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
                     scale += limit;
                     parts.push(Part::Slider { stiffness, limit });
                 }
-                Piece::Stop { stiffness: 0.0, .. } => {}
-                Piece::Stop { gap, stiffness } => {
+                IdealElement::Stop { stiffness: 0.0, .. } => {}
+                IdealElement::Stop { gap, stiffness } => {
                     scale = f64::INFINITY;
                     parts.push(Part::Stop { gap, stiffness });
                 }
@@ -104,7 +104,7 @@ impl Gathered {
 
     /// Adds a force port, or adds the joint to an existing port with a proportional motion.
     fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, measures: (f64, f64, f64)) {
-        let lines: Vec<Line> = of.axes().iter().map(Line::of).collect();
+        let lines: Vec<CollinearAxis> = of.axes().iter().map(CollinearAxis::of).collect();
         let found = self.lines.iter().find_map(|(port, its)| {
             let factor = along(&lines, its)?;
             Some((*port, factor, times(&kernel, &self.ports.list[*port].kernel, factor)?))
@@ -138,11 +138,11 @@ impl Gathered {
 }
 
 /// Returns the factor between all motions along some axes and those along others.
-fn along(lines: &[Line], others: &[Line]) -> Option<f64> {
+fn along(lines: &[CollinearAxis], others: &[CollinearAxis]) -> Option<f64> {
     if lines.len() != others.len() {
         return None;
     }
-    let mut factors = lines.iter().zip(others).map(|(line, other)| line.along(other));
+    let mut factors = lines.iter().zip(others).map(|(line, other)| line.ratio_to(other));
     let first = factors.next()??;
     factors.all(|factor| factor.is_some_and(|f| (f - first).abs() <= PARALLEL * first.abs())).then_some(first)
 }
@@ -155,7 +155,7 @@ fn times(kernel: &Kernel, other: &Kernel, factor: f64) -> Option<f64> {
         (Kernel::Rigid(rigid), Kernel::Rigid(other)) => Some(rigid.limit / other.limit),
         (Kernel::Prox(one), Kernel::Prox(other)) => {
             let as_fast = (factor.abs() - 1.0).abs() <= PARALLEL;
-            if as_fast && (factor > 0.0 || other.law.is_odd()) { one.law.times(&*other.law) } else { None }
+            if as_fast && (factor > 0.0 || other.law.is_odd()) { one.law.force_ratio(&*other.law) } else { None }
         }
         _ => None,
     }

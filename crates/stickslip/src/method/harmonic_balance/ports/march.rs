@@ -13,7 +13,7 @@
 
 use super::alternation::{Alternation, share};
 use super::memory::{Memory, REPEATS, at_once};
-use crate::law::MOST_DIRECTIONS;
+use crate::law::MAX_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -63,10 +63,10 @@ pub(super) trait March {
     /// `rows`, [sample], receives the derivatives of the step that ends at the sample: those of
     /// the states after it, then those of the forces. Its columns are the inputs, the states
     /// before, and ω if that is known. Returns false if a step has no solution.
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
     /// Takes the initial step, straight from static equilibrium to sample 0.
     /// Returns false if it has no solution.
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
 }
 
 impl Alternation {
@@ -103,7 +103,7 @@ impl Alternation {
         if begun {
             z.copy_from_slice(&known.state);
         } else {
-            let mut force = [0.0; MOST_DIRECTIONS];
+            let mut force = [0.0; MAX_DIRECTIONS];
             if !march.first(z.as_mut_slice(), &mut force, None) {
                 return None;
             }
@@ -460,7 +460,7 @@ impl Alternation {
         let (m, d) = (march.states(), march.axes());
         first.resize((m + d) * width(march), 0.0);
         let mut z = DVector::zeros(m);
-        let mut force = [0.0; MOST_DIRECTIONS];
+        let mut force = [0.0; MAX_DIRECTIONS];
         if !march.first(z.as_mut_slice(), &mut force, Some(first)) {
             return None;
         }

@@ -19,7 +19,7 @@ use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
 use super::events::{Anchor, Extreme};
 use super::series::{Series, turns};
 use super::sliders::{add_multiple, integrate_over};
-use crate::law::{Law, Masing};
+use crate::law::{Law, MasingView};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -59,7 +59,7 @@ pub(in super::super) struct Branches {
 /// The force on a branch, from the displacement `from` with the force `begin`,
 /// with a scale of 1 or 2.
 struct Curve<'a> {
-    law: &'a dyn Masing,
+    law: &'a dyn MasingView,
     from: f64,
     begin: f64,
     scale: f64,
@@ -96,7 +96,7 @@ impl Branches {
 
     /// Returns the force at the end of the last leg between these points.
     /// Writes its derivative by every point into `slopes`.
-    fn force(&self, law: &dyn Masing, points: &[Point], slopes: &mut Vec<f64>) -> f64 {
+    fn force(&self, law: &dyn MasingView, points: &[Point], slopes: &mut Vec<f64>) -> f64 {
         slopes.clear();
         slopes.resize(points.len(), 0.0);
         let mut sum = 0.0;
@@ -112,7 +112,7 @@ impl Branches {
 
     /// Returns the curve of a branch. Writes the derivative of its initial
     /// force by every point into `slopes`.
-    fn curve<'a>(&self, law: &'a dyn Masing, branch: &Branch, slopes: &mut Vec<f64>) -> Curve<'a> {
+    fn curve<'a>(&self, law: &'a dyn MasingView, branch: &Branch, slopes: &mut Vec<f64>) -> Curve<'a> {
         let points = &self.points[branch.points.clone()];
         let begin = self.force(law, points, slopes);
         let from = points.last().map_or(0.0, |point| point.value);
@@ -125,7 +125,7 @@ impl Alternation {
     /// and their derivative to `tangent`.
     pub(super) fn masing(
         &mut self,
-        law: &dyn Masing,
+        law: &dyn MasingView,
         rest: &StaticState,
         c: &[Complex64],
         force: &mut [Complex64],
@@ -161,7 +161,7 @@ impl Alternation {
                     self.state.fill(0.0);
                     let points = branches.points[branch.points.clone()].iter().map(|point| point.value);
                     for u in points.skip(1).chain([self.signal[0]]) {
-                        step.value(&before, &[u, 0.0, 0.0], &mut self.state);
+                        step.advance_values(&before, &[u, 0.0, 0.0], &mut self.state);
                         before[0] = u;
                     }
                 }
@@ -173,7 +173,7 @@ impl Alternation {
     /// Computes the branches of a period from the turning points found before.
     /// The motion first passes one period from static equilibrium; after it the
     /// law has forgotten all that it can forget.
-    fn remember(&self, law: &dyn Masing, rest: &StaticState, series: Series, branches: &mut Branches) {
+    fn remember(&self, law: &dyn MasingView, rest: &StaticState, series: Series, branches: &mut Branches) {
         branches.clear();
         branches.memory.push(Point { value: 0.0, anchor: Anchor::Nothing });
         let count = self.extremes.len();
@@ -201,7 +201,7 @@ impl Alternation {
     /// `begin` on; `None` is a leg before the recorded period.
     fn add_leg(
         &self,
-        law: &dyn Masing,
+        law: &dyn MasingView,
         series: Series,
         branches: &mut Branches,
         (begin, end, anchor): (Option<f64>, Extreme, Anchor),
@@ -229,10 +229,10 @@ impl Alternation {
             branches.memory.truncate(branches.memory.len() - if first { 1 } else { 2 });
         }
         let rest = branches.memory[0].value;
-        if branches.memory.len() == 1 && (end.value - rest).abs() >= law.slips_at() {
-            until(branches, Some(rest + sign * law.slips_at()));
+        if branches.memory.len() == 1 && (end.value - rest).abs() >= law.slip_displacement() {
+            until(branches, Some(rest + sign * law.slip_displacement()));
             until(branches, None);
-            branches.memory[0] = Point { value: end.value - sign * law.slips_at(), anchor };
+            branches.memory[0] = Point { value: end.value - sign * law.slip_displacement(), anchor };
         } else {
             until(branches, None);
         }
@@ -242,7 +242,7 @@ impl Alternation {
     /// Adds the harmonics of the force, and their derivative.
     fn add_branches(
         &mut self,
-        law: &dyn Masing,
+        law: &dyn MasingView,
         series: Series,
         branches: &Branches,
         (force, mut tangent): (&mut [Complex64], Option<&mut [f64]>),
@@ -387,7 +387,7 @@ mod tests {
     fn the_loss_is_the_closed_form() {
         for pair in LAWS {
             let law = law(pair);
-            let (chi, far) = (law.chi, law.slips_at());
+            let (chi, far) = (law.chi, law.slip_displacement());
             let d = law.beta + (chi + 1.0) / (chi + 2.0);
             let r = law.limit * (chi + 1.0) / (far.powf(chi + 2.0) * d);
             for share in [1e-3f64, 0.03, 0.4, 0.99, 1.0, 1.7] {
@@ -416,7 +416,7 @@ mod tests {
                 let c: Vec<Complex64> = (0..harmonics.len())
                     .map(|i| {
                         let z = Complex64::new(noise(2 * i), if i == 0 { 0.0 } else { noise(2 * i + 1) });
-                        z * (size * law.slips_at() / (1.0 + i as f64))
+                        z * (size * law.slip_displacement() / (1.0 + i as f64))
                     })
                     .collect();
                 let found = respond(&law, &harmonics, &c, None);
@@ -445,7 +445,7 @@ mod tests {
                 let mut slopes = vec![0.0; unknowns * unknowns];
                 respond(&law, &harmonics, &c, Some(&mut slopes));
                 for b in (0..unknowns).filter(|b| *b != 1) {
-                    let step = 1e-6 * size * law.slips_at();
+                    let step = 1e-6 * size * law.slip_displacement();
                     let moved = |by: f64| {
                         let mut c = c.clone();
                         if b % 2 == 0 {
@@ -472,7 +472,7 @@ mod tests {
     fn the_state_is_that_of_the_force() {
         let harmonics = vec![0, 1, 2, 3];
         let law = law(LAWS[0]);
-        let far = law.slips_at();
+        let far = law.slip_displacement();
         let c = [0.1 * far, 0.5 * far, 0.3 * far, 0.4 * far].map(|x| Complex64::new(x, 0.3 * x));
         let c = [c[0].re.into(), c[1], c[2], c[3]];
         let mut alternation = Alternation::new(harmonics, 256);
@@ -528,7 +528,11 @@ mod tests {
                 let lost = (found.energy.friction / loss - 1.0).abs();
                 let said = format!("{} {chi} {beta} {frequency}: {off:.1e} {lost:.1e}", method.name());
                 assert!(off < allowed && lost < 4.0 * allowed, "{said}");
-                assert!(found.evidence.truncation.is_none_or(|error| error < allowed), "{said} {:?}", found.evidence);
+                assert!(
+                    found.evidence.error_estimate.is_none_or(|error| error < allowed),
+                    "{said} {:?}",
+                    found.evidence
+                );
                 assert!(found.evidence.return_defect.is_none_or(|defect| defect < 1e-3), "{said} {:?}", found.evidence);
             }
         }

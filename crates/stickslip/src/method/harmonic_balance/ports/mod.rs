@@ -33,9 +33,9 @@ pub(super) use memory::{REPEATS, at_once};
 use prox::{Rigid, Times};
 use sliders::Part;
 
-use crate::law::{MOST_DIRECTIONS, Masing, Prox, SharedLaw};
+use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
-use crate::model::{Axis, Cyclic, System, SystemJoint};
+use crate::model::{Axis, CyclicSymmetry, System, SystemJoint};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
@@ -77,7 +77,7 @@ pub(super) struct Member {
 #[derive(Debug, Clone, Default)]
 pub(super) struct StaticState {
     /// Displacements along the axes of the port, m.
-    pub displacement: [f64; MOST_DIRECTIONS],
+    pub displacement: [f64; MAX_DIRECTIONS],
     /// Internal states of the law, or the forces of its sliders (N); empty if the law has none.
     pub states: Vec<f64>,
 }
@@ -131,7 +131,7 @@ impl Port {
     pub fn is_rigid(&self) -> bool {
         match &self.kernel {
             Kernel::Rigid(_) => true,
-            Kernel::Prox(times) => times.at_velocity(0.0).is_none(),
+            Kernel::Prox(times) => times.force_at_velocity(0.0).is_none(),
             _ => false,
         }
     }
@@ -207,7 +207,7 @@ impl Port {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::closed).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
-            Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed() {
+            Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed_stiffness() {
                 Some(closed) => closed[axis],
                 None => crate::method::guess::at_rest(&**law, 1.0)[(axis, axis)].re,
             },
@@ -219,7 +219,7 @@ impl Port {
     pub fn reach(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(Part::reach).fold(0.0, f64::max),
-            Kernel::Masing(law) => law.masing().map_or(0.0, Masing::slips_at),
+            Kernel::Masing(law) => law.masing().map_or(0.0, MasingView::slip_displacement),
             _ => 0.0,
         }
     }
@@ -259,7 +259,7 @@ impl Port {
         }
     }
 
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         match &self.kernel {
             Kernel::Rigid(rigid) => Some(rigid),
             Kernel::Prox(times) => Some(times),
@@ -275,7 +275,7 @@ pub(super) struct Ports {
     /// Joint and axis within the joint, for every axis. A port of several
     /// joints lists the first one.
     axes: Vec<(usize, usize)>,
-    wave: Option<Cyclic>,
+    wave: Option<CyclicSymmetry>,
     /// Displacements along all axes in static equilibrium, m; empty if unknown.
     equilibrium: Vec<f64>,
 }
@@ -358,7 +358,7 @@ impl Ports {
     }
 
     /// Returns the travelling wave, if these are the ports of the first sector alone.
-    pub fn wave(&self) -> Option<Cyclic> {
+    pub fn wave(&self) -> Option<CyclicSymmetry> {
         self.wave
     }
 
@@ -507,7 +507,7 @@ impl Alternation {
 }
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-const _: () = assert!(MOST_DIRECTIONS == 3, "signals of a port are kept for three axes");
+const _: () = assert!(MAX_DIRECTIONS == 3, "signals of a port are kept for three axes");
 
 /// Returns the start of every port's tangent, and the length of all. A port
 /// with d axes has a square of 2 d × harmonics rows.

@@ -15,7 +15,7 @@
 
 use super::Port;
 use super::alternation::{Alternation, add_block, as_block, pair, share};
-use crate::law::{MOST_DIRECTIONS, Mean, Prox, SharedLaw};
+use crate::law::{MAX_DIRECTIONS, ProxView, SampleMeans, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -31,14 +31,14 @@ pub(super) struct Rigid {
     pub limit: f64,
 }
 
-impl Prox for Rigid {
+impl ProxView for Rigid {
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         force[0] = y[0].clamp(-self.limit, self.limit);
         slope[0] = if y[0].abs() < self.limit { 1.0 } else { 0.0 };
     }
-    fn mean(&self, y: f64, e: f64, _penalty: f64) -> Mean {
+    fn resolvent_means(&self, y: f64, e: f64, _penalty: f64) -> SampleMeans {
         let mean = saturation(y / self.limit, e / self.limit);
-        Mean { zeroth: self.limit * mean.zeroth, first: self.limit * mean.first, ..mean }
+        SampleMeans { zeroth: self.limit * mean.zeroth, first: self.limit * mean.first, ..mean }
     }
 }
 
@@ -51,36 +51,36 @@ pub(super) struct Times {
 }
 
 impl Times {
-    fn one(&self) -> &dyn Prox {
+    fn one(&self) -> &dyn ProxView {
         self.law.prox().expect("a law without a resolvent has another kernel")
     }
 }
 
-impl Prox for Times {
+impl ProxView for Times {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
-        let mut share = [0.0; MOST_DIRECTIONS];
+        let mut share = [0.0; MAX_DIRECTIONS];
         share.iter_mut().zip(y).for_each(|(share, y)| *share = y / self.times);
         self.one().resolve(&share[..y.len()], penalty / self.times, force, slope);
         force.iter_mut().for_each(|force| *force *= self.times);
     }
-    fn at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
-        let (force, slope) = self.one().at_velocity(velocity)?;
+    fn force_at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
+        let (force, slope) = self.one().force_at_velocity(velocity)?;
         Some((self.times * force, self.times * slope))
     }
     fn compliance(&self) -> f64 {
         self.one().compliance() / self.times
     }
-    fn least_penalty(&self) -> f64 {
-        self.one().least_penalty() * self.times
+    fn minimum_penalty(&self) -> f64 {
+        self.one().minimum_penalty() * self.times
     }
-    fn mean(&self, y: f64, e: f64, penalty: f64) -> Mean {
+    fn resolvent_means(&self, y: f64, e: f64, penalty: f64) -> SampleMeans {
         // the derivative of a resolvent is dimensionless
-        let mean = self.one().mean(y / self.times, e / self.times, penalty / self.times);
-        Mean { zeroth: self.times * mean.zeroth, first: self.times * mean.first, ..mean }
+        let mean = self.one().resolvent_means(y / self.times, e / self.times, penalty / self.times);
+        SampleMeans { zeroth: self.times * mean.zeroth, first: self.times * mean.first, ..mean }
     }
-    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<Mean> {
+    fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<SampleMeans> {
         let mean = self.one().mean_at_velocity(velocity, e)?;
-        Some(Mean {
+        Some(SampleMeans {
             zeroth: self.times * mean.zeroth,
             first: self.times * mean.first,
             slope: self.times * mean.slope,
@@ -95,7 +95,7 @@ impl Alternation {
     /// to `image`, and their derivative to `tangent`.
     pub(super) fn resolve(
         &mut self,
-        prox: &dyn Prox,
+        prox: &dyn ProxView,
         port: &Port,
         penalty: f64,
         y: &[Complex64],
@@ -107,7 +107,7 @@ impl Alternation {
             let mean = port.is_rigid() || self.changes_by(y, 1.0 / port.scale);
             // in stick the map is the identity and the force must equal the signal: the effect
             // of the mean over a sample is undone first
-            return self.along(|y, e| prox.mean(y, e, penalty), (mean, mean), port.scale, y, image, tangent);
+            return self.along(|y, e| prox.resolvent_means(y, e, penalty), (mean, mean), port.scale, y, image, tangent);
         }
         self.turn(prox, port.axes, penalty, y, image, tangent);
     }
@@ -116,14 +116,14 @@ impl Alternation {
     /// Rigid friction changes its sign over `width` (m/s).
     pub(super) fn velocity(
         &mut self,
-        prox: &dyn Prox,
+        prox: &dyn ProxView,
         port: &Port,
         width: f64,
         v: &mut [Complex64],
         image: &mut [Complex64],
     ) {
         if port.axes == 1
-            && let Some((_, slope)) = prox.at_velocity(0.0)
+            && let Some((_, slope)) = prox.force_at_velocity(0.0)
         {
             let mean = self.changes_by(v, slope / port.scale);
             let law = |v, e| prox.mean_at_velocity(v, e).unwrap_or_default();
@@ -133,7 +133,7 @@ impl Alternation {
         let penalty = port.scale / width;
         v.iter_mut().for_each(|v| *v *= penalty);
         if port.axes == 1 {
-            return self.along(|y, e| prox.mean(y, e, penalty), (true, true), port.scale, v, image, None);
+            return self.along(|y, e| prox.resolvent_means(y, e, penalty), (true, true), port.scale, v, image, None);
         }
         self.turn(prox, port.axes, penalty, v, image, None);
     }
@@ -149,7 +149,7 @@ impl Alternation {
     /// signal is rescaled first, so that the mean of the identity is the identity.
     fn along(
         &mut self,
-        map: impl Fn(f64, f64) -> Mean,
+        map: impl Fn(f64, f64) -> SampleMeans,
         (mean, undo): (bool, bool),
         scale: f64,
         y: &[Complex64],
@@ -206,7 +206,7 @@ impl Alternation {
     /// Applies a map along several axes.
     fn turn(
         &mut self,
-        prox: &dyn Prox,
+        prox: &dyn ProxView,
         axes: usize,
         penalty: f64,
         y: &[Complex64],
@@ -219,9 +219,9 @@ impl Alternation {
             self.displacement[a].copy_from_slice(&self.signal);
         }
         self.reserve_slopes(axes * axes);
-        let (mut force, mut slope) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS * MOST_DIRECTIONS]);
+        let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
         for i in 0..n {
-            let y: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| self.displacement[a][i]);
+            let y: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| self.displacement[a][i]);
             prox.resolve(&y[..axes], penalty, &mut force[..axes], &mut slope[..axes * axes]);
             for a in 0..axes {
                 self.force[a][i] = force[a];
@@ -249,18 +249,24 @@ fn change(h: usize, n: usize) -> Complex64 {
 
 /// Returns the means of x clamped to [-1, 1].
 #[inline]
-fn saturation(y: f64, e: f64) -> Mean {
+fn saturation(y: f64, e: f64) -> SampleMeans {
     let (at, reach) = (y.abs(), e.abs());
     if at >= 1.0 + reach {
-        return Mean { zeroth: y.signum(), ..Mean::default() };
+        return SampleMeans { zeroth: y.signum(), ..SampleMeans::default() };
     }
     if at + reach <= 1.0 {
-        return Mean { zeroth: y, first: e / 3.0, slope: 1.0, slope_second: 1.0 / 3.0, ..Mean::default() };
+        return SampleMeans {
+            zeroth: y,
+            first: e / 3.0,
+            slope: 1.0,
+            slope_second: 1.0 / 3.0,
+            ..SampleMeans::default()
+        };
     }
     let mut mean = if at - reach >= -1.0 {
         // only the upper end of the ramp lies within the sample, at ξ = t
         let t = ((1.0 - at) / reach).clamp(-1.0, 1.0);
-        Mean {
+        SampleMeans {
             zeroth: 1.0 - 0.25 * reach * (t + 1.0) * (t + 1.0),
             first: -0.5 * reach * (t * t * t / 6.0 - 0.5 * t - 1.0 / 3.0),
             slope: 0.5 * (t + 1.0),
@@ -273,7 +279,7 @@ fn saturation(y: f64, e: f64) -> Mean {
         let (s, t) = (s.clamp(-1.0, 1.0), t.clamp(-1.0, 1.0));
         let ramp = |power: i32| (t.powi(power) - s.powi(power)) / f64::from(power);
         let (r1, r2, r3) = (ramp(1), ramp(2), ramp(3));
-        Mean {
+        SampleMeans {
             zeroth: 0.5 * (at * r1 + reach * r2 + (1.0 - t) - (s + 1.0)),
             first: 0.5 * (at * r2 + reach * r3 + 0.5 * (1.0 - t * t) - 0.5 * (s * s - 1.0)),
             slope: 0.5 * r1,

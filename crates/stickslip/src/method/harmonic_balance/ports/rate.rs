@@ -12,7 +12,7 @@
 use super::Port;
 use super::alternation::Alternation;
 use super::march::March;
-use crate::law::{MOST_DIRECTIONS, Rate, RatePoint, Relative};
+use crate::law::{MAX_DIRECTIONS, RatePoint, RateView, RelativeMotion};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -38,7 +38,7 @@ impl Alternation {
     /// `force`, and their derivative to `tangent`.
     pub(super) fn rate(
         &mut self,
-        rate: &dyn Rate,
+        rate: &dyn RateView,
         port: &Port,
         omega: f64,
         c: &[Complex64],
@@ -88,10 +88,10 @@ impl Alternation {
     }
 
     /// Samples the force of a law without internal states, and its slopes if asked.
-    fn sample_rate(&mut self, rate: &dyn Rate, axes: usize, slopes: bool) {
+    fn sample_rate(&mut self, rate: &dyn RateView, axes: usize, slopes: bool) {
         let at_once = if rate.is_batched() { self.samples() } else { 1 };
-        let mut motions = vec![Relative::along(0.0, 0.0); at_once];
-        let mut values = vec![[0.0; MOST_DIRECTIONS]; if slopes { 0 } else { at_once }];
+        let mut motions = vec![RelativeMotion::along(0.0, 0.0); at_once];
+        let mut values = vec![[0.0; MAX_DIRECTIONS]; if slopes { 0 } else { at_once }];
         let mut points = vec![RatePoint::new(axes, 0); if slopes { at_once } else { 0 }];
         for first in (0..self.samples()).step_by(at_once) {
             for (i, motion) in motions.iter_mut().enumerate() {
@@ -99,13 +99,13 @@ impl Alternation {
                 motion.velocity = std::array::from_fn(|a| self.velocity[a][first + i]);
             }
             if !slopes {
-                rate.value_many(&motions, &mut values);
+                rate.evaluate_many_values(&motions, &mut values);
                 for (i, value) in values.iter().enumerate() {
                     (0..axes).for_each(|a| self.force[a][first + i] = value[a]);
                 }
                 continue;
             }
-            rate.linearise_many(axes, &motions, &[], &mut points);
+            rate.evaluate_many_with_derivatives(axes, &motions, &[], &mut points);
             for (i, point) in points.iter().enumerate() {
                 for a in 0..axes {
                     self.force[a][first + i] = point.force[a];
@@ -120,7 +120,7 @@ impl Alternation {
     /// Adds the harmonics and the derivative for a law with internal states.
     fn integrate(
         &mut self,
-        rate: &dyn Rate,
+        rate: &dyn RateView,
         port: &Port,
         omega: f64,
         c: &[Complex64],
@@ -130,7 +130,7 @@ impl Alternation {
         let (n, nh, axes) = (self.samples(), self.harmonics.len(), port.axes);
         let (rest, at_rest) = self.at_rest(port);
         let angle = TAU / n as f64;
-        let mut stages: [[Vec<f64>; MOST_DIRECTIONS]; 2] = Default::default();
+        let mut stages: [[Vec<f64>; MAX_DIRECTIONS]; 2] = Default::default();
         for a in 0..axes {
             let c = &c[a * nh..(a + 1) * nh];
             for (kind, stage) in stages.iter_mut().enumerate() {
@@ -163,12 +163,12 @@ impl Alternation {
 }
 
 /// Displacements or velocities, [axis][sample].
-type Signals = [Vec<f64>; MOST_DIRECTIONS];
+type Signals = [Vec<f64>; MAX_DIRECTIONS];
 
 /// Steps of a rate law along a sampled motion. The inputs of a step are displacements and
 /// velocities at the first stage, then at the end.
 struct RateMarch<'a> {
-    rate: &'a dyn Rate,
+    rate: &'a dyn RateView,
     axes: usize,
     omega: f64,
     /// Time from sample to sample, s.
@@ -178,7 +178,7 @@ struct RateMarch<'a> {
     /// Displacements and velocities at the first stage of the step that ends at the sample.
     stages: &'a [Signals; 2],
     /// Displacements and states in static equilibrium, where the initial step begins.
-    rest: [f64; MOST_DIRECTIONS],
+    rest: [f64; MAX_DIRECTIONS],
     at_rest: Vec<f64>,
     points: [RatePoint; 2],
     stage: DVector<f64>,
@@ -191,10 +191,10 @@ struct RateMarch<'a> {
 impl RateMarch<'_> {
     fn advance(
         &mut self,
-        (length, motions): (f64, [Relative<f64>; 2]),
+        (length, motions): (f64, [RelativeMotion<f64>; 2]),
         before: &[f64],
         after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
+        force: &mut [f64; MAX_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) -> bool {
         let (m, d) = (before.len(), self.axes);
@@ -206,7 +206,7 @@ impl RateMarch<'_> {
         for _ in 0..ITERATIONS {
             for (stage, motion) in motions.iter().enumerate() {
                 let z = &self.stage.as_slice()[stage * m..(stage + 1) * m];
-                self.rate.linearise(d, motion, z, &mut self.points[stage]);
+                self.rate.evaluate_with_derivatives(d, motion, z, &mut self.points[stage]);
             }
             let points = &self.points;
             let Some((change, size, lu)) = newton_step(d, length, points, before, self.stage.as_slice(), scale) else {
@@ -220,10 +220,10 @@ impl RateMarch<'_> {
         }
         after.copy_from_slice(&self.stage.as_slice()[m..]);
         let Some(rows) = rows else {
-            *force = self.rate.value(&motions[1], after, &mut vec![0.0; m]);
+            *force = self.rate.evaluate_values(&motions[1], after, &mut vec![0.0; m]);
             return true;
         };
-        self.rate.linearise(d, &motions[1], after, &mut self.points[1]);
+        self.rate.evaluate_with_derivatives(d, &motions[1], after, &mut self.points[1]);
         *force = self.points[1].force;
         factor.is_some_and(|lu| self.step_rows(length, &self.points, &motions, &lu, rows))
     }
@@ -234,9 +234,9 @@ impl RateMarch<'_> {
     /// was, if the method does not converge.
     fn around_at_once(
         &mut self,
-        motions: &[Relative<f64>],
+        motions: &[RelativeMotion<f64>],
         z: &mut [f64],
-        force: &mut [Vec<f64>; MOST_DIRECTIONS],
+        force: &mut [Vec<f64>; MAX_DIRECTIONS],
         mut rows: Option<&mut [f64]>,
     ) -> bool {
         let (n, m, d) = (motions.len() / 2, z.len(), self.axes);
@@ -247,7 +247,7 @@ impl RateMarch<'_> {
             self.whole = z.iter().copied().cycle().take(2 * n * m).collect();
         }
         for _ in 0..ITERATIONS {
-            self.rate.linearise_many(d, motions, &self.whole, &mut points);
+            self.rate.evaluate_many_with_derivatives(d, motions, &self.whole, &mut points);
             let mut factors = Vec::with_capacity(n);
             let mut before = z.to_vec();
             let mut largest = 0.0f64;
@@ -293,7 +293,7 @@ impl RateMarch<'_> {
         &self,
         length: f64,
         points: &[RatePoint],
-        motions: &[Relative<f64>],
+        motions: &[RelativeMotion<f64>],
         factor: &LU<f64, Dyn, Dyn>,
         rows: &mut [f64],
     ) -> bool {
@@ -395,10 +395,10 @@ impl March for RateMarch<'_> {
         let rate = self.omega / (TAU * LEAD);
         [1.0 - LEFT, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
         let (n, m, d) = (self.at[0][0].len(), z.len(), self.axes);
         let size = (m + d) * (4 * d + m + usize::from(self.frequency));
-        let read = |signals: [&Signals; 2], i: usize| Relative {
+        let read = |signals: [&Signals; 2], i: usize| RelativeMotion {
             displacement: std::array::from_fn(|a| if a < d { signals[0][a][i] } else { 0.0 }),
             velocity: std::array::from_fn(|a| if a < d { signals[1][a][i] } else { 0.0 }),
         };
@@ -410,7 +410,7 @@ impl March for RateMarch<'_> {
                 return true;
             }
         }
-        let (mut before, mut now) = (z.to_vec(), [0.0; MOST_DIRECTIONS]);
+        let (mut before, mut now) = (z.to_vec(), [0.0; MAX_DIRECTIONS]);
         for step in 1..=n {
             let (i, motions) = (step % n, motions_of(step));
             let rows = rows.as_deref_mut().map(|rows| &mut rows[i * size..(i + 1) * size]);
@@ -422,12 +422,12 @@ impl March for RateMarch<'_> {
         }
         true
     }
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         let duration = TAU * LEAD / self.omega;
-        let to: [f64; MOST_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
+        let to: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
         let velocity = std::array::from_fn(|a| (to[a] - self.rest[a]) / duration);
         let third = std::array::from_fn(|a| LEFT * self.rest[a] + (1.0 - LEFT) * to[a]);
-        let motions = [third, to].map(|displacement| Relative { displacement, velocity });
+        let motions = [third, to].map(|displacement| RelativeMotion { displacement, velocity });
         let before = std::mem::take(&mut self.at_rest);
         let found = self.advance((duration, motions), &before, after, force, rows);
         self.at_rest = before;

@@ -7,7 +7,7 @@
 use super::Port;
 use super::alternation::{Alternation, Beginning, add_entries};
 use super::march::March;
-use crate::law::{MOST_DIRECTIONS, Reach, Step, StepPoint};
+use crate::law::{DisplacementBox, MAX_DIRECTIONS, StepPoint, StepView};
 use num_complex::Complex64;
 
 impl Alternation {
@@ -15,7 +15,7 @@ impl Alternation {
     /// their derivative to `tangent`. A motion that provably sticks throughout is not sampled.
     pub(super) fn step(
         &mut self,
-        step: &dyn Step,
+        step: &dyn StepView,
         port: &Port,
         c: &[Complex64],
         force: &mut [Complex64],
@@ -23,7 +23,7 @@ impl Alternation {
     ) {
         let (axes, nh) = (port.axes, self.harmonics.len());
         let (rest, states) = self.at_rest(port);
-        let (mut mean, mut reach) = ([0.0; MOST_DIRECTIONS], [0.0; MOST_DIRECTIONS]);
+        let (mut mean, mut reach) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS]);
         for (a, c) in c.chunks_exact(nh).enumerate() {
             for (c, h) in c.iter().zip(&self.harmonics) {
                 if *h == 0 {
@@ -33,14 +33,14 @@ impl Alternation {
                 }
             }
         }
-        if !step.holds((&rest, &states), Reach { mean: &mean, reach: &reach }) {
+        if !step.sticks_throughout((&rest, &states), DisplacementBox { mean: &mean, half_width: &reach }) {
             return self.step_by_step(step, port, c, force, tangent);
         }
         self.state.clear();
         self.forgets.clear();
         self.begin = Beginning::default();
         let mut point = StepPoint::new(axes, step.states());
-        step.linearise(axes, &rest, &mean, &states, &mut point);
+        step.advance_with_derivatives(axes, &rest, &mean, &states, &mut point);
         let mut tangent = tangent;
         for a in 0..axes {
             let to = &point.force_slope(a)[axes..2 * axes];
@@ -65,7 +65,7 @@ impl Alternation {
     /// Integrates the law through the samples of a period.
     pub(super) fn step_by_step(
         &mut self,
-        step: &dyn Step,
+        step: &dyn StepView,
         port: &Port,
         c: &[Complex64],
         force: &mut [Complex64],
@@ -93,36 +93,36 @@ impl Alternation {
 /// Steps of a law from sample to sample. The inputs of a step are the
 /// displacements before it, then after it.
 struct StepMarch<'a> {
-    step: &'a dyn Step,
+    step: &'a dyn StepView,
     axes: usize,
-    at: &'a [Vec<f64>; MOST_DIRECTIONS],
+    at: &'a [Vec<f64>; MAX_DIRECTIONS],
     /// Displacements and states in static equilibrium, where the initial step begins.
-    rest: [f64; MOST_DIRECTIONS],
+    rest: [f64; MAX_DIRECTIONS],
     states: Vec<f64>,
     point: StepPoint,
-    /// States at the samples of the last period, see [`Step::around`].
+    /// States at the samples of the last period, see [`StepView::advance_cycle`].
     trail: Vec<f64>,
 }
 
 impl StepMarch<'_> {
-    fn read(&self, i: usize) -> [f64; MOST_DIRECTIONS] {
+    fn read(&self, i: usize) -> [f64; MAX_DIRECTIONS] {
         std::array::from_fn(|a| if a < self.axes { self.at[a][i] } else { 0.0 })
     }
 
     fn advance(
         &mut self,
-        (from, to): (&[f64; MOST_DIRECTIONS], &[f64; MOST_DIRECTIONS]),
+        (from, to): (&[f64; MAX_DIRECTIONS], &[f64; MAX_DIRECTIONS]),
         before: &[f64],
         after: &mut [f64],
-        force: &mut [f64; MOST_DIRECTIONS],
+        force: &mut [f64; MAX_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) -> bool {
         let Some(rows) = rows else {
             after.copy_from_slice(before);
-            *force = self.step.value(from, to, after);
+            *force = self.step.advance_values(from, to, after);
             return after.iter().all(|z| z.is_finite());
         };
-        self.step.linearise(self.axes, from, to, before, &mut self.point);
+        self.step.advance_with_derivatives(self.axes, from, to, before, &mut self.point);
         *force = self.point.force;
         after.copy_from_slice(&self.point.state);
         let (m, width) = (before.len(), 2 * self.axes + before.len());
@@ -156,11 +156,11 @@ impl March for StepMarch<'_> {
     fn first_waves(&self, _h: usize) -> [Complex64; 4] {
         [0.0, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
-        self.step.around(self.axes, self.at, (&mut *z, &mut self.trail), force, rows);
+    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+        self.step.advance_cycle(self.axes, self.at, (&mut *z, &mut self.trail), force, rows);
         z.iter().all(|z| z.is_finite())
     }
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MOST_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         let (from, to) = (self.rest, self.read(0));
         let before = std::mem::take(&mut self.states);
         let found = self.advance((&from, &to), &before, after, force, rows);
@@ -183,7 +183,7 @@ mod tests {
             first: 0,
             axes,
             series: 0.0,
-            scale: law.scale(),
+            scale: law.force_scale(),
             least_penalty: 0.0,
             static_state: StaticState { states: vec![0.0; states], ..StaticState::default() },
             kernel: Kernel::Step(Arc::new(law)),
@@ -198,7 +198,7 @@ mod tests {
         let line = FrictionContact { tangents: 1, ..contact };
         let plane = Jenkins2d { stiffness: 3.0, limit: 1.8 };
         let ports = [port(contact, 3), port(line, 2), port(plane, 2)];
-        let laws: [&dyn Step; 3] = [&contact, &line, &plane];
+        let laws: [&dyn StepView; 3] = [&contact, &line, &plane];
         for (law, port) in laws.into_iter().zip(&ports) {
             let axes = port.axes;
             for harmonics in [vec![0, 1, 2, 3], vec![1, 3]] {

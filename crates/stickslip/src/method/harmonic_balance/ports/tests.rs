@@ -5,7 +5,9 @@ use super::super::equations::Level;
 use super::super::rest::Rest;
 use super::super::sparse::Sparse;
 use super::*;
-use crate::law::{BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, Rate, RateLaw, Relative, Step, StepLaw, Stribeck};
+use crate::law::{
+    BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, RateLaw, RateView, RelativeMotion, StepLaw, StepView, Stribeck,
+};
 use crate::method::harmonic_balance::HarmonicBalance;
 use crate::method::shooting::Shooting;
 use crate::method::{Method, advised};
@@ -52,16 +54,16 @@ impl Law for Plane {
     fn directions(&self) -> usize {
         2
     }
-    fn scale(&self) -> f64 {
+    fn force_scale(&self) -> f64 {
         LIMIT
     }
-    fn step(&self) -> Option<&dyn Step> {
+    fn step(&self) -> Option<&dyn StepView> {
         (*self == Plane::Masing).then_some(self)
     }
-    fn rate(&self) -> Option<&dyn Rate> {
+    fn rate(&self) -> Option<&dyn RateView> {
         matches!(self, Plane::Stiffening | Plane::Relaxing).then_some(self)
     }
-    fn prox(&self) -> Option<&dyn Prox> {
+    fn prox(&self) -> Option<&dyn ProxView> {
         (*self == Plane::Rigid).then_some(self)
     }
 }
@@ -90,7 +92,7 @@ impl RateLaw for Plane {
     fn states(&self) -> usize {
         if *self == Plane::Relaxing { 2 } else { 0 }
     }
-    fn evaluate<S: Real>(&self, motion: &Relative<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
+    fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
         let (u, v) = (motion.displacement, motion.velocity);
         let growth = (u[0] * u[0] + u[1] * u[1]) * 0.5 + 1.0;
         let mut force = [S::from(0.0); 3];
@@ -105,7 +107,7 @@ impl RateLaw for Plane {
     }
 }
 
-impl Prox for Plane {
+impl ProxView for Plane {
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let size = (y[0] * y[0] + y[1] * y[1]).sqrt();
         for a in 0..2 {
@@ -197,7 +199,7 @@ fn derivatives_agree_with_differences() {
             let largest = tangent.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
             // a difference misses the kinks of sampled maps within its step:
             // occasionally one slope in 512 samples
-            let (step, kinks) = (1e-6 * size, if law.pieces().is_some() { 1e-7 } else { 2e-3 });
+            let (step, kinks) = (1e-6 * size, if law.ideal_elements().is_some() { 1e-7 } else { 2e-3 });
             for k in (0..2 * count).filter(|k| !(is_real(k / 2) && k % 2 == 1)) {
                 let moved = |by: f64| {
                     let mut c = c.clone();

@@ -1,0 +1,133 @@
+//! The describing function of a law: the first harmonic of its periodic force under a harmonic
+//! motion.
+
+use crate::law::{IdealElement, MAX_DIRECTIONS, ProxView, RatePoint, RateView, RelativeMotion, Slider, StepView};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Samples per cycle. The result serves as an initial guess, so an error of 1 % is acceptable.
+const SAMPLES: usize = 128;
+/// Simulated cycles. Hysteresis is periodic by then, and states with slow relaxation are close
+/// to it.
+const CYCLES: usize = 3;
+/// Newton iterations for the states at a sample.
+const ITERATIONS: usize = 8;
+/// Penalty times velocity amplitude. The resolvent then evaluates the law at a velocity that
+/// differs by `λ / STEEP` of the velocity amplitude.
+const SCALED_PENALTY: f64 = 1e6;
+
+/// The views of a law from which its describing function follows.
+#[derive(Default)]
+pub(in crate::law) struct Views<'a> {
+    pub(in crate::law) ideal_elements: Option<Vec<IdealElement>>,
+    pub(in crate::law) rate: Option<&'a dyn RateView>,
+    pub(in crate::law) step: Option<&'a dyn StepView>,
+    pub(in crate::law) prox: Option<&'a dyn ProxView>,
+    /// Number of directions of the law.
+    pub(in crate::law) directions: usize,
+}
+
+/// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
+/// first available view, in the order of the fields.
+pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega: f64) -> Complex64 {
+    let Views { ideal_elements, rate, step, prox, directions } = views;
+    // At zero amplitude, use a tiny amplitude. The limit of small motion would need a length
+    // scale of the law.
+    let a = if amplitude > 0.0 { amplitude } else { f64::MIN_POSITIVE.sqrt() };
+    if let Some(ideal_elements) = ideal_elements {
+        return ideal_elements.iter().map(|element| slider_or_stop(element, amplitude)).sum();
+    }
+    if let Some(rate) = rate {
+        return rate_law(rate, a, omega);
+    }
+    if let Some(step) = step {
+        let mut z = vec![0.0; step.states()];
+        let mut before = [0.0; MAX_DIRECTIONS];
+        return first_harmonic(a, |theta| {
+            let to = [a * theta.cos(), 0.0, 0.0];
+            let force = step.advance_values(&before, &to, &mut z)[0];
+            before = to;
+            force
+        });
+    }
+    let Some(prox) = prox else { return ZERO };
+    let penalty = SCALED_PENALTY / (a * omega);
+    let rigid = first_harmonic(a, |theta| {
+        let y = -penalty * a * omega * theta.sin();
+        let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
+        prox.resolve(&[y, 0.0, 0.0][..directions], penalty, &mut force, &mut slope);
+        force[0]
+    });
+    // add the spring in series
+    if prox.compliance() > 0.0 { rigid / (1.0 + rigid * prox.compliance()) } else { rigid }
+}
+
+/// Returns the complex stiffness of one ideal part in closed form.
+pub(in crate::law) fn slider_or_stop(element: &IdealElement, amplitude: f64) -> Complex64 {
+    match *element {
+        IdealElement::Slider(Slider { limit: 0.0, .. }) => ZERO,
+        IdealElement::Slider(Slider { stiffness: None, limit, .. }) => {
+            Complex64::new(0.0, 4.0 * limit / (PI * amplitude))
+        }
+        IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
+            let hold = limit / stiffness;
+            if amplitude <= hold {
+                return Complex64::new(stiffness, 0.0);
+            }
+            let slip = (1.0 - 2.0 * hold / amplitude).acos(); // phase at which slip begins
+            let (sin, cos) = slip.sin_cos();
+            Complex64::new(slip - sin * cos, sin * sin) * (stiffness / PI)
+        }
+        // closed while cos θ > gap / amplitude
+        IdealElement::Stop { gap, stiffness } => {
+            let share = if amplitude > 0.0 { gap / amplitude } else { f64::INFINITY.copysign(gap) };
+            let closed = share.clamp(-1.0, 1.0).acos();
+            let (sin, cos) = closed.sin_cos();
+            Complex64::new((closed - sin * cos) * stiffness / PI, 0.0)
+        }
+    }
+}
+
+/// Returns the first harmonic of the force in the last cycle, divided by the amplitude of the
+/// motion.
+fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex64 {
+    let mut sum = ZERO;
+    for i in 0..=CYCLES * SAMPLES {
+        let theta = TAU * i as f64 / SAMPLES as f64;
+        let value = force(theta);
+        if i > (CYCLES - 1) * SAMPLES {
+            sum += Complex64::cis(-theta) * value;
+        }
+    }
+    sum * (2.0 / (SAMPLES as f64 * amplitude))
+}
+
+/// Integrates the states by the implicit Euler method, which is stable for any stiffness.
+fn rate_law(rate: &dyn RateView, amplitude: f64, omega: f64) -> Complex64 {
+    let states = rate.states();
+    let length = TAU / (omega * SAMPLES as f64);
+    let mut z = vec![0.0; states];
+    let mut rates = vec![0.0; states];
+    let mut point = RatePoint::new(1, states);
+    first_harmonic(amplitude, |theta| {
+        let (sin, cos) = theta.sin_cos();
+        let motion = RelativeMotion::along(amplitude * cos, -amplitude * omega * sin);
+        let before = z.clone();
+        for _ in 0..if states == 0 { 0 } else { ITERATIONS } {
+            rate.evaluate_with_derivatives(1, &motion, &z, &mut point);
+            let residual = DVector::from_fn(states, |s, _| z[s] - before[s] - length * point.rate[s]);
+            let jacobian = DMatrix::from_fn(states, states, |s, t| {
+                f64::from(u8::from(s == t)) - length * point.rate_slope(s)[2 + t]
+            });
+            let Some(change) = jacobian.lu().solve(&residual) else { break };
+            z.iter_mut().zip(change.iter()).for_each(|(z, d)| *z -= d);
+        }
+        if z.iter().any(|z| !z.is_finite()) {
+            z = before;
+        }
+        rate.evaluate_values(&motion, &z, &mut rates)[0]
+    })
+}

@@ -1,0 +1,491 @@
+//! Reduction of a sector of a ring, valid for all its waves.
+//!
+//! The matrices of a wave are affine in `e^{jθ}`. Therefore its modes and residual vectors
+//! depend smoothly on the nodal diameter. Real and imaginary parts of those of some diameters
+//! form one real basis of the sector, `q(s) = V p(s)`. The reduced ring couples adjacent
+//! sectors only, like the whole ring: `V* A(θ) V` for every θ at once.
+//!
+//! It has the modes of these diameters exactly and is compared with the whole ring for other
+//! diameters. The number of diameters follows from the required error.
+//!
+//! Differences between sectors use the same basis, `Vᵀ ΔA V`: the nominal modes of the ring
+//! approximately span the space of the mistuned ring (`nominal_modes`, `mistuning_error`). If
+//! that is not accurate enough, the basis also receives residual vectors of the forces `D φ`,
+//! which a deviating blade exerts in the modes φ.
+//!
+//! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of
+//! nominal system modes", J. Eng. Gas Turbines Power 123, 893-900.
+
+use super::{
+    FullStructure, ReducedMatrices, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance,
+    Row, RubinBasis, StructureDamping, damping, residual_flexibility,
+};
+use crate::structure::sector::{is_real, wave_entries};
+use crate::structure::sector_boundary::{Blade, symmetrized};
+use crate::structure::{CyclicSector, RingEntry, unit_root};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+use stickslip_numerics::eigen;
+use stickslip_numerics::sparse::{ModeSelection, NaturalModes, multi_vector};
+
+/// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
+/// which a combination is dropped. They are tried in this sequence.
+const SIZES: [(usize, f64); 5] = [(1, 1e-6), (1, 1e-9), (2, 1e-9), (3, 1e-9), (3, 1e-12)];
+/// Multiples of the frequency of interest up to which the modes of every wave are tried.
+const EXTENTS: [f64; 2] = [1.5, 3.0];
+/// First entry of the sequence of extents and sizes that each step tries for different blades.
+/// The first step is that of the tuned ring, without blade vectors.
+pub(in crate::structure) const STEPS: [usize; 5] = [0, 1, 2, 7, 9];
+/// Converts a relative shift of a natural frequency to an error of the receptance: the shift
+/// divided by this half width of a resonance. Modes that no port observes are compared in this
+/// way.
+pub(super) const HALF_WIDTH: f64 = 1e-3;
+/// Largest number of samples in the comparison of a wave; each needs a factorization of twice
+/// the size of a sector.
+const SAMPLES: usize = 5;
+
+/// A reduced sector.
+#[derive(Debug, Clone)]
+pub(crate) struct ReducedSector {
+    pub kind: String,
+    /// Columns over the remaining rows.
+    pub basis: Vec<f64>,
+    pub n: usize,
+    /// Entries as row, column, shift, value.
+    pub mass: Vec<RingEntry>,
+    pub damping: Option<Vec<RingEntry>>,
+    pub stiffness: Vec<RingEntry>,
+    /// Ports over coordinates: port, coordinate, shift, weight.
+    pub ports: Vec<RingEntry>,
+    pub port_count: usize,
+}
+
+/// Result of a reduction.
+#[derive(Debug, Clone)]
+pub(in crate::structure) struct SectorReduction {
+    pub reduced: ReducedSector,
+    pub deviation: ReductionDeviation,
+    /// Frequencies of the computed waves, rad/s, ascending. Each pair of travelling waves is
+    /// listed once.
+    pub frequencies: Vec<f64>,
+    /// Number of free motions among them.
+    pub free: usize,
+    /// Upper end of the frequency range of the deviation, rad/s.
+    pub up_to: f64,
+    /// Highest frequency for which the basis is intended, rad/s.
+    pub serves: f64,
+}
+
+/// A computed wave.
+struct ComputedWave {
+    diameter: usize,
+    whole: FullStructure,
+    modes: NaturalModes,
+    /// Multiple of the frequency of interest up to which modes are computed.
+    extent: f64,
+    reference: ReferenceReceptance,
+}
+
+/// Returns the first Gram tolerance for this number of orders.
+fn share(orders: usize) -> f64 {
+    SIZES.iter().find(|(order, _)| *order >= orders).map_or(SIZES[SIZES.len() - 1].1, |(_, share)| *share)
+}
+
+/// The waves of a sector, computed on request.
+struct WaveCollection<'a> {
+    sector: &'a CyclicSector,
+    seen: &'a [Row],
+    /// For different blades: the blade, and the highest frequency of interest.
+    blade: Option<(&'a Blade, f64)>,
+    computed: Vec<ComputedWave>,
+}
+
+impl CyclicSector {
+    /// Returns the reduced sector, observed at these weighted sums of the component's rows. For
+    /// different blades, it includes blade vectors, from this entry of [`STEPS`] on.
+    pub(in crate::structure) fn reduced(
+        &self,
+        seen: &[Row],
+        how: &Reduction,
+        blade: Option<(&Blade, usize)>,
+    ) -> Result<SectorReduction, ReductionError> {
+        if seen.is_empty() {
+            return Err(ReductionError::NoPorts);
+        }
+        let mut waves = WaveCollection { sector: self, seen, blade: None, computed: Vec::new() };
+        match *how {
+            Reduction::None { .. } => Err(ReductionError::NoPorts),
+            Reduction::UpTo { up_to, tolerance, kind } => {
+                waves.blade = blade.map(|(blade, _)| (blade, up_to));
+                waves.up_to(up_to, tolerance, kind, blade.map_or(0, |(_, step)| STEPS[step]))
+            }
+            Reduction::Modes { modes, kind, orders, up_to } => waves.with_modes(modes, (kind, orders), up_to),
+        }
+    }
+
+    /// Returns the nodal diameters of a refinement level. High levels contain all diameters.
+    pub(super) fn diameters(&self, level: usize) -> Vec<usize> {
+        let (half, parts) = (self.sectors / 2, 2usize << level);
+        let mut all: Vec<usize> = (0..=parts).map(|part| (part * half + parts / 2) / parts).collect();
+        all.dedup();
+        all
+    }
+}
+
+impl WaveCollection<'_> {
+    /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
+    /// of interest.
+    fn compute(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
+        for &diameter in diameters {
+            match self.computed.iter_mut().find(|wave| wave.diameter == diameter) {
+                Some(wave) if wave.extent >= extent => {}
+                Some(wave) => {
+                    wave.modes = wave.whole.modes(extent * up_to)?;
+                    wave.extent = extent;
+                }
+                None => {
+                    let whole = self.sector.wave(diameter, self.seen)?;
+                    let modes = whole.modes(extent * up_to)?;
+                    let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
+                    self.computed.push(ComputedWave { diameter, whole, modes, extent, reference });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn up_to(
+        &mut self,
+        up_to: f64,
+        tolerance: f64,
+        kind: Option<ReductionKind>,
+        from: usize,
+    ) -> Result<SectorReduction, ReductionError> {
+        for (what, value) in
+            [("the largest frequency of a reduction (rad/s)", up_to), ("the tolerance of a reduction", tolerance)]
+        {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ReductionError::Number { what, value, must: "positive" });
+            }
+        }
+        let kind = kind.unwrap_or(ReductionKind::Rubin);
+        let mut best: Option<(ReductionDeviation, usize)> = None;
+        let mut level = 0;
+        let tried = EXTENTS.into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)));
+        for (extent, size) in tried.skip(from) {
+            loop {
+                let taken = self.sector.diameters(level);
+                let between = self.sector.diameters(level + 1);
+                self.compute(&between, up_to, extent)?;
+                let reduced = self.basis(&taken, size, kind)?;
+                let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
+                let (own, all) = (at(&taken)?, at(&between)?);
+                if best.is_none_or(|(least, _)| all.error < least.error) {
+                    best = Some((all, reduced.dofs()));
+                }
+                if all.error <= tolerance {
+                    return Ok(self.chosen(reduced, all, (up_to, up_to)));
+                }
+                // if the computed waves are accurate, other diameters are missing
+                if own.error > tolerance || taken == between {
+                    break;
+                }
+                level += 1;
+            }
+        }
+        let (least, dofs) = best.unwrap_or((ReductionDeviation { error: f64::INFINITY, omega: up_to }, 0));
+        Err(ReductionError::ToleranceNotReached { best: least.error, at: least.omega, dofs, tolerance })
+    }
+
+    /// Reduces the sector with a fixed number of modes of every wave.
+    fn with_modes(
+        &mut self,
+        count: usize,
+        (kind, orders): (ReductionKind, usize),
+        up_to: f64,
+    ) -> Result<SectorReduction, ReductionError> {
+        let level = 1;
+        let (taken, between) = (self.sector.diameters(level), self.sector.diameters(level + 1));
+        let mut serves = f64::INFINITY;
+        let mut wholes = Vec::new();
+        for &diameter in &between {
+            let whole = self.sector.wave(diameter, self.seen)?;
+            let copies = if is_real(diameter, self.sector.sectors) { 1 } else { 2 };
+            let modes = whole.lowest_modes(copies * count)?;
+            let last = modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
+            serves = last.min(serves);
+            wholes.push((diameter, whole, modes));
+        }
+        serves /= BEYOND;
+        let up_to = if up_to > 0.0 { up_to } else { serves };
+        for (diameter, whole, modes) in wholes {
+            let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
+            self.computed.push(ComputedWave { diameter, whole, modes, extent: BEYOND, reference });
+        }
+        let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
+        let deviation = self.deviation(&reduced, &between, up_to)?;
+        Ok(self.chosen(reduced, deviation, (up_to, serves)))
+    }
+
+    fn chosen(
+        &self,
+        reduced: ReducedSector,
+        deviation: ReductionDeviation,
+        (up_to, serves): (f64, f64),
+    ) -> SectorReduction {
+        let (mut frequencies, mut free) = (Vec::new(), 0);
+        for wave in &self.computed {
+            let step = if is_real(wave.diameter, self.sector.sectors) { 1 } else { 2 };
+            frequencies.extend(wave.modes.values.iter().step_by(step).map(|value| value.max(0.0).sqrt()));
+            free += wave.modes.rigid_body_count() / step;
+        }
+        frequencies.sort_by(f64::total_cmp);
+        SectorReduction { reduced, deviation, frequencies, free, up_to, serves }
+    }
+
+    /// Builds one basis from the waves of these diameters.
+    fn basis(
+        &self,
+        diameters: &[usize],
+        (order, share): (usize, f64),
+        kind: ReductionKind,
+    ) -> Result<ReducedSector, ReductionError> {
+        let n = self.sector.dofs;
+        let mut vectors: Vec<f64> = Vec::new();
+        let taken = || self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
+        for wave in taken() {
+            let basis = match kind {
+                ReductionKind::Rubin => RubinBasis::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
+                ReductionKind::CraigBampton => {
+                    let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
+                    let wanted = ModeSelection::UpTo { value: omega * omega, most: super::MAX_MODES };
+                    Arc::unwrap_or_clone(wave.whole.fixed_interface(wanted)?.basis)
+                }
+            };
+            vectors.extend(basis);
+            if let Some((blade, up_to)) = self.blade {
+                vectors.extend(self.blade_vectors(wave, blade, up_to, order)?);
+            }
+        }
+        let modes = taken().map(|wave| wave.modes.count()).max().unwrap_or(0);
+        let basis = self.independent(&vectors, share)?;
+        let name = match kind {
+            ReductionKind::Rubin => "modes and residual vectors",
+            ReductionKind::CraigBampton => "Craig-Bampton",
+        };
+        let count = diameters.len();
+        let differing = if self.blade.is_some() { ", with blade vectors" } else { "" };
+        let modes = modes.div_ceil(2).max(1);
+        let kind = format!("one sector: {name} of {count} nodal diameters, up to {modes} modes each{differing}");
+        Ok(self.projected(kind, basis, n))
+    }
+
+    /// Returns residual vectors of a wave for the forces of a deviating blade, in its modes up
+    /// to a frequency. Both parts of the wave are included.
+    fn blade_vectors(
+        &self,
+        wave: &ComputedWave,
+        blade: &Blade,
+        up_to: f64,
+        order: usize,
+    ) -> Result<Vec<f64>, ReductionError> {
+        let (n, modes) = (self.sector.dofs, &wave.modes);
+        let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
+        let forces = (modes.rigid_body_count()..inside).map(|mode| -> Row {
+            let parts = modes.shape(mode).chunks_exact(n).flat_map(|part| blade.times(part));
+            parts.enumerate().filter(|(_, force)| *force != 0.0).collect()
+        });
+        let forces: Vec<Row> = forces.filter(|row| !row.is_empty()).collect();
+        if forces.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (mut basis, _) = residual_flexibility::basis(&wave.whole.with_ports(forces)?, modes, 0.0, order)?;
+        Ok(basis.split_off(modes.shapes.len()))
+    }
+
+    /// Returns combinations of columns over the remaining rows that are orthogonal in the
+    /// energy of the sector. Nearly dependent combinations are dropped. Each is scaled to unit
+    /// displacement at the port that moves most.
+    fn independent(&self, vectors: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
+        let n = self.sector.dofs;
+        let (mass, stiffness) = (
+            self.sector.with_fixed_adjacent(&self.sector.mass)?,
+            self.sector.with_fixed_adjacent(&self.sector.stiffness)?,
+        );
+        let highest =
+            self.computed.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
+        let mut energies = multi_vector::inner_products(n, vectors, &stiffness.multiply_columns(vectors));
+        energies += multi_vector::inner_products(n, vectors, &mass.multiply_columns(vectors)) * highest;
+        let size: Vec<f64> = energies.diagonal().iter().map(|e| e.max(0.0).sqrt()).collect();
+        let moving: Vec<usize> = (0..size.len()).filter(|&k| size[k] > 0.0).collect();
+        let gram = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
+            let (i, k) = (moving[i], moving[k]);
+            0.5 * (energies[(i, k)] + energies[(k, i)]) / (size[i] * size[k])
+        });
+        let eigen = eigen::symmetric(gram).ok_or(ReductionError::OutOfRange)?;
+        let largest = eigen.eigenvalues.amax();
+        let mut kept: Vec<usize> = (0..moving.len()).filter(|&k| eigen.eigenvalues[k] > share * largest).collect();
+        kept.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let mut weights = DMatrix::zeros(size.len(), kept.len());
+        for (column, &k) in kept.iter().enumerate() {
+            for (i, &row) in moving.iter().enumerate() {
+                weights[(row, column)] = eigen.eigenvectors[(i, k)] / (eigen.eigenvalues[k].sqrt() * size[row]);
+            }
+        }
+        let mut basis = multi_vector::combine(n, vectors, &weights);
+        let seen: Vec<_> = self.seen.iter().map(|row| self.sector.row(row)).collect();
+        for column in basis.chunks_exact_mut(n.max(1)) {
+            let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            let port = seen.iter().map(|row| row.iter().map(|(at, _, w)| w * column[*at]).sum::<f64>().abs());
+            let port = port.fold(0.0, f64::max);
+            let size = if port > super::UNSEEN * largest { port } else { largest };
+            column.iter_mut().for_each(|x| *x /= size);
+        }
+        Ok(basis)
+    }
+
+    fn projected(&self, kind: String, basis: Vec<f64>, n: usize) -> ReducedSector {
+        let sector = self.sector;
+        let project = |entries: &Vec<RingEntry>| projected(entries, n, &basis);
+        let symmetric = |entries: &Vec<RingEntry>| symmetrized(project(entries), |shift| -shift);
+        let mut ports = Vec::new();
+        for (port, row) in self.seen.iter().enumerate() {
+            for (k, column) in basis.chunks_exact(n.max(1)).enumerate() {
+                for shift in [0, 1] {
+                    let parts = sector.row(row).into_iter().filter(|part| part.1 == shift);
+                    let weight: f64 = parts.map(|(at, _, weight)| weight * column[at]).sum();
+                    if weight != 0.0 {
+                        ports.push((port, k, shift, weight));
+                    }
+                }
+            }
+        }
+        ReducedSector {
+            kind,
+            n,
+            mass: symmetric(&sector.mass),
+            damping: sector.damping.as_ref().map(project),
+            stiffness: symmetric(&sector.stiffness),
+            ports,
+            port_count: self.seen.len(),
+            basis,
+        }
+    }
+
+    /// Returns the error of the waves of these diameters relative to the whole ring.
+    fn deviation(
+        &self,
+        reduced: &ReducedSector,
+        diameters: &[usize],
+        up_to: f64,
+    ) -> Result<ReductionDeviation, ReductionError> {
+        let mut worst = ReductionDeviation { error: 0.0, omega: 0.0 };
+        for wave in self.computed.iter().filter(|wave| diameters.contains(&wave.diameter)) {
+            let small = reduced.wave(wave.diameter, self.sector.sectors)?;
+            let deviation = wave.reference.deviation(&small);
+            let own = small.frequencies().unwrap_or_default();
+            let found = wave
+                .modes
+                .values
+                .iter()
+                .map(|value| value.max(0.0).sqrt())
+                .enumerate()
+                .skip(wave.modes.rigid_body_count());
+            let shifts = found.take_while(|(_, omega)| *omega <= up_to).map(|(k, omega)| {
+                let error = own.get(k).map_or(f64::INFINITY, |own| (own / omega - 1.0).abs() / HALF_WIDTH);
+                ReductionDeviation { error, omega }
+            });
+            worst =
+                shifts.chain([deviation]).fold(worst, |worst, one| if one.error > worst.error { one } else { worst });
+        }
+        Ok(worst)
+    }
+}
+
+/// Same ratio as in [`Reduction::Modes`] of a component: the last modes only improve those
+/// below.
+const BEYOND: f64 = 1.5;
+
+/// Returns `Vᵀ A V` for entries with shifts.
+fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
+    let r = basis.len() / n.max(1);
+    let mut out = Vec::with_capacity(3 * r * r);
+    for shift in [-1, 0, 1] {
+        let mut moved = vec![0.0; basis.len()];
+        for &(row, column, _, value) in entries.iter().filter(|entry| entry.2 == shift) {
+            for k in 0..r {
+                moved[k * n + row] += value * basis[k * n + column];
+            }
+        }
+        let product = multi_vector::inner_products(n, basis, &moved);
+        let all = (0..r).flat_map(|row| (0..r).map(move |column| (row, column)));
+        out.extend(all.map(|at| (at.0, at.1, shift, product[at])).filter(|entry| entry.3 != 0.0));
+    }
+    out
+}
+
+impl ReducedSector {
+    /// Returns the number of coordinates of a sector.
+    pub fn dofs(&self) -> usize {
+        self.basis.len() / self.n.max(1)
+    }
+
+    /// Returns the damping within every sector and between any two sectors, for damping that
+    /// depends on modes.
+    pub fn damped(&self, by: &StructureDamping, sectors: usize) -> Result<Vec<RingEntry>, ReductionError> {
+        by.check()?;
+        let r = self.dofs();
+        if let StructureDamping::Rayleigh { mass, stiffness } = *by {
+            let of = |entries: &[RingEntry], factor: f64| -> Vec<RingEntry> {
+                entries.iter().map(|&(row, column, shift, value)| (row, column, shift, factor * value)).collect()
+            };
+            return Ok([of(&self.mass, mass), of(&self.stiffness, stiffness)].concat());
+        }
+        // damping by the modes of every wave; C of a sector is the phase-weighted mean over the
+        // waves
+        let mut between = vec![DMatrix::<f64>::zeros(r, r); sectors];
+        for diameter in 0..=sectors / 2 {
+            let wave = self.wave(diameter, sectors)?;
+            let own = damping(by, &wave.mass, &wave.stiffness, None)?;
+            let real = is_real(diameter, sectors);
+            let share = if real { 1.0 } else { 2.0 } / sectors as f64;
+            for (shift, sum) in between.iter_mut().enumerate() {
+                let phase = unit_root(-((diameter * shift) as i64), sectors);
+                *sum += own.view((0, 0), (r, r)) * (phase.re * share);
+                if !real {
+                    *sum -= own.view((r, 0), (r, r)) * (phase.im * share);
+                }
+            }
+        }
+        let all = between.into_iter().enumerate().flat_map(|(shift, matrix)| {
+            let at = (0..r).flat_map(|row| (0..r).map(move |column| (row, column)));
+            at.map(|at| (at.0, at.1, shift as i64, matrix[at])).collect::<Vec<_>>()
+        });
+        let back = |shift: i64| (sectors as i64 - shift) % sectors as i64;
+        Ok(symmetrized(all.collect(), back))
+    }
+
+    /// Returns the reduced structure in a wave.
+    pub(super) fn wave(&self, diameter: usize, sectors: usize) -> Result<ReducedMatrices, ReductionError> {
+        let r = self.dofs();
+        let copies = if is_real(diameter, sectors) { 1 } else { 2 };
+        let matrix = |entries: &[RingEntry], rows: usize| {
+            let mut sum = DMatrix::zeros(copies * rows, copies * r);
+            for (row, column, value) in wave_entries(entries.iter().copied(), [rows, r], diameter, sectors) {
+                sum[(row, column)] += value;
+            }
+            sum
+        };
+        let mass = matrix(&self.mass, r);
+        Ok(ReducedMatrices {
+            kind: String::new(),
+            damping: self.damping.as_ref().map_or_else(|| &mass * 0.0, |own| matrix(own, r)),
+            stiffness: matrix(&self.stiffness, r),
+            ports: matrix(&self.ports, self.port_count),
+            mass,
+            basis: Arc::default(),
+            weights: DMatrix::zeros(0, 0),
+            n: 0,
+        })
+    }
+}
