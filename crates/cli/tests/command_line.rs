@@ -589,7 +589,7 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     assert!(spot == read && spot < 1e-4, "{spot:e} {read:e}");
     let said = stickslip(folder.path(), &["check", "few/study.toml"]);
     let said = String::from_utf8_lossy(&said.stdout).into_owned();
-    assert!(said.contains("before, error") && said.contains("up to 400 Hz"), "{said}");
+    assert!(said.contains("by an earlier reduction, error") && said.contains("up to 400 Hz"), "{said}");
     // A structure that is already reduced has nothing to save.
     let said = stickslip(folder.path(), &["reduce", "few/study.toml", "--out", "fewer"]);
     assert_eq!(said.status.code(), Some(2), "{}", String::from_utf8_lossy(&said.stderr));

@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(report.empty_rows, [3]);
         assert_eq!(report.asymmetry, 1e-36);
         assert_eq!((report.smallest, report.zeros), (2.0, 1));
-        let text = "4 x 4, 4 entries and 1 zeros\nvalues from 2.000e0 to 1.000e36\nnot symmetric: the triangles \
+        let text = "4 x 4, 4 entries and 1 explicit zeros\nvalues from 2.000e0 to 1.000e36\nnot symmetric: the triangles \
                     differ by 1.0e-36 of the largest value\n2 rows with a zero diagonal: 3, 4\n1 row with a negative \
                     diagonal: 2\n1 row with no entry: 4\n1 row with 1e36 on the diagonal (constrained): 1\nrows are \
                     named 1.x, 2.x, 3.x, 4.x";
