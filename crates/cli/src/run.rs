@@ -442,7 +442,8 @@ fn print_json(dataset: &Dataset) -> Exit {
 
 /// Prints the failed points and those of lower accuracy than requested on standard error.
 fn complain(dataset: &Dataset) {
-    for failure in dataset.failures.iter().take(NAMED_FAILURES) {
+    let failures = dataset.failures_by_reason();
+    for failure in failures.iter().take(NAMED_FAILURES) {
         complain!("{}: {failure}", dataset.name);
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
@@ -453,12 +454,8 @@ fn complain(dataset: &Dataset) {
             );
         }
     }
-    if dataset.failures.len() > NAMED_FAILURES {
-        complain!(
-            "{}: and {} more failed points, see record.json",
-            dataset.name,
-            dataset.failures.len() - NAMED_FAILURES
-        );
+    if failures.len() > NAMED_FAILURES {
+        complain!("{}: and {} more failed points, see record.json", dataset.name, failures.len() - NAMED_FAILURES);
     }
 }
 

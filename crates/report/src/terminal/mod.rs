@@ -93,7 +93,8 @@ impl Terminal {
         if let Some(more @ 1..) = notes.len().checked_sub(NOTES) {
             let _ = writeln!(out, "note: {more} more note{}; all are in record.json", plural(more));
         }
-        for failure in dataset.failures.iter().take(FAILURES) {
+        let failures = dataset.failures_by_reason();
+        for failure in failures.iter().take(FAILURES) {
             let text = clean(&failure.to_string());
             for (i, line) in self.wrapped(&text, "  ").iter().enumerate() {
                 match line.strip_prefix("failed").filter(|_| i == 0) {
@@ -103,7 +104,7 @@ impl Terminal {
                 .unwrap_or(()); // Writing to a string cannot fail.
             }
         }
-        if let Some(more @ 1..) = dataset.failures.len().checked_sub(FAILURES) {
+        if let Some(more @ 1..) = failures.len().checked_sub(FAILURES) {
             let _ = writeln!(
                 out,
                 "{} at {more} more point{}; all are in record.json",
@@ -458,7 +459,11 @@ results/fig02/: loops_summary.csv, figure.svg
 
     #[test]
     fn failures_are_named_then_counted() {
-        let text = Terminal::default().text(&samples::hostile(), &[]);
+        let same_reason = Terminal::default().text(&samples::hostile(), &[]);
+        assert!(same_reason.contains(", and at 8 more: ") && !same_reason.contains("more points"), "{same_reason}");
+        let mut dataset = samples::hostile();
+        dataset.failures.iter_mut().enumerate().for_each(|(i, failure)| failure.reason += &format!(" ({i})"));
+        let text = Terminal::default().text(&dataset, &[]);
         assert_eq!(text.matches("failed at Ft").count(), FAILURES);
         assert!(text.contains("failed at 4 more points") && text.contains("240 converged, 9 not converged"), "{text}");
         assert!(!text.contains('\x1b'));

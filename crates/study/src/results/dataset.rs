@@ -31,6 +31,21 @@ pub struct Dataset {
     pub record: Record,
 }
 
+impl Dataset {
+    /// Returns the failures with consecutive ones of the same reason joined, such as those of all
+    /// places at one peak.
+    pub fn failures_by_reason(&self) -> Vec<Failure> {
+        let joined = |same: &[Failure]| {
+            let Failure { location, reason } = same[0].clone();
+            match same.len() {
+                1 => Failure { location, reason },
+                count => Failure { location: format!("{location}, and at {} more", count - 1), reason },
+            }
+        };
+        self.failures.chunk_by(|a, b| a.reason == b.reason).map(joined).collect()
+    }
+}
+
 /// A table: named columns of equal length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {

@@ -162,6 +162,9 @@ impl Alternation {
     }
 }
 
+/// The factored equations of the stages of a step.
+type StageFactor = LU<f64, Dyn, Dyn>;
+
 /// Displacements or velocities, [axis][sample].
 type Signals = [Vec<f64>; MAX_DIRECTIONS];
 
@@ -294,7 +297,7 @@ impl RateMarch<'_> {
         length: f64,
         points: &[RatePoint],
         motions: &[RelativeMotion<f64>],
-        factor: &LU<f64, Dyn, Dyn>,
+        factor: &StageFactor,
         rows: &mut [f64],
     ) -> bool {
         let (m, d) = (points[0].rate.len(), self.axes);
@@ -346,7 +349,7 @@ fn newton_step(
     before: &[f64],
     stage: &[f64],
     scale: f64,
-) -> Option<(DVector<f64>, f64, LU<f64, Dyn, Dyn>)> {
+) -> Option<(DVector<f64>, f64, StageFactor)> {
     let m = before.len();
     let matrix = DMatrix::from_fn(2 * m, 2 * m, |row, column| {
         let (i, s, k, t) = (row / m, row % m, column / m, column % m);

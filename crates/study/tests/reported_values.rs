@@ -1,0 +1,164 @@
+//! Small studies whose right values were computed without this program, in Python with NumPy and
+//! SciPy: linear motion by formulas, integration in time (Radau, 1e-8 a step), own harmonic balance
+//! with 11 and 15 harmonics.
+
+use stickslip_study::dataset::{Dataset, Table};
+use stickslip_study::read_study;
+use stickslip_study::run::{Context, run};
+
+fn dataset(text: &str) -> Dataset {
+    let study = read_study("study.toml", &format!("schema = 1\n{text}"), &[]).unwrap();
+    run(&study, &Context::without_progress(1)).unwrap()
+}
+
+fn table<'d>(dataset: &'d Dataset, name: &str) -> &'d Table {
+    dataset.tables.iter().find(|table| table.name == name).unwrap()
+}
+
+fn assert_near(found: f64, expected: f64, tolerance: f64) {
+    assert!((found / expected - 1.0).abs() < tolerance, "{found} {expected}");
+}
+
+/// A block of 1 kg with bristle friction, on a spring of 2 N/m to `end`.
+fn bristles(end: &str, study: &str) -> String {
+    format!(
+        r#"[[mass]]
+name = "block"
+mass = "1 kg"
+[[spring]]
+between = ["block", "{end}"]
+stiffness = "2 N/m"
+[[joint]]
+name = "rub"
+between = ["block", "ground"]
+law = {{ kind = "lugre", stiffness = "1e5 N/m", damping = "316.2278 N s/m", viscous = "0.4 N s/m", limit = "1 N", static_limit = "1.5 N", velocity = "0.001 m/s" }}
+{study}"#
+    )
+}
+
+/// In small motion the bristles are a spring and a damper: `F/(k + s₀ + jω (s₁ + s₂) - ω² m)`.
+#[test]
+fn small_motion_on_bristles_is_linear() {
+    let found = dataset(&bristles(
+        "ground",
+        r#"[[force]]
+on = "block"
+amplitude = "1 mN"
+[study]
+kind = "response"
+frequency = "40 Hz"
+"#,
+    ));
+    let amplitude = table(&found, "curve").numbers("block_amplitude_m").unwrap()[0];
+    assert_near(amplitude, 0.011404e-6, 1e-4);
+}
+
+/// A block that a spring pulls whose end moves at constant speed, after 40 s.
+#[test]
+fn a_pulled_block_on_bristles_moves_as_it_does_in_scipy() {
+    let found = dataset(&bristles(
+        "hand",
+        r#"[[motion]]
+on = "hand"
+amplitude = "1000 m"
+phase = "-90 deg"
+[study]
+kind = "transient"
+frequency = "1e-4 rad/s"
+duration = "40 s"
+time_step = "10 ms"
+"#,
+    ));
+    let last = *table(&found, "motion").numbers("block_displacement_m").unwrap().last().unwrap();
+    assert_near(last, 3.306_778, 1e-4);
+}
+
+/// Coulomb friction shifts the centre of each swing, and not the time between two turning points:
+/// every cycle has the frequency `ω sqrt(1 - ζ²)/2π`.
+#[test]
+fn every_cycle_of_a_decay_has_its_frequency() {
+    let found = dataset(
+        r#"[[mass]]
+name = "m"
+mass = "2 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "800 N/m"
+damping = "4 N s/m"
+[[joint]]
+name = "rub"
+between = ["m", "ground"]
+law = { kind = "coulomb", limit = "3 N" }
+[study]
+kind = "transient"
+start = { m = "0.1 m" }
+duration = "5 s"
+time_step = "10 ms"
+"#,
+    );
+    let frequencies = table(&found, "decay").numbers("frequency_Hz").unwrap();
+    assert!(frequencies.len() > 1);
+    frequencies.iter().for_each(|frequency| assert_near(*frequency, 3.179_117_5, 1e-6));
+}
+
+/// A cubic energy sink on a linear oscillator, beside its peak.
+#[test]
+fn an_energy_sink_vibrates_as_own_harmonic_balance_says() {
+    let found = dataset(
+        r#"[[mass]]
+name = "main"
+mass = "2 kg"
+[[mass]]
+name = "sink"
+mass = "0.1 kg"
+[[spring]]
+between = ["main", "ground"]
+stiffness = "8 N/m"
+damping = "0.04 N s/m"
+[[spring]]
+between = ["main", "sink"]
+damping = "0.04 N s/m"
+[[joint]]
+name = "cubic"
+between = ["main", "sink"]
+law = { kind = "cubic", stiffness = "800 N/m^3" }
+[[force]]
+on = "main"
+amplitude = "0.016 N"
+[study]
+kind = "response"
+frequency = ["1.8 rad/s", "2 rad/s"]
+"#,
+    );
+    let amplitudes = table(&found, "curve").numbers("main_amplitude_m").unwrap();
+    assert_near(amplitudes[0], 19.981_89e-3, 1e-3);
+    assert_near(amplitudes[1], 11.513_80e-3, 1e-3);
+}
+
+/// A lap joint is pulled and let go: it carries the force of its displacement, so that the first
+/// swing reaches 161 µm of 200 µm. A joint relaxed at the place of release would leave 121 µm.
+#[test]
+fn a_lap_joint_that_is_let_go_swings_about_zero() {
+    let found = dataset(
+        r#"[[mass]]
+name = "m"
+mass = "10 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "20 N/um"
+damping = "20 N s/m"
+[[joint]]
+name = "bolt"
+between = ["m", "ground"]
+law = { kind = "iwan", stiffness = "10 N/um", limit = "1 kN", chi = -0.4, beta = 0.5 }
+[study]
+kind = "transient"
+start = { m = "0.2 mm" }
+duration = "4 ms"
+time_step = "0.01 ms"
+"#,
+    );
+    let motion = table(&found, "motion").numbers("m_displacement_m").unwrap();
+    let lowest = motion.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_near(lowest, -161e-6, 5e-3);
+}
