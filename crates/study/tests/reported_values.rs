@@ -36,7 +36,8 @@ law = {{ kind = "lugre", stiffness = "1e5 N/m", damping = "316.2278 N s/m", visc
     )
 }
 
-/// In small motion the bristles are a spring and a damper: `F/(k + s₀ + jω (s₁ + s₂) - ω² m)`.
+/// In small motion the bristles are a spring and a damper: `F/(k + s₀ + jω (s₁ + s₂) - ω² m)`. The
+/// force reaches 8e-4 of the slip limit, which changes the amplitude by some 1e-4.
 #[test]
 fn small_motion_on_bristles_is_linear() {
     let found = dataset(&bristles(
@@ -50,7 +51,7 @@ frequency = "40 Hz"
 "#,
     ));
     let amplitude = table(&found, "curve").numbers("block_amplitude_m").unwrap()[0];
-    assert_near(amplitude, 0.011404e-6, 1e-4);
+    assert_near(amplitude, 0.011_403_860e-6, 5e-4);
 }
 
 /// A block that a spring pulls whose end moves at constant speed, after 40 s.
@@ -135,8 +136,9 @@ frequency = ["1.8 rad/s", "2 rad/s"]
     assert_near(amplitudes[1], 11.513_80e-3, 1e-3);
 }
 
-/// A lap joint is pulled and let go: it carries the force of its displacement, so that the first
-/// swing reaches 161 µm of 200 µm. A joint relaxed at the place of release would leave 121 µm.
+/// A lap joint is pulled and let go. It carries the force of its displacement, so that the first
+/// swing goes from 200 to -175.7375 µm (own integration in NumPy with 2000 sliders). A joint
+/// relaxed at the place of release would go to -121.86 µm.
 #[test]
 fn a_lap_joint_that_is_let_go_swings_about_zero() {
     let found = dataset(
@@ -160,5 +162,5 @@ time_step = "0.01 ms"
     );
     let motion = table(&found, "motion").numbers("m_displacement_m").unwrap();
     let lowest = motion.iter().copied().fold(f64::INFINITY, f64::min);
-    assert_near(lowest, -161e-6, 5e-3);
+    assert_near(lowest, -175.7375e-6, 1e-4);
 }
