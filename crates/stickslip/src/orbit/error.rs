@@ -253,7 +253,7 @@ pub enum OrbitError {
         estimate: f64,
         /// The permitted error.
         tolerance: f64,
-        /// State at t = 0 of the longest series, see [`OrbitError::candidate`].
+        /// State at t = 0 of the longest series. Another method may start from it.
         state: Vec<f64>,
         /// Advice about other methods, as text that follows a comma; empty if no method was
         /// asked or none applies.
@@ -285,7 +285,7 @@ pub enum OrbitError {
         omega: f64,
         /// Behaviour of the integrated motion.
         observed: ObservedMotion,
-        /// State at t = 0 of the integrated motion at its end, see [`OrbitError::candidate`].
+        /// State at t = 0 of the integrated motion at its end. Another method may start from it.
         state: Vec<f64>,
     },
     /// The motion of the structure without its joints is unbounded.
