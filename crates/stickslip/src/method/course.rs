@@ -57,12 +57,14 @@ pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option
     let (n, period) = (system.dofs(), TAU / omega);
     start.resize(flow.states(), 0.0);
     let mut state = start;
+    flow.set_drive(system, omega);
+    let drive = flow.drive.clone();
     for grown in 1..GROWTH {
         let share = 0.5 - 0.5 * (PI * grown as f64 / GROWTH as f64).cos();
-        flow.set_scaled_drive(system, omega, share);
+        flow.drive = drive.scaled(share);
         flow.run(&mut state, period, None).ok()?;
     }
-    flow.set_drive(system, omega);
+    flow.drive = drive;
     let mut returns = VecDeque::with_capacity(WINDOW);
     let (mut count, mut next) = (0, PERIODS);
     loop {

@@ -116,11 +116,6 @@ impl IncrementalFlow {
         self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
     }
 
-    /// Sets the excitation at a frequency (rad/s) with all harmonics multiplied by `share`.
-    pub fn set_scaled_drive(&mut self, system: &System, omega: f64, share: f64) {
-        self.drive = self.assembly.drive(system, omega).scaled(share);
-    }
-
     /// Runs from `state` and returns the end state with the record of the run.
     fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), IntegrationError> {
         let mut end = state.to_vec();
