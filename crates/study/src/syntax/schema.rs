@@ -541,6 +541,17 @@ const ONE_SECTOR: Key = optional(
 
 const MAX_HARMONIC: i64 = 1_000;
 
+const PHASE: Key =
+    default("phase", ValueType::Quantity(Dimension::ANGLE, Bounds::Finite), "0 deg", "phase lead", "\"90 deg\"");
+
+const HARMONIC: Key = default(
+    "harmonic",
+    ValueType::Count(0, MAX_HARMONIC),
+    "1",
+    "multiple of the excitation frequency; 0 is constant",
+    "3",
+);
+
 const FORCE: &[Key] = &[
     required("on", ValueType::Name, "the place on which it acts", "\"blade1\""),
     required(
@@ -549,14 +560,8 @@ const FORCE: &[Key] = &[
         "amplitude; on a rotation of a body the amplitude of a moment in N m",
         "\"10 N\"",
     ),
-    default("phase", ValueType::Quantity(Dimension::ANGLE, Bounds::Finite), "0 deg", "phase lead", "\"90 deg\""),
-    default(
-        "harmonic",
-        ValueType::Count(0, MAX_HARMONIC),
-        "1",
-        "multiple of the excitation frequency; 0 is constant",
-        "3",
-    ),
+    PHASE,
+    HARMONIC,
     ENGINE_ORDER,
     NODAL_DIAMETER,
     ONE_SECTOR,
@@ -571,14 +576,8 @@ const MOTION: &[Key] = &[
         "amplitude; for a rotation of a body an angle",
         "\"2 mm\"",
     ),
-    default("phase", ValueType::Quantity(Dimension::ANGLE, Bounds::Finite), "0 deg", "phase lead", "\"90 deg\""),
-    default(
-        "harmonic",
-        ValueType::Count(0, MAX_HARMONIC),
-        "1",
-        "multiple of the excitation frequency; 0 is constant",
-        "3",
-    ),
+    PHASE,
+    HARMONIC,
     ENGINE_ORDER,
     NODAL_DIAMETER,
     ONE_SECTOR,
