@@ -301,17 +301,18 @@ impl LooseDamper {
         (gain, moved)
     }
 
+    /// Returns the stiffness of the structure with the springs of both closed contacts.
+    fn stuck_stiffness(&self) -> DMatrix<f64> {
+        let axes = self.faces.iter().flat_map(|face| face.iter().zip(self.stiffness));
+        axes.fold(self.matrices[2].clone(), |sum, (axis, stiffness)| sum + axis * axis.transpose() * stiffness)
+    }
+
     /// Returns displacements and friction forces in static equilibrium. The constant load grows
     /// slowly, and every motion is critically damped.
     fn pressed(&self) -> Option<(DVector<f64>, [f64; 2])> {
         let n = self.load.len();
         let [m, _, k] = &self.matrices;
-        let mut held = k.clone();
-        for face in &self.faces {
-            for (axis, stiffness) in face.iter().zip(self.stiffness) {
-                held += axis * axis.transpose() * stiffness;
-            }
-        }
+        let held = self.stuck_stiffness();
         let damping = |i: usize| 2.0 * (m[(i, i)] * if i < self.blades { k[(i, i)] } else { held[(i, i)] }).sqrt();
         let damping = DMatrix::from_diagonal(&DVector::from_fn(n, |i, _| damping(i)));
         let rate = (k[(0, 0)] / m[(0, 0)]).sqrt();
@@ -327,12 +328,8 @@ impl LooseDamper {
     /// Returns `None` if no constant friction force keeps both contacts within their slip limits
     /// at every instant.
     pub fn stuck(&self, omega: f64) -> Option<Vec<f64>> {
-        let [m, c, k] = &self.matrices;
-        let mut held = k.clone();
-        for (axis, stiffness) in self.faces.iter().flat_map(|face| face.iter().zip(self.stiffness)) {
-            held += axis * axis.transpose() * stiffness;
-        }
-        let dynamic = (held - m * (omega * omega)).map(|re| Complex64::new(re, 0.0))
+        let [m, c, _] = &self.matrices;
+        let dynamic = (self.stuck_stiffness() - m * (omega * omega)).map(|re| Complex64::new(re, 0.0))
             + c.map(|im| Complex64::new(0.0, omega * im));
         let x = dynamic.lu().solve(&self.excitation)?;
         let (still, _) = self.pressed()?;

@@ -32,7 +32,7 @@ fn main() -> ExitCode {
     let args: Vec<&str> = args.iter().map(String::as_str).collect();
     let done = match args[..] {
         ["record", folder, ref rest @ ..] => {
-            record::Selection::parse(rest).and_then(|what| record::record(Path::new(folder), &what))
+            record::Selection::parse(rest).and_then(|what| record::record(Path::new(folder), &what)).map(|()| true)
         }
         ["compare", old, new] => compare::compare(Path::new(old), Path::new(new)),
         _ => Err(USAGE.to_owned()),
