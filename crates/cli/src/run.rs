@@ -378,7 +378,7 @@ fn finish_shard(study: &Study, shard: Shard, journal: &mut Journal, whole: bool)
     if failed { Exit::SomeFailed } else { Exit::Done }
 }
 
-/// What a command shows besides the files that it writes.
+/// Optional outputs of a command besides the files that it writes.
 #[derive(Clone, Copy)]
 pub(crate) struct Display {
     /// `true` prints the results as JSON.

@@ -131,7 +131,7 @@ pub struct ProductShape {
 /// Says whether a matrix is used as it is stored, or transposed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transpose {
-    /// As it is stored.
+    /// The matrix in its stored order.
     No,
     /// Transposed.
     Yes,

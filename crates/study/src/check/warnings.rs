@@ -29,7 +29,7 @@ pub(crate) fn sampling_warnings(cases: &[SurveyedCase]) -> Vec<String> {
     resonance_warnings(cases).into_iter().chain(coarse_frequencies(cases)).collect()
 }
 
-/// Whether an initial state or a constant load counts as an excitation.
+/// Tells if an initial state or a constant load counts as an excitation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum InitialStates {
     Ignored,

@@ -1,4 +1,4 @@
-//! What a law implements: the trait [`Law`], its views, and the types that they use.
+//! The interface of a law: the trait [`Law`], its views, and the types that they use.
 //!
 //! - `law_trait`: the trait of all laws, and the description of a law in the table.
 //! - `parameter`: parameters, their ranges, and the errors of invalid values.

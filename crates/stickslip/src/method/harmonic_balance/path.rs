@@ -166,7 +166,7 @@ pub(super) fn orbit(
     let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
     let Judged { derivative, defect } = judge
         .map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start, &path.stuck()));
-    // Where a normal force changes the slip limit, or vanishes, a series with twice the harmonics may
+    // If a normal force changes the slip limit, or vanishes, a series with twice the harmonics may
     // be as wrong as the shorter one. The return defect shows it, except on an unstable orbit, whose
     // return multiplies the error.
     let joints = system.joints().iter().zip(&measured.joints);

@@ -100,7 +100,7 @@ pub(in crate::kinds) fn groups(joints: &[String]) -> Vec<(String, Vec<String>)> 
     }
 }
 
-/// How the panels of contact states are drawn.
+/// The drawing of the panels of contact states.
 pub(in crate::kinds) struct SharePlot<'a> {
     /// Abscissae of the rows, and their axis.
     pub(in crate::kinds) x: &'a [f64],
