@@ -3,7 +3,7 @@
 //! It picks event-driven for exact laws and shooting for smooth laws. It picks harmonic balance
 //! for cheaper or other systems, and for travelling waves on a disk.
 
-use super::followed::Kind;
+use super::flow::followed::Kind;
 use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
 use super::{

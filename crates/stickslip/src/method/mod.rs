@@ -7,42 +7,27 @@
 //! reuse from orbit to orbit.
 
 mod advice;
-mod assembly;
 pub mod auto;
-mod course;
-mod drive;
 mod error;
 pub mod event_driven;
-mod evidence;
-mod exact_flow;
 mod flow;
-mod followed;
-mod guess;
 pub mod harmonic_balance;
-mod incremental;
 mod list;
 mod option;
-mod periodic;
-mod repeated;
-mod residual_traction;
+mod orbit_search;
 pub mod shooting;
-mod smooth;
 mod static_equilibrium;
-mod stepped;
-mod steps;
-mod switched;
 pub mod time_history;
 mod traits;
 pub mod transient;
-mod vibration;
 mod ways;
 
 pub use crate::orbit::{IntegrationError, OrbitError};
 pub use advice::{advised, ways};
 pub use error::{MethodError, Refusal};
-pub use evidence::evidence_steps;
 use list::LIST;
 pub use option::{MethodOption, Options, WIDTH};
+pub use orbit_search::evidence::evidence_steps;
 pub use static_equilibrium::StaticEquilibrium;
 pub use traits::{Choice, Method, MethodInfo, Solver};
 pub use ways::Ways;

@@ -5,21 +5,24 @@
 //! for the transient to decay proves nothing. Newton's method with the exact derivative of the
 //! integrator's return map closes the orbit instead.
 
-use super::assembly::{Assembly, NEAR_REST};
 use super::event_driven::MISSING_WORK;
 use super::flow::Flow;
-use super::followed::Kind;
-use super::guess::Guess;
-use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
+use super::flow::assembly::{Assembly, NEAR_REST};
+use super::flow::followed::Kind;
+use super::flow::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
+use super::flow::smooth::flow::{Lengths, SmoothFlow};
+use super::flow::stepped::SteppedPath;
+use super::flow::switched::flow::SwitchedFlow;
 use super::option::{PERIOD, periods, width};
-use super::periodic::{Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
-use super::repeated::Afresh;
-use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
-use super::smooth::flow::{Lengths, SmoothFlow};
+use super::orbit_search::guess::Guess;
+use super::orbit_search::periodic::{
+    Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm,
+};
+use super::orbit_search::repeated::Afresh;
+use super::orbit_search::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
+use super::orbit_search::vibration;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
-use super::stepped::SteppedPath;
-use super::switched::flow::SwitchedFlow;
-use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
+use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::postprocess::{CONSERVATIVE_WORK, results};
@@ -244,7 +247,7 @@ impl<'a> Shooter<'a> {
             Kind::Switched => Stepping::Switched(Box::new(SwitchedFlow::new(system, options.tolerance, name)?)),
             // the assembly smooths exact laws if a width is given, else it refuses them
             Kind::Smooth | Kind::Exact => {
-                let assembly = super::smooth::assembly(system, options.width, name)?;
+                let assembly = super::flow::smooth::assembly(system, options.width, name)?;
                 Stepping::Smooth(Box::new(SmoothFlow::new(assembly, options.tolerance)))
             }
         };

@@ -8,8 +8,8 @@
 //! vibration then begins from there. A slider that the vibration does not move stays where the
 //! ramp left it; another slider moves only as far as necessary.
 
+use super::flow::incremental::law;
 use super::harmonic_balance;
-use super::incremental::law;
 use crate::law::{IdealElement, Law, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::System;
 use crate::orbit::Orbit;

@@ -6,7 +6,8 @@
 //! in a stepped-sine test.
 
 use super::flow::Flow;
-use super::{IntegrationError, MethodError, followed, ways};
+use super::flow::followed;
+use super::{IntegrationError, MethodError, ways};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;

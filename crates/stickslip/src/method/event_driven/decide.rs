@@ -21,7 +21,7 @@
 
 use super::mechanics::{Kind, Mechanics, Part, REST};
 use crate::law::Contact;
-use crate::method::drive::Drive;
+use crate::method::flow::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 

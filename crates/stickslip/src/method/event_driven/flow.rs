@@ -8,7 +8,7 @@ use super::pattern::{Beginning, Driven, Pattern, Work};
 use super::tolerances::NEAR_REST;
 use crate::law::Contact;
 use crate::method::IntegrationError;
-use crate::method::drive::Drive;
+use crate::method::flow::drive::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::sync::Arc;

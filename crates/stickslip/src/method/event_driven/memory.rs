@@ -8,7 +8,7 @@
 use super::mechanics::Mechanics;
 use super::pattern::{Driven, Pattern};
 use crate::law::Contact;
-use crate::method::drive::Drive;
+use crate::method::flow::drive::Drive;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::quadratic_modes::DefectiveModes;

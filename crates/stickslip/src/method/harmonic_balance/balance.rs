@@ -1,20 +1,21 @@
 //! The solver of harmonic balance: one orbit after another, with warm starts.
 
+use super::aft::Ports;
 use super::budget::{self, POINT, Work, is_affordable};
+use super::dynamics::rest::Rest;
+use super::dynamics::sparse::{self, Sparse};
+use super::equations::kept::Kept;
 use super::equations::{self, Level, Solution};
-use super::found_by::FoundBy;
-use super::kept::Kept;
+use super::globalization::found_by::FoundBy;
+use super::linear_solve::coupled;
 use super::options::{FIRST, HarmonicBalance, NAME, TOLERANCE};
-use super::ports::Ports;
 use super::recent::{RECENT, Recent};
-use super::rest::Rest;
 use super::solve::Lost;
-use super::sparse::{self, Sparse};
 use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
 use super::storage::{MEMORY, check_memory, level_memory};
-use super::{coupled, path, work};
-use crate::method::evidence::Judge;
-use crate::method::guess::Guess;
+use super::{path, work};
+use crate::method::orbit_search::evidence::Judge;
+use crate::method::orbit_search::guess::Guess;
 use crate::method::{MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::{ObservedMotion, Orbit};

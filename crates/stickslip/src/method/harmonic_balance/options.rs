@@ -1,6 +1,6 @@
 //! Options of harmonic balance: number of harmonics, number of samples, tolerance.
 
-use super::ports::{Port, Ports};
+use super::aft::{Port, Ports};
 use crate::method::{MethodError, Options};
 use crate::model::System;
 

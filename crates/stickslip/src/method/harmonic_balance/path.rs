@@ -1,10 +1,10 @@
 //! The orbit of a solution: displacements, energies, evidence, and the motion at any time.
 
+use super::aft::{Member, Ports};
+use super::dynamics::rest::Rest;
 use super::equations::{Level, Solution};
-use super::ports::{Member, Ports};
-use super::rest::Rest;
 use crate::law::{Contact, MAX_DIRECTIONS};
-use crate::method::evidence::{Judge, Judged};
+use crate::method::orbit_search::evidence::{Judge, Judged};
 use crate::model::{Axis, MovedPlace, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results, sticks};
 use crate::orbit::{

@@ -5,13 +5,13 @@
 //! rigid friction, the interior point method follows, then the proximal point method. The last
 //! search is a homotopy in the slip limits, from the solution in which all joints stick.
 
+use super::aft::{Port, Ports};
 use super::budget::{FEWEST, SEARCH, WORK, Work};
-use super::coupled::{FORMED, Near, product_work};
-use super::ease::{Ease, GIVEN, SOLVED};
+use super::dynamics::sparse::Along;
 use super::equations::{Level, Slopes, Solution};
-use super::found_by::FoundBy;
-use super::ports::{Port, Ports};
-use super::sparse::Along;
+use super::globalization::ease::{Ease, GIVEN, SOLVED};
+use super::globalization::found_by::FoundBy;
+use super::linear_solve::coupled::{FORMED, Near, product_work};
 use num_complex::Complex64;
 use stickslip_numerics::{dense, interrupt};
 

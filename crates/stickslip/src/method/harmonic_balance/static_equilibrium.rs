@@ -14,11 +14,11 @@
 //!
 //! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
 
+use super::aft::{Ports, StaticState};
+use super::dynamics::rest::Rest;
+use super::dynamics::sparse::Sparse;
 use super::equations::{Level, Solution, Tether};
 use super::path;
-use super::ports::{Ports, StaticState};
-use super::rest::Rest;
-use super::sparse::Sparse;
 use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::Arc;

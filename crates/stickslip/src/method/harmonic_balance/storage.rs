@@ -1,9 +1,10 @@
 //! Estimate of the memory for the equations, before they are built.
 
-use super::ports::{Ports, at_once};
-use super::rest::{CACHED, Rest};
-use super::sparse::Sparse;
-use super::{NAME, coupled};
+use super::NAME;
+use super::aft::{Ports, at_once};
+use super::dynamics::rest::{CACHED, Rest};
+use super::dynamics::sparse::Sparse;
+use super::linear_solve::coupled;
 use crate::method::MethodError;
 use crate::method::option::PERIOD;
 
@@ -88,10 +89,10 @@ fn tangents(ports: &Ports, harmonics: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::aft::Ports;
+    use super::super::dynamics::receptance::Receptance;
+    use super::super::dynamics::rest::Rest;
     use super::super::equations::Level;
-    use super::super::ports::Ports;
-    use super::super::receptance::Receptance;
-    use super::super::rest::Rest;
     use super::memory;
     use crate::law::{Coulomb, Jenkins2d, SharedLaw};
     use crate::model::{Axis, System};

@@ -1,12 +1,12 @@
 //! Cost model: multiplications of a Newton step and of an orbit, counted before anything is
 //! computed.
 
+use super::aft::Ports;
 use super::budget::{FEWEST, POINT, WORK};
-use super::coupled::{by_products, step_products};
-use super::kept::Kept;
+use super::dynamics::sparse::Sparse;
+use super::equations::kept::Kept;
+use super::linear_solve::coupled::{by_products, step_products};
 use super::options::FIRST;
-use super::ports::Ports;
-use super::sparse::Sparse;
 use crate::law::IdealElement;
 use crate::model::System;
 use num_complex::Complex64;

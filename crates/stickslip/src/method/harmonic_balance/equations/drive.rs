@@ -1,13 +1,13 @@
 //! The equations at one excitation frequency: receptances, the motion without
 //! friction, penalties, and the initial guess.
 
-use super::super::hold::CLEAR;
-use super::super::penalty::penalty as penalty_of;
-use super::super::ports::{Member, Ports};
-use super::super::receptance::{Formed, Modal, Receptance};
-use super::super::rest::Rest;
+use super::hold::CLEAR;
+use super::penalty::penalty as penalty_of;
 use super::{Level, Solution, ZERO};
-use crate::method::guess::Guess;
+use crate::method::harmonic_balance::aft::{Member, Ports};
+use crate::method::harmonic_balance::dynamics::receptance::{Formed, Modal, Receptance};
+use crate::method::harmonic_balance::dynamics::rest::Rest;
+use crate::method::orbit_search::guess::Guess;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;

@@ -1,8 +1,8 @@
 //! Coarse sampling of the period, for derivatives of many contacts.
 
-use super::super::ease::Ease;
-use super::super::ports::{Alternation, Ports, REPEATS, block};
 use super::{Level, OPEN, Solution};
+use crate::method::harmonic_balance::aft::{Alternation, Ports, REPEATS, block};
+use crate::method::harmonic_balance::globalization::ease::Ease;
 
 /// The coarse sampling has at least `1/FEWER` of all samples, at least `SKETCHED` samples per
 /// wave of the highest harmonic, and at most half of all samples.

@@ -1,8 +1,8 @@
 //! The equations as a function of unknowns of order one, for continuation.
 
-use super::super::ease::GIVEN;
-use super::super::ports::Ports;
 use super::{Level, Slopes, Solution};
+use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::globalization::ease::GIVEN;
 use num_complex::Complex64;
 
 impl Level {

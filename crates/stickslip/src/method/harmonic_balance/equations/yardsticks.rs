@@ -1,8 +1,8 @@
 //! Scaling: the length of a motion, the units of residuals, and slip limits that no motion reaches.
 
-use super::super::kept::weight;
-use super::super::ports::{Port, Ports};
+use super::kept::weight;
 use super::{Level, Solution};
+use crate::method::harmonic_balance::aft::{Port, Ports};
 use num_complex::Complex64;
 
 /// If contacts alone hold a body, the length of a motion is at most this multiple of the sum of
