@@ -3,12 +3,13 @@
 //! It picks event-driven for exact laws and shooting for smooth laws. It picks harmonic balance
 //! for cheaper or other systems, and for travelling waves on a disk.
 
-use super::flow::followed::Kind;
+use super::event_driven::EventDriven;
+use super::flow::integrator_choice::Kind;
 use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
+use super::shooting::Shooting;
 use super::{
-    Choice, Method, MethodError, MethodInfo, Options, Solver, event_driven, event_driven::EventDriven,
-    harmonic_balance, shooting::Shooting, transient, ways,
+    Choice, Method, MethodError, MethodInfo, Options, Solver, event_driven, harmonic_balance, transient, ways,
 };
 use crate::law::Law;
 use crate::model::System;

@@ -6,31 +6,31 @@
 //! [`Method::solver`] makes a [`Solver`] for one system. The solver keeps data that it can
 //! reuse from orbit to orbit.
 
-mod advice;
+mod alternatives;
 pub mod auto;
 mod error;
 pub mod event_driven;
 mod flow;
 pub mod harmonic_balance;
 mod list;
-mod option;
+mod options;
 mod orbit_search;
 pub mod shooting;
 mod static_equilibrium;
 pub mod time_history;
 mod traits;
 pub mod transient;
-mod ways;
+mod with_alternatives;
 
 pub use crate::orbit::{IntegrationError, OrbitError};
-pub use advice::{advised, ways};
+pub use alternatives::Ways;
 pub use error::{MethodError, Refusal};
 use list::LIST;
-pub use option::{MethodOption, Options, WIDTH};
+pub use options::{MethodOption, Options, WIDTH};
 pub use orbit_search::evidence::evidence_steps;
 pub use static_equilibrium::StaticEquilibrium;
 pub use traits::{Choice, Method, MethodInfo, Solver};
-pub use ways::Ways;
+pub use with_alternatives::{advised, ways};
 
 /// All methods: `auto` and the rows of `list.rs`.
 pub const TABLE: &[MethodInfo] = &{

@@ -8,19 +8,19 @@
 use super::event_driven::MISSING_WORK;
 use super::flow::Flow;
 use super::flow::assembly::{Assembly, NEAR_REST};
-use super::flow::followed::Kind;
-use super::flow::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::flow::smooth::flow::{Lengths, SmoothFlow};
-use super::flow::stepped::SteppedPath;
-use super::flow::switched::flow::SwitchedFlow;
-use super::option::{PERIOD, periods, width};
-use super::orbit_search::guess::Guess;
-use super::orbit_search::periodic::{
+use super::flow::average_acceleration::flow::{FIRST, IncrementalFlow, MOST, estimate};
+use super::flow::integrator_choice::Kind;
+use super::flow::radau::step_size_control::{Lengths, SmoothFlow};
+use super::flow::set_valued::located_switches::SwitchedFlow;
+use super::flow::trajectory::SteppedPath;
+use super::options::{PERIOD, periods, width};
+use super::orbit_search::cold_restart::Afresh;
+use super::orbit_search::describing_guess::Guess;
+use super::orbit_search::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
+use super::orbit_search::return_map::{
     Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm,
 };
-use super::orbit_search::repeated::Afresh;
-use super::orbit_search::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
-use super::orbit_search::vibration;
+use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH};
 use crate::dimension::Dimension;
@@ -247,7 +247,7 @@ impl<'a> Shooter<'a> {
             Kind::Switched => Stepping::Switched(Box::new(SwitchedFlow::new(system, options.tolerance, name)?)),
             // the assembly smooths exact laws if a width is given, else it refuses them
             Kind::Smooth | Kind::Exact => {
-                let assembly = super::flow::smooth::assembly(system, options.width, name)?;
+                let assembly = super::flow::radau::assembly(system, options.width, name)?;
                 Stepping::Smooth(Box::new(SmoothFlow::new(assembly, options.tolerance)))
             }
         };
@@ -293,7 +293,7 @@ impl<'a> Shooter<'a> {
     /// Returns the size of the vibration over the size of the state at t = 0; both are at least
     /// `rest` (√J).
     fn share_in(&self, orbit: &Orbit, rest: f64) -> f64 {
-        vibration::share(
+        vibration_share::share(
             orbit.path.as_ref(),
             (orbit.symmetry, orbit.period()),
             &orbit.initial_state,
@@ -635,7 +635,9 @@ impl Solver for Shooter<'_> {
             }
             found => found?,
         };
-        while let Some(share) = vibration::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))? {
+        while let Some(share) =
+            vibration_share::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))?
+        {
             self.set_share(share);
             // an orbit accurate as a state but not as a vibration has too few digits
             orbit = self.found(Some(&orbit.initial_state), symmetry, aim).map_err(|_| self.lost(omega, share))?;
@@ -647,10 +649,10 @@ impl Solver for Shooter<'_> {
             orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
         }
         let share = self.share_in(&orbit, rest);
-        vibration::relate(&mut orbit.evidence, share);
+        vibration_share::relate(&mut orbit.evidence, share);
         let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
-            if share < vibration::SMALL {
+            if share < vibration_share::SMALL {
                 return Err(self.lost(omega, share));
             }
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });

@@ -6,7 +6,7 @@
 //! in a stepped-sine test.
 
 use super::flow::Flow;
-use super::flow::followed;
+use super::flow::integrator_choice;
 use super::{IntegrationError, MethodError, ways};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
@@ -251,7 +251,7 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
+        integrator_choice::of(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
     }
 
     /// Returns the excitation frequency of the cycle that begins at `time`.

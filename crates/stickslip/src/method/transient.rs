@@ -10,9 +10,9 @@
 //! equal steps, Newton's method then finds the same orbit in finer steps.
 
 use super::event_driven::Exact;
-use super::flow::followed::Kind;
-use super::option::{PERIOD, periods, width};
-use super::orbit_search::periodic::Search;
+use super::flow::integrator_choice::Kind;
+use super::options::{PERIOD, periods, width};
+use super::orbit_search::return_map::Search;
 use super::shooting::{Shooter, Shooting};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver, WIDTH};
 use crate::dimension::Dimension;

@@ -3,40 +3,40 @@
 //!
 //! - `mechanics`: the system as masses, springs, ideal sliders and stops
 //! - `pattern`: the linear motion in one pattern of stick and slip, open and closed
-//! - `memory`: cache of patterns with a memory limit
-//! - `decide`: transition to the next pattern at a switch
-//! - `flow`: segments joined at the switches, with exact sensitivities
-//! - `path`: results of an orbit from its segments
-//! - `work`: cost estimate of an orbit
+//! - `pattern_cache`: cache of patterns with a memory limit
+//! - `transition`: transition to the next pattern at a switch
+//! - `segments`: segments joined at the switches, with exact sensitivities
+//! - `postprocess`: results of an orbit from its segments
+//! - `cost_model`: cost estimate of an orbit
 //!
 //! Newton's method on the return map finds the periodic orbit. If the excitation has only odd
 //! harmonics, the solver uses the half period `x(t + T/2) = -x(t)`. This halves the work, and
 //! the map stays regular if a joint sticks for the whole period.
 
-mod decide;
-mod flow;
+mod cost_model;
 mod mechanics;
-mod memory;
-mod path;
 mod pattern;
+mod pattern_cache;
+mod postprocess;
+mod segments;
 mod tolerances;
-mod work;
+mod transition;
 
-pub(crate) use flow::SegmentedMotion;
+pub use cost_model::{ALONE, orbit_work};
 use mechanics::Kind;
 pub(crate) use mechanics::{Mechanics, takes};
-pub(crate) use path::ExactPath;
+pub(crate) use postprocess::ExactPath;
+pub(crate) use segments::SegmentedMotion;
 pub(crate) use tolerances::MISSING_WORK;
 use tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
-pub use work::{ALONE, orbit_work};
 
-use super::flow::drive::Drive;
-use super::option::{PERIOD, periods};
-use super::orbit_search::guess::Guess;
-use super::orbit_search::periodic::{Aim, Closed, ReturnMap, Search, approached};
-use super::orbit_search::repeated::Afresh;
+use super::flow::excitation::Drive;
+use super::options::{PERIOD, periods};
+use super::orbit_search::cold_restart::Afresh;
+use super::orbit_search::describing_guess::Guess;
 use super::orbit_search::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
-use super::orbit_search::vibration;
+use super::orbit_search::return_map::{Aim, Closed, ReturnMap, Search, approached};
+use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::{IntegrationError, Method, MethodError, MethodInfo, OrbitError, Solver};
 use crate::model::System;
@@ -161,7 +161,7 @@ impl Closing for Exact<'_> {
         let omega = self.flow.drive.omega;
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (at, closed) = ((omega, self.periods), (closed, self.weights.as_slice()));
-        let orbit = path::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
+        let orbit = postprocess::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
             .map_err(|cause| OrbitError::Breakdown { method: self.name, omega, cause })?;
         Ok(Orbit { method: self.name, ..orbit })
     }
@@ -262,9 +262,9 @@ impl Solver for Exact<'_> {
             let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
             let (mut taken, at) = (1.0, (symmetry, orbit.period()));
             let share = |exact: &Self, orbit: &Orbit| {
-                vibration::share(orbit.path.as_ref(), at, &orbit.initial_state, (&exact.weights, aim.rest))
+                vibration_share::share(orbit.path.as_ref(), at, &orbit.initial_state, (&exact.weights, aim.rest))
             };
-            while let Some(share) = vibration::next(taken, share(self, &orbit)).map_err(broke)? {
+            while let Some(share) = vibration_share::next(taken, share(self, &orbit)).map_err(broke)? {
                 taken = share;
                 orbit = self.found(Some(&orbit.initial_state), search.of_share(share), aim)?;
             }

@@ -11,7 +11,7 @@
 
 use super::mechanics::{Kind, Mechanics};
 use crate::law::Contact;
-use crate::method::flow::drive::Drive;
+use crate::method::flow::excitation::Drive;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense::{ProductShape, multiply};

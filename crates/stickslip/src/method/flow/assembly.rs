@@ -1,7 +1,7 @@
 //! The system in the form that the time integrations use: full matrices, joint axes, and laws
 //! with the indices of their axes and states.
 
-use super::drive::Drive;
+use super::excitation::Drive;
 use crate::law::SharedLaw;
 use crate::method::{IntegrationError, MethodError};
 use crate::model::{Axis, System};

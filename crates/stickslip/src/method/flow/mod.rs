@@ -1,29 +1,29 @@
 //! The trait of all time integrations: motion over one return for orbits, or over successive
 //! intervals for transients.
 //!
-//! [`followed`] chooses the integration by the laws of a system.
+//! [`integrator_choice`] chooses the integration by the laws of a system.
 //!
 //! The integrations:
-//! - `exact_flow`: event-driven motion
-//! - `smooth`: stiff integration (Radau IIA-9) of smooth laws
-//! - `switched`: set-valued friction with located switches
-//! - `incremental`: average acceleration in equal steps
+//! - `event_flow`: event-driven motion
+//! - `radau`: stiff integration (Radau IIA-9) of smooth laws
+//! - `set_valued`: set-valued friction with located switches
+//! - `average_acceleration`: average acceleration in equal steps
 //!
 //! Their common parts:
 //! - `assembly`: the system as full matrices and laws with indices
-//! - `drive`: the excitation at one frequency
-//! - `steps`: the record of a run in steps
-//! - `stepped`: the recorded motion at any time
+//! - `excitation`: the excitation at one frequency
+//! - `step_record`: the record of a run in steps
+//! - `trajectory`: the recorded motion at any time
 
 pub(super) mod assembly;
-pub(super) mod drive;
-pub(super) mod exact_flow;
-pub(super) mod followed;
-pub(super) mod incremental;
-pub(super) mod smooth;
-pub(super) mod stepped;
-pub(super) mod steps;
-pub(super) mod switched;
+pub(super) mod average_acceleration;
+pub(super) mod event_flow;
+pub(super) mod excitation;
+pub(super) mod integrator_choice;
+pub(super) mod radau;
+pub(super) mod set_valued;
+pub(super) mod step_record;
+pub(super) mod trajectory;
 
 use super::IntegrationError;
 use crate::model::System;

@@ -15,56 +15,56 @@
 //!
 //! The solver and its options:
 //! - `options`: number of harmonics, number of samples, tolerance;
-//! - `balance`: the solver of a system, with its warm starts;
-//! - `recent`: the last orbits, for warm starts and the secant predictor;
+//! - `solver`: the solver of a system, with its warm starts;
+//! - `warm_start`: the last orbits, for warm starts and the secant predictor;
 //! - `subharmonic`: orbits of several periods of the excitation;
 //! - `static_equilibrium`: the equilibrium under the constant loads, by harmonic 0 alone;
-//! - `budget`, `work`, `storage`: work limits, operation counts, estimates of memory.
+//! - `budget`, `cost_model`, `memory_estimate`: work limits, operation counts, estimates of memory.
 //!
 //! The equations and their solution:
 //! - `equations/`: residual and Jacobian along the joints, set of harmonics, scaling;
 //! - `aft/`: harmonics of joint forces from harmonics of joint motions, with exact derivatives;
 //! - `dynamics/`: receptances of the linear part;
 //! - `linear_solve/`: the linear system of a Newton step;
-//! - `solve`: Newton's method with line search, and the order in which the other searches
+//! - `newton`: Newton's method with line search, and the order in which the other searches
 //!   follow;
 //! - `globalization/`: these searches.
 //!
 //! Results:
 //! - `accuracy/`: number of harmonics, truncation error, sampling error;
-//! - `path`: displacements, energies and evidence of an orbit from its harmonics;
+//! - `postprocess`: displacements, energies and evidence of an orbit from its harmonics;
 //! - `modes/`: nonlinear modes, and branches of orbits with a parameter.
 
 mod accuracy;
 mod aft;
-mod balance;
 mod budget;
+mod cost_model;
 mod dynamics;
 mod equations;
 mod globalization;
 mod linear_solve;
+mod memory_estimate;
 mod modes;
+mod newton;
 mod options;
-mod path;
-mod recent;
-mod solve;
+mod postprocess;
+mod solver;
 mod static_equilibrium;
-mod storage;
 mod subharmonic;
-mod work;
+mod warm_start;
 
-use super::option::{PERIOD, periods};
+use super::options::{PERIOD, periods};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver};
 use crate::dimension::Dimension;
 use crate::model::System;
-use balance::Balance;
-pub(crate) use modes::arc::{ModeArc, Step as ModeStep};
-pub(crate) use modes::branch::BranchEquations;
-pub(crate) use modes::mode::{LinearMode, ModeEquations, ModeState};
+pub use cost_model::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
+pub(crate) use modes::branch_equations::BranchEquations;
+pub(crate) use modes::mode_continuation::{ModeArc, Step as ModeStep};
+pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState};
 pub use options::{HarmonicBalance, NAME};
+use solver::Balance;
 pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
-pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 
 /// Entry of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {

@@ -15,10 +15,10 @@
 //! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
 
 use super::aft::{Ports, StaticState};
-use super::dynamics::rest::Rest;
-use super::dynamics::sparse::Sparse;
+use super::dynamics::banded::Sparse;
+use super::dynamics::linear_dynamics::Rest;
 use super::equations::{Level, Solution, Tether};
-use super::path;
+use super::postprocess;
 use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::Arc;
@@ -73,8 +73,8 @@ pub(super) fn static_equilibrium(
             *to = c.re;
         }
     }
-    let x = path::places(&mut level, rest, omega, &solution).ok()?;
-    let setting = path::Setting {
+    let x = postprocess::places(&mut level, rest, omega, &solution).ok()?;
+    let setting = postprocess::Setting {
         system,
         ports,
         around,
@@ -85,7 +85,7 @@ pub(super) fn static_equilibrium(
         tolerance: 0.0,
         judge: None,
     };
-    let orbit = path::orbit(setting, &mut level, &solution, x)?;
+    let orbit = postprocess::orbit(setting, &mut level, &solution, x)?;
     Some(SolvedEquilibrium { orbit, states })
 }
 

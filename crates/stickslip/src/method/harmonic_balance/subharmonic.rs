@@ -1,10 +1,10 @@
 //! Orbits of several periods of the excitation.
 
-use super::balance::Balance;
-use super::equations::kept::Kept;
+use super::equations::harmonic_set::Kept;
+use super::solver::Balance;
 use super::{HarmonicBalance, NAME};
-use crate::method::option::PERIOD;
-use crate::method::orbit_search::repeated::Afresh;
+use crate::method::options::PERIOD;
+use crate::method::orbit_search::cold_restart::Afresh;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use num_complex::Complex64;

@@ -10,12 +10,12 @@
 //! A travelling wave on a ring returns, rotated by some sectors, after a fraction of the
 //! period.
 
-use super::periodic::{newton_step, norm};
-use super::vibration;
+use super::return_map::{newton_step, norm};
+use super::vibration_share;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::NEAR_REST;
-use crate::method::flow::followed::{self, Kind};
-use crate::method::flow::incremental::flow::IncrementalFlow;
+use crate::method::flow::average_acceleration::flow::IncrementalFlow;
+use crate::method::flow::integrator_choice::{self, Kind};
 use crate::model::{CyclicSymmetry, System};
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -104,7 +104,7 @@ impl Judge {
                 flow.count = STEPS;
                 Box::new(flow)
             }),
-            Kind::Exact | Kind::Smooth | Kind::Switched => followed::of(system, None, TOLERANCE, name).ok(),
+            Kind::Exact | Kind::Smooth | Kind::Switched => integrator_choice::of(system, None, TOLERANCE, name).ok(),
         };
         Judge { flow, proven: false }
     }
@@ -178,7 +178,7 @@ impl Judge {
         let back = Return::of(system, symmetry);
         flow.set_drive(system, omega);
         let (weights, rest) = (flow.weights(), NEAR_REST * flow.energy_scale());
-        let share = vibration::share(path, (symmetry, TAU / omega), start, (&weights, rest));
+        let share = vibration_share::share(path, (symmetry, TAU / omega), start, (&weights, rest));
         flow.set_tolerance(share * TOLERANCE);
         let states = flow.states();
         let mut state = start.to_vec();

@@ -12,7 +12,7 @@
 //! Newton's method on a return map may find any orbit of the continuum. This file replaces the
 //! rows of such sliders by `z = kt (u - o)` and iterates `o`.
 
-use super::periodic::{Aim, Closed, ReturnMap, close};
+use super::return_map::{Aim, Closed, ReturnMap, close};
 use crate::method::OrbitError;
 use crate::method::static_equilibrium::StaticEquilibrium;
 use crate::model::System;

@@ -15,8 +15,8 @@
 //! depends on the return points that are still remembered.
 
 use super::StaticState;
-use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
 use super::events::{Anchor, Extreme};
+use super::frequency_time::{Alternation, ZERO, add_block, as_block, pair};
 use super::series::{Series, turns};
 use super::sliders::{add_multiple, integrate_over};
 use crate::law::{Law, MasingView};

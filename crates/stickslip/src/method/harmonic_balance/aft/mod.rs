@@ -9,29 +9,29 @@
 //!   law, `P` the truncation to the harmonics of the series.
 //!
 //! Both kinds return the exact derivative by all unknowns of the port. The equations use nothing
-//! else of a law. Joints with proportional motions may share one force port, see [`gathered`].
+//! else of a law. Joints with proportional motions may share one force port, see [`grouping`].
 
-mod alternation;
-mod barrier;
+#[cfg(test)]
+mod conformance;
 mod events;
-mod gathered;
-mod march;
+mod frequency_time;
+mod grouping;
+mod interior_point;
 mod masing;
-mod memory;
+mod periodic_state;
 mod prox;
 mod rate;
 mod series;
 mod sliders;
 mod step;
-#[cfg(test)]
-mod tests;
+mod workspace;
 
-pub(super) use alternation::{Alternation, Beginning};
-pub(super) use barrier::Barrier;
-use gathered::Gathered;
-pub(super) use memory::{REPEATS, at_once};
+pub(super) use frequency_time::{Alternation, Beginning};
+use grouping::Gathered;
+pub(super) use interior_point::Barrier;
 use prox::{Rigid, Times};
 use sliders::Part;
+pub(super) use workspace::{REPEATS, at_once};
 
 use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
@@ -177,7 +177,9 @@ impl Port {
     /// (rad/s), axes × axes, N/m. For motion ports.
     pub fn at_rest(&self, omega: f64) -> DMatrix<Complex64> {
         match &self.kernel {
-            Kernel::Step(law) | Kernel::Rate(law) => crate::method::orbit_search::guess::at_rest(&**law, omega),
+            Kernel::Step(law) | Kernel::Rate(law) => {
+                crate::method::orbit_search::describing_guess::at_rest(&**law, omega)
+            }
             _ => DMatrix::from_diagonal_element(self.axes, self.axes, Complex64::new(self.stiffness(), 0.0)),
         }
     }
@@ -195,7 +197,7 @@ impl Port {
             }
             Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => {
                 // for a rate law, at 1 rad/s, where its states are assumed to follow
-                let at_rest = crate::method::orbit_search::guess::at_rest(&**law, 1.0);
+                let at_rest = crate::method::orbit_search::describing_guess::at_rest(&**law, 1.0);
                 (0..self.axes).map(|a| at_rest[(a, a)].norm()).fold(0.0, f64::max)
             }
         }
@@ -209,7 +211,7 @@ impl Port {
             Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
             Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed_stiffness() {
                 Some(closed) => closed[axis],
-                None => crate::method::orbit_search::guess::at_rest(&**law, 1.0)[(axis, axis)].re,
+                None => crate::method::orbit_search::describing_guess::at_rest(&**law, 1.0)[(axis, axis)].re,
             },
         }
     }

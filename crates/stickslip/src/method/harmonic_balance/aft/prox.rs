@@ -14,7 +14,7 @@
 //! passes through zero, and the value in the middle of the sample is taken.
 
 use super::Port;
-use super::alternation::{Alternation, add_block, as_block, pair, share};
+use super::frequency_time::{Alternation, add_block, as_block, pair, share};
 use crate::law::{MAX_DIRECTIONS, ProxView, SampleMeans, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;

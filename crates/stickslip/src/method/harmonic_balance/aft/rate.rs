@@ -10,8 +10,8 @@
 //! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5.
 
 use super::Port;
-use super::alternation::Alternation;
-use super::march::March;
+use super::frequency_time::Alternation;
+use super::periodic_state::March;
 use crate::law::{MAX_DIRECTIONS, RatePoint, RateView, RelativeMotion};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use num_complex::Complex64;

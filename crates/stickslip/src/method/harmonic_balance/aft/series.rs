@@ -1,8 +1,8 @@
 //! A motion along an axis at any phase: value, slope and curvature of its
 //! series, its zeros, and its range.
 
-use super::alternation::Alternation;
 use super::events::Grid;
+use super::frequency_time::Alternation;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 

@@ -12,8 +12,8 @@
 //! Every stick interval adds one rank-one term to the derivative.
 
 use super::StaticState;
-use super::alternation::{Alternation, ZERO, add_block, as_block, pair};
 use super::events::{Anchor, Extreme, Grid, Interval};
+use super::frequency_time::{Alternation, ZERO, add_block, as_block, pair};
 use super::series::{Series, turns};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};

@@ -5,8 +5,8 @@
 //! the motion at harmonic h, about 5e-6 at h = 1 and 1024 samples.
 
 use super::Port;
-use super::alternation::{Alternation, Beginning, add_entries};
-use super::march::March;
+use super::frequency_time::{Alternation, Beginning, add_entries};
+use super::periodic_state::March;
 use crate::law::{DisplacementBox, MAX_DIRECTIONS, StepPoint, StepView};
 use num_complex::Complex64;
 

@@ -1,8 +1,8 @@
 //! Receptances: the motions along the axes under forces along them. Large ones
 //! are applied by modes and not formed.
 
-use super::rest::{CACHED, Closed};
-use super::uncoupled::{Resonant, Uncoupled};
+use super::linear_dynamics::{CACHED, Closed};
+use super::uncoupled_modes::{Resonant, Uncoupled};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;

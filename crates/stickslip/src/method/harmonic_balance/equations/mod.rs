@@ -12,33 +12,33 @@
 //! `-r_u = 1`, `f_y = K`; force ports have `r_y = 1 - T`, `-r_u = T ε d/dt`, `f_y = 1`.
 //!
 //! If contacts alone hold a body, `R` of the mean contains the springs of closed contacts, and
-//! their force is subtracted from `f`, see `closed`.
+//! their force is subtracted from `f`, see `closed_contacts`.
 //!
 //! `ε` is not a free parameter: it is the impedance of the structure at the contact at the
-//! highest harmonic, the resolution of the series (see [`penalty`](super::equations::penalty::penalty)).
+//! highest harmonic, the resolution of the series (see [`contact_parameter`](super::equations::contact_parameter::penalty)).
 //! Another ε changes the solution no more than the missing harmonics do.
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian
 //! frequency-time method".
 
-mod drive;
-pub(super) mod hold;
-pub(super) mod kept;
-pub(super) mod penalty;
-mod sketch;
-mod unknowns;
-mod yardsticks;
+mod coarse_sampling;
+pub(super) mod contact_parameter;
+mod excitation;
+pub(super) mod harmonic_set;
+pub(super) mod regularization;
+mod scaled_unknowns;
+mod scaling;
 
 use super::aft::{Alternation, Beginning, Port, Ports, block, blocks};
 use super::budget::{POINT, Work};
+use super::dynamics::banded::Sparse;
 use super::dynamics::receptance::{Formed, Receptance};
-use super::dynamics::sparse::Sparse;
-use super::equations::kept::weight;
-use super::globalization::ease::Ease;
+use super::equations::harmonic_set::weight;
 use super::globalization::found_by::FoundBy;
-use super::globalization::window::Settling;
-use super::linear_solve::coupled::{Coupled, Near, by_products, dot};
-use super::linear_solve::linear::Linear;
+use super::globalization::homotopy::Ease;
+use super::globalization::subdomain::Settling;
+use super::linear_solve::linearization::Linear;
+use super::linear_solve::newton_krylov::{Coupled, Near, by_products, dot};
 use crate::model::CyclicSymmetry;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -606,8 +606,8 @@ pub(super) fn transfer(motion: &Solution, from: &[usize], to: &[usize]) -> Solut
 
 #[cfg(test)]
 mod tests {
-    use super::super::dynamics::rest::Rest;
-    use super::super::path;
+    use super::super::dynamics::linear_dynamics::Rest;
+    use super::super::postprocess;
     use super::*;
     use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
@@ -738,7 +738,7 @@ mod tests {
                     level.penalty[0] *= factor;
                     let start = level.begin(&case.system, &case.ports, None, case.omega);
                     let motion = level.solve(&case.ports, case.omega, start).unwrap();
-                    path::places(&mut level, &case.rest, case.omega, &motion).unwrap()
+                    postprocess::places(&mut level, &case.rest, case.omega, &motion).unwrap()
                 };
                 let distance = |a: &[DVector<Complex64>], b: &[DVector<Complex64>]| {
                     let zero = DVector::from_element(3, ZERO);

@@ -1,9 +1,9 @@
 //! Nonlinear modes, and branches of orbits with a parameter.
 //!
-//! - `mode`: equations of a nonlinear mode, its linear start and its results
-//! - `arc`: arc-length continuation of a mode
-//! - `branch`: equations of an orbit with a parameter, for continuation
+//! - `nonlinear_mode`: equations of a nonlinear mode, its linear start and its results
+//! - `mode_continuation`: arc-length continuation of a mode
+//! - `branch_equations`: equations of an orbit with a parameter, for continuation
 
-pub(super) mod arc;
-pub(super) mod branch;
-pub(super) mod mode;
+pub(super) mod branch_equations;
+pub(super) mod mode_continuation;
+pub(super) mod nonlinear_mode;

@@ -1,0 +1,71 @@
+//! Scaling: the length of a motion, the units of residuals, and slip limits that no motion reaches.
+
+use super::harmonic_set::weight;
+use super::{Level, Solution};
+use crate::method::harmonic_balance::aft::{Port, Ports};
+use num_complex::Complex64;
+
+/// If contacts alone hold a body, the length of a motion is at most this multiple of the sum of
+/// its harmonics and the motion without friction.
+const FAR: f64 = 4.0;
+/// Least length, relative to the motion without friction with its mean on closed contacts. At a
+/// smaller length, the rounding of the mean would dominate the residual.
+const STANDING: f64 = 1e-5;
+/// Length of a zero motion, m. Its square is still positive.
+const NOTHING: f64 = 1e-150;
+
+impl Level {
+    /// Returns the length of a motion: its size plus a hundredth of the motion without
+    /// friction, both as velocities relative to the excitation frequency.
+    pub fn length(&self, motion: &Solution) -> f64 {
+        let nh = self.alternation.harmonics.len();
+        // without friction the mean is very large if only laws hold a direction
+        let norm = |c: &[Complex64], from: usize| {
+            let harmonics = c.iter().enumerate().map(|(i, z)| (z.norm_sqr(), self.alternation.harmonics[i % nh]));
+            harmonics.filter(|(_, h)| *h >= from).map(|(square, h)| square * weight(h)).sum::<f64>().sqrt()
+        };
+        let mut size = norm(&motion.c, 0);
+        if self.stands() {
+            // a large mean must not define the length
+            let standing = norm(&self.linear, 0);
+            size = size.min(FAR * (norm(&motion.c, 1) + standing)).max(STANDING * standing);
+        }
+        (size + 1e-2 * norm(&self.linear, 1)).max(NOTHING)
+    }
+
+    /// Computes the units of the residual. The unit of motions is the length. The unit of
+    /// forces is the law's scale, but no more than the forces in play: a limit that no force
+    /// reaches is no measure. If only laws hold a direction, the mean is the small difference
+    /// of large terms, and these increase its unit.
+    pub(in super::super) fn measure(&mut self, ports: &Ports, motion: &Solution, length: f64) {
+        let nh = self.harmonics().len();
+        let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
+        let largest =
+            forces.flat_map(|q| &motion.force[q * nh..(q + 1) * nh]).map(|f| f.norm_sqr()).fold(0.0, f64::max);
+        let in_play = (self.holding + largest.sqrt()).max(NOTHING);
+        for port in ports.iter() {
+            let unit = port.unit(length);
+            let unit = if port.is_force() { unit.min(in_play) } else { unit };
+            self.units[2 * nh * port.first..2 * nh * (port.first + port.axes)].fill(unit);
+            if port.is_force() || self.alternation.harmonics[0] != 0 {
+                continue;
+            }
+            for q in port.range() {
+                let moved = match self.sparse {
+                    Some(_) => 0.0,
+                    None => self.receptance.mean(q) * motion.force[q * nh].norm(),
+                };
+                let large = unit + self.linear[q * nh].norm().min(moved);
+                (self.units[2 * q * nh], self.units[2 * q * nh + 1]) = (large, large);
+            }
+        }
+    }
+
+    /// Returns the factor on slip limits above which nothing slips, not even
+    /// for the motion without friction.
+    pub fn sticking(&self, ports: &Ports) -> f64 {
+        let limits = ports.iter().filter(|port| port.is_force()).map(|port| port.scale);
+        let least = limits.filter(|limit| *limit > 0.0).fold(f64::INFINITY, f64::min);
+        Some(4.0 * self.holding / least).filter(|factor| factor.is_finite()).unwrap_or(1.0)
+    }
+}

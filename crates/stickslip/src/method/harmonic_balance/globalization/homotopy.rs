@@ -1,0 +1,27 @@
+//! Parameters of the homotopies, and the tolerance of a solution.
+
+use crate::method::harmonic_balance::equations::regularization::stay;
+
+/// Residual, relative to the motion and to the slip limits, at which the equations count as
+/// solved. It is a thousand times the rounding of a stiff system.
+pub(crate) const SOLVED: f64 = 1e-10;
+
+/// Parameters of the homotopy between easier equations and the given ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ease {
+    /// Factor `L` on the slip limits. Every law gives the force `L f(u / L)`, so that nonlinear
+    /// effects begin only at large motions.
+    pub limits: f64,
+    /// Weight `s` of the proximal term `s (λ - λ₀)`, see [`crate::method::harmonic_balance::equations::Level::anchor`].
+    pub pull: f64,
+}
+
+/// Parameters of the given equations.
+pub(crate) const GIVEN: Ease = Ease { limits: 1.0, pull: 0.0 };
+
+impl Ease {
+    /// Returns the term on the diagonal of the Jacobian of a force equation, at harmonic `h`.
+    pub fn stay(self, h: usize) -> f64 {
+        self.pull + stay(h)
+    }
+}

@@ -1,0 +1,81 @@
+//! Proximal point method for friction forces that the equations leave undetermined.
+//!
+//! Forces of redundant contacts that stick are not unique. They change from one Newton step to
+//! the next, and the set of slipping samples changes with them. A proximal term makes them
+//! unique:
+//!
+//! `λ - P J(λ + ε u') + s (λ - λ₀) = 0`
+//!
+//! With a large `s` the forces stay near λ₀; with a small `s` the equations are nearly the
+//! given ones. The forces of each solution are the next λ₀. `s` need not vanish: the residual
+//! of the given equations is `s |λ - λ₀|`.
+//!
+//! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
+
+use super::homotopy::{Ease, GIVEN, SOLVED};
+use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::equations::{Level, Slopes, Solution};
+use crate::method::harmonic_balance::newton::{Goal, Lost};
+
+/// First value of `s`.
+const PULL: f64 = 1.0;
+/// Largest value of `s`. Beyond it a proximal point hardly moves.
+const MOST_PULL: f64 = 1e4;
+/// Bounds of the factor by which `s` shrinks after a point. The factor is squared after few
+/// Newton iterations, within these bounds; failures increase it.
+const LESS: [f64; 2] = [0.1, 0.3];
+/// Factor above which a failure keeps `s` in the next try. A failure with an unchanged `s`
+/// increases it.
+const AGAIN: f64 = 0.5;
+/// Residual at which the last point counts as the solution if the next one is not found. It is
+/// a thousandth of the usual truncation error. The total force of redundant contacts is then
+/// known to this accuracy; only its distribution among them is not.
+const ENOUGH: f64 = 1e-6;
+/// Largest number of points and tries; ten are usual.
+const MOST: usize = 40;
+/// Newton iterations per point; 2 to 10 are usual.
+const ITERATIONS: usize = 30;
+/// Newton iterations up to which a point was found quickly.
+const QUICK: usize = 8;
+
+impl Level {
+    /// Solves by the proximal point method from `motion`. If that fails, `motion` is the last
+    /// point found.
+    pub(crate) fn by_proximal_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
+        self.begin_anew(ports);
+        self.anchor.clone_from(&motion.force);
+        let mut good = Solution { residual: f64::INFINITY, ..motion.clone() };
+        let (mut pull, mut factor) = (PULL, 1.0f64);
+        for _ in 0..MOST {
+            let next = pull * factor;
+            let before = motion.iterations;
+            let found = self.newton(ports, omega, motion, Ease { pull: next, ..GIVEN }, (ITERATIONS, Goal::Solved));
+            if found.is_ok() {
+                let length = self.length(motion);
+                motion.residual = self.evaluate(ports, omega, motion, GIVEN, length, Slopes::None);
+                if motion.residual <= SOLVED {
+                    return Ok(());
+                }
+                good.copy(motion);
+                self.anchor.clone_from(&motion.force);
+                pull = next;
+                if motion.iterations - before <= QUICK || factor == 1.0 {
+                    factor = (factor * factor).clamp(LESS[0], LESS[1]);
+                }
+            } else {
+                good.iterations = motion.iterations;
+                motion.copy(&good);
+                match factor {
+                    ..AGAIN => factor = factor.sqrt(),
+                    ..1.0 => factor = 1.0,
+                    _ => pull /= LESS[0],
+                }
+            }
+            if pull > MOST_PULL || self.is_exhausted(ports) || (found.is_err() && good.residual <= ENOUGH) {
+                break;
+            }
+        }
+        motion.copy(&good);
+        if motion.residual <= ENOUGH { Ok(()) } else { Err(Lost::after(motion.iterations, motion.residual)) }
+    }
+}

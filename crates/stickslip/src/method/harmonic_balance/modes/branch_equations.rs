@@ -1,0 +1,248 @@
+//! The equations of harmonic balance with a parameter, for continuation.
+
+use crate::method::harmonic_balance::accuracy::truncation_error::{Compared, estimate};
+use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::dynamics::banded::GUESSED;
+use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
+use crate::method::harmonic_balance::equations::harmonic_set::Kept;
+use crate::method::harmonic_balance::equations::{Level, Solution, transfer};
+use crate::method::harmonic_balance::memory_estimate::{check_memory, memory};
+use crate::method::harmonic_balance::options::{HarmonicBalance, TOLERANCE};
+use crate::method::harmonic_balance::postprocess;
+use crate::method::harmonic_balance::solver::LARGEST;
+use crate::method::orbit_search::describing_guess::Guess;
+use crate::method::orbit_search::evidence::Judge;
+use crate::method::{MethodError, OrbitError, ways};
+use crate::model::System;
+use crate::orbit::Orbit;
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip_numerics::continuation::ParametricEquations;
+
+/// Default number of harmonics, in units of the excitation's greatest common divisor.
+const HARMONICS: usize = 15;
+/// Step of the central difference with respect to the parameter, relative to the larger of the
+/// parameter and its range. It is near the cube root of rounding.
+const DIFFERENCE: f64 = 1e-6;
+
+/// Newton iterations of the solution for the error estimate.
+const CHECK: usize = 30;
+/// Unit of the unknowns relative to the first motion. Motions grow towards a resonance, and the
+/// unknowns then stay of order one.
+const RESONANCE: f64 = 30.0;
+
+/// Equations whose unknowns are the harmonics along the joints, relative to the size of the
+/// first orbit.
+pub(crate) struct BranchEquations<'a> {
+    /// Returns the system and the excitation frequency (rad/s) for a value of the parameter.
+    at: &'a dyn Fn(f64) -> (System, f64),
+    system: Arc<System>,
+    omega: f64,
+    value: f64,
+    span: f64,
+    ports: Ports,
+    around: Option<Ports>,
+    rest: Rest,
+    /// System to which `rest` belongs.
+    rest_of: Arc<System>,
+    level: Level,
+    /// Equations with twice the harmonics for the error estimate, unless they are too large.
+    finer: Option<Level>,
+    tolerance: f64,
+    motion: Solution,
+    /// Unit of motions, m.
+    length: f64,
+    judge: Judge,
+    kept: Kept,
+}
+
+impl<'a> BranchEquations<'a> {
+    /// Makes the equations for a range of the parameter that begins at `range.0`.
+    pub fn new(
+        at: &'a dyn Fn(f64) -> (System, f64),
+        method: HarmonicBalance,
+        range: (f64, f64),
+    ) -> Result<Self, MethodError> {
+        let (system, omega) = at(range.0);
+        let system = Arc::new(system);
+        // a force that is zero at the first value may be nonzero later
+        let kept = Kept::new(&system, |_| true);
+        method.check(kept.highest)?;
+        let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
+        let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with(ways(&system)))?;
+        let rest = Rest::new(&system, &ports);
+        let method = HarmonicBalance { harmonics: Some(top), ..method };
+        let level = |top: usize| {
+            Level::new(kept.up_to(top), method.samples_at(top, &ports, ports.has_steep()), &ports, None).with_matrix()
+        };
+        let harmonics = kept.up_to(top).len();
+        check_memory(memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
+        let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
+        let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
+        let motion = Solution::rest(level.linear.len());
+        Ok(BranchEquations {
+            at,
+            rest_of: system.clone(),
+            judge: Judge::new(&system),
+            system,
+            omega,
+            value: f64::NAN,
+            span: (range.1 - range.0).abs(),
+            ports,
+            around,
+            rest,
+            level,
+            finer,
+            tolerance: method.tolerance.unwrap_or(TOLERANCE),
+            motion,
+            length: 1.0,
+            kept,
+        })
+    }
+
+    /// Updates all data that depend on the parameter.
+    ///
+    /// Returns false if the frequency is not positive, or if the joints or their kinds of law
+    /// have changed, so that the unknowns differ. Returns false at a resonance without damping
+    /// too.
+    fn set(&mut self, value: f64) -> bool {
+        if value == self.value {
+            return true;
+        }
+        let (system, omega) = (self.at)(value);
+        let system = Arc::new(system);
+        match Ports::of_sector(&system) {
+            Ok((found, around))
+                if omega > 0.0
+                    && found.wave() == self.ports.wave()
+                    && found.len() == self.ports.len()
+                    && found.iter().zip(self.ports.iter()).all(|(a, b)| a.is_like(b)) =>
+            {
+                (self.ports, self.around) = (found, around);
+            }
+            _ => return false,
+        }
+        let same = system.structure() == self.rest_of.structure();
+        if !same {
+            self.rest = Rest::new(&system, &self.ports);
+            self.rest_of = system.clone();
+        }
+        if self.level.drive(&system, &self.ports, &self.rest, omega).is_err() {
+            return false;
+        }
+        if !same || self.system.joints() != system.joints() {
+            self.judge = Judge::new(&system);
+        }
+        (self.system, self.omega, self.value) = (system, omega, value);
+        true
+    }
+
+    /// Returns the error for a search that did not converge.
+    fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
+        OrbitError::not_converged(crate::method::harmonic_balance::NAME, self.omega, iterations, residual)
+    }
+
+    /// Finds the first point from the describing functions.
+    pub fn start(&mut self, value: f64) -> Result<Vec<f64>, OrbitError> {
+        if !self.set(value) {
+            return Err(OrbitError::Frequency { omega: self.omega });
+        }
+        // as for a single point: the initial guess solves the whole structure; large systems
+        // start without friction
+        let guess = (self.system.dofs() < GUESSED).then(|| Guess::new(&self.system, self.omega));
+        let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
+        self.level.begin_point();
+        let solved = self.level.solve(&self.ports, self.omega, start);
+        self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
+        let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+        let size = norm(&self.motion.c).max(1e-3 * norm(&self.level.linear));
+        self.length = (RESONANCE * size).max(f64::MIN_POSITIVE);
+        Ok(self.level.pack(&self.ports, &self.motion, self.length))
+    }
+
+    /// Returns the orbit of a point of the branch.
+    pub fn orbit(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
+        if !self.set(value) {
+            return None;
+        }
+        self.level.unpack(&self.ports, (x, self.length), &mut self.motion);
+        self.level.begin_point();
+        self.level.polish(&self.ports, self.omega, &mut self.motion, 10).ok()?;
+        let places = postprocess::places(&mut self.level, &self.rest, self.omega, &self.motion).ok()?;
+        let truncation = self.finer.as_mut().and_then(|finer| {
+            finer.drive(&self.system, &self.ports, &self.rest, self.omega).ok()?;
+            let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics());
+            // Newton's method alone: a search would find another branch near a turning point
+            finer.begin_point();
+            finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
+            let better = postprocess::places(finer, &self.rest, self.omega, &motion).ok()?;
+            let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
+            let steep = self.ports.has_steep() || self.level.jumps(&self.ports, &self.motion);
+            let at = (self.kept, self.omega, steep);
+            Some(estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
+        });
+        let setting = postprocess::Setting {
+            system: &self.system,
+            ports: &self.ports,
+            around: self.around.as_ref(),
+            omega: self.omega,
+            first: 1,
+            odd: self.kept.half_period(),
+            truncation,
+            tolerance: self.tolerance,
+            judge: Some(&mut self.judge),
+        };
+        postprocess::orbit(setting, &mut self.level, &self.motion, places)
+            .filter(|orbit| postprocess::balances(&self.system, orbit))
+    }
+
+    /// Returns the orbit at `value` that the solver finds from the nearby point `x`.
+    pub fn near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
+        let mut x = x.to_vec();
+        self.jump_kink(&mut x, value).then(|| self.orbit(&x, value))?
+    }
+}
+
+impl ParametricEquations for BranchEquations<'_> {
+    fn size(&self) -> usize {
+        2 * self.motion.c.len()
+    }
+
+    fn tolerance(&self) -> f64 {
+        crate::method::harmonic_balance::globalization::homotopy::SOLVED / RESONANCE
+    }
+
+    fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
+        if !p.is_finite() || x.iter().any(|x| !x.is_finite()) {
+            return false;
+        }
+        let step = DIFFERENCE * p.abs().max(self.span);
+        for (sign, at) in [(1.0, p + step), (-1.0, p - step)] {
+            if !self.set(at) {
+                return false;
+            }
+            self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, None);
+            for (d, r) in by_p.iter_mut().zip(f.iter()) {
+                *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step) };
+            }
+        }
+        if !self.set(p) {
+            return false;
+        }
+        self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
+        true
+    }
+
+    fn jump_kink(&mut self, x: &mut [f64], p: f64) -> bool {
+        if !self.set(p) {
+            return false;
+        }
+        let mut start = self.motion.clone();
+        self.level.unpack(&self.ports, (x, self.length), &mut start);
+        self.level.begin_point();
+        let Ok(motion) = self.level.solve(&self.ports, self.omega, start) else { return false };
+        self.motion = motion;
+        x.copy_from_slice(&self.level.pack(&self.ports, &self.motion, self.length));
+        true
+    }
+}
