@@ -4,7 +4,7 @@
 //! for cheaper or other systems, and for travelling waves on a disk.
 
 use super::event_driven::EventDriven;
-use super::flow::integrator_choice::Kind;
+use super::flow::integrator_choice::IntegratorKind;
 use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
 use super::shooting::Shooting;
@@ -96,7 +96,7 @@ impl Auto {
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
         } else if falls(system)
-            && Kind::of(system, None) == Kind::Switched
+            && IntegratorKind::of(system, None) == IntegratorKind::Switched
             && system.dofs() <= DOFS
             && joints <= FOLLOWED
         {
@@ -135,13 +135,13 @@ impl Method for Auto {
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let (method, _) = Auto::chosen(system);
         let first = method.solver(system)?;
-        Ok(Box::new(WithSecond { first, chosen: method.name(), system, second: None, last: None, effort: 0.0 }))
+        Ok(Box::new(WithFallback { first, chosen: method.name(), system, second: None, last: None, effort: 0.0 }))
     }
 }
 
 /// The picked method, and a second method that takes over if the first finds no orbit. The
 /// second method must take the system and need only seconds.
-struct WithSecond<'a> {
+struct WithFallback<'a> {
     first: Box<dyn Solver + Send + 'a>,
     chosen: &'static str,
     system: &'a System,
@@ -154,7 +154,7 @@ struct WithSecond<'a> {
     effort: f64,
 }
 
-impl<'a> WithSecond<'a> {
+impl<'a> WithFallback<'a> {
     /// Returns the second method. It is never `transient`, which can take minutes.
     fn next(&self) -> Option<(&'static str, Box<dyn Solver + Send + 'a>)> {
         let (system, joints) = (self.system, self.system.joints().len());
@@ -215,7 +215,7 @@ fn misses(error: &OrbitError) -> bool {
     )
 }
 
-impl Solver for WithSecond<'_> {
+impl Solver for WithFallback<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.seek(omega, start, false)
     }
@@ -302,9 +302,9 @@ mod tests {
     }
 
     /// A solver that finds no orbit. It asserts that it gets no warm start from another method.
-    struct Nothing;
+    struct FailingSolver;
 
-    impl Solver for Nothing {
+    impl Solver for FailingSolver {
         fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             assert!(start.is_none());
             Err(OrbitError::not_converged("nothing", omega, 1, 1.0))
@@ -315,8 +315,8 @@ mod tests {
     fn what_the_first_choice_does_not_find_the_next_one_may() {
         let system = example::blade_couple().assemble().unwrap();
         for (chosen, next) in [("event-driven", "harmonic-balance"), ("harmonic-balance", "event-driven")] {
-            let first = Box::new(Nothing);
-            let mut solver = WithSecond { first, chosen, system: &system, second: None, last: None, effort: 0.0 };
+            let first = Box::new(FailingSolver);
+            let mut solver = WithFallback { first, chosen, system: &system, second: None, last: None, effort: 0.0 };
             let orbit = solver.orbit(TAU * 121.0, None).unwrap();
             let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.initial_state)).unwrap();
             assert_eq!((orbit.method, neighbour.method), (next, next));
@@ -328,9 +328,10 @@ mod tests {
     #[test]
     fn who_was_asked_in_vain_is_not_advised() {
         let system = example::blade_couple().assemble().unwrap();
-        let second = Some(Some(("harmonic-balance", Box::new(Nothing) as Box<dyn Solver + Send>)));
-        let first = Box::new(Nothing);
-        let mut solver = WithSecond { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
+        let second = Some(Some(("harmonic-balance", Box::new(FailingSolver) as Box<dyn Solver + Send>)));
+        let first = Box::new(FailingSolver);
+        let mut solver =
+            WithFallback { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
         let said = solver.orbit(TAU * 121.0, None).unwrap_err().to_string();
         assert!(said.ends_with("; `harmonic-balance` found no orbit either"), "{said}");
     }

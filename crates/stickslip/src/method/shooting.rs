@@ -8,17 +8,18 @@
 use super::event_driven::MISSING_WORK;
 use super::flow::Flow;
 use super::flow::assembly::{Assembly, NEAR_REST};
-use super::flow::average_acceleration::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::flow::integrator_choice::Kind;
-use super::flow::radau::step_size_control::{Lengths, SmoothFlow};
-use super::flow::set_valued::located_switches::SwitchedFlow;
-use super::flow::trajectory::SteppedPath;
+use super::flow::average_acceleration::flow::{AverageAccelerationFlow, FIRST, MOST, estimate};
+use super::flow::integrator_choice::IntegratorKind;
+use super::flow::radau::step_size_control::{RadauFlow, StepSizes};
+use super::flow::set_valued::located_switches::SetValuedFlow;
+use super::flow::trajectory::Trajectory;
 use super::options::{PERIOD, periods, width};
-use super::orbit_search::cold_restart::Afresh;
-use super::orbit_search::describing_guess::Guess;
-use super::orbit_search::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
+use super::orbit_search::cold_restart::ColdRestart;
+use super::orbit_search::describing_guess::DescribingGuess;
+use super::orbit_search::residual_traction::{ElasticSlider, OrbitMap, as_in_equilibrium};
 use super::orbit_search::return_map::{
-    Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm,
+    ClosedState, ClosingMethod, ClosingTargets, LargeIncrease, ReturnMap, approached, close, descended, newton_step,
+    norm,
 };
 use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
@@ -140,59 +141,59 @@ impl Method for Shooting {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let shooter = Shooter::new(system, *self, NAME, Search::Newton)?;
-        Ok(if self.period > 1 { Box::new(Afresh(shooter)) } else { Box::new(shooter) })
+        let shooter = ShootingSolver::new(system, *self, NAME, ClosingMethod::Newton)?;
+        Ok(if self.period > 1 { Box::new(ColdRestart(shooter)) } else { Box::new(shooter) })
     }
 }
 
 /// The time integration.
-enum Stepping {
-    Smooth(Box<SmoothFlow>),
-    Switched(Box<SwitchedFlow>),
-    Incremental(Box<IncrementalFlow>),
+enum StepIntegrator {
+    Smooth(Box<RadauFlow>),
+    Switched(Box<SetValuedFlow>),
+    Incremental(Box<AverageAccelerationFlow>),
 }
 
-impl Stepping {
+impl StepIntegrator {
     fn flow(&mut self) -> &mut dyn Flow {
         match self {
-            Stepping::Smooth(flow) => flow.as_mut(),
-            Stepping::Switched(flow) => flow.as_mut(),
-            Stepping::Incremental(flow) => flow.as_mut(),
+            StepIntegrator::Smooth(flow) => flow.as_mut(),
+            StepIntegrator::Switched(flow) => flow.as_mut(),
+            StepIntegrator::Incremental(flow) => flow.as_mut(),
         }
     }
 
     fn assembly(&self) -> &Assembly {
         match self {
-            Stepping::Smooth(flow) => &flow.assembly,
-            Stepping::Switched(flow) => &flow.assembly,
-            Stepping::Incremental(flow) => &flow.assembly,
+            StepIntegrator::Smooth(flow) => &flow.assembly,
+            StepIntegrator::Switched(flow) => &flow.assembly,
+            StepIntegrator::Incremental(flow) => &flow.assembly,
         }
     }
 
-    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
         match self {
-            Stepping::Smooth(flow) => flow.stepped(system, symmetry, period),
-            Stepping::Switched(flow) => flow.stepped(system, symmetry, period),
-            Stepping::Incremental(flow) => flow.stepped(system, symmetry, period),
+            StepIntegrator::Smooth(flow) => flow.stepped(system, symmetry, period),
+            StepIntegrator::Switched(flow) => flow.stepped(system, symmetry, period),
+            StepIntegrator::Incremental(flow) => flow.stepped(system, symmetry, period),
         }
     }
 }
 
 /// Finds orbits by time integration, by Newton's method or by waiting until the motion settles.
-pub(super) struct Shooter<'a> {
+pub(super) struct ShootingSolver<'a> {
     system: &'a System,
     shared: Arc<System>,
     /// Name of the method that uses this solver.
     name: &'static str,
     /// Search and relative error per step, relative to the vibration.
-    asked: (Search, f64),
+    asked: (ClosingMethod, f64),
     /// Size of the vibration over the size of its states.
     share: f64,
     /// Search and relative error per step, relative to the states.
-    search: Search,
+    search: ClosingMethod,
     tolerance: f64,
     periods: usize,
-    stepping: Stepping,
+    stepping: StepIntegrator,
     weights: Vec<f64>,
     omega: f64,
     duration: f64,
@@ -203,7 +204,7 @@ pub(super) struct Shooter<'a> {
     equilibrium: Option<StaticEquilibrium>,
 }
 
-impl ReturnMap for Shooter<'_> {
+impl ReturnMap for ShootingSolver<'_> {
     fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         let duration = self.duration;
         self.stepping.flow().run(state, duration, derivative)
@@ -212,46 +213,55 @@ impl ReturnMap for Shooter<'_> {
         &self.weights
     }
     fn moves(&mut self, change: f64) {
-        if let Stepping::Smooth(flow) = &mut self.stepping {
+        if let StepIntegrator::Smooth(flow) = &mut self.stepping {
             let apart = change > SETTLED * flow.tolerance;
-            flow.lengths = if apart { Lengths::Chosen } else { Lengths::Halved };
+            flow.lengths = if apart { StepSizes::Chosen } else { StepSizes::Halved };
         }
     }
 }
 
-impl Closing for Shooter<'_> {
+impl OrbitMap for ShootingSolver<'_> {
     fn springs(&self) -> Vec<ElasticSlider> {
         match &self.stepping {
-            Stepping::Smooth(_) | Stepping::Switched(_) => Vec::new(),
-            Stepping::Incremental(flow) => flow.springs(),
+            StepIntegrator::Smooth(_) | StepIntegrator::Switched(_) => Vec::new(),
+            StepIntegrator::Incremental(flow) => flow.springs(),
         }
     }
     fn limit(&mut self, springs: &[ElasticSlider]) {
-        if let Stepping::Incremental(flow) = &mut self.stepping {
+        if let StepIntegrator::Incremental(flow) = &mut self.stepping {
             flow.limit(springs);
         }
     }
-    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
+    fn finish(&mut self, closed: ClosedState) -> Result<Orbit, OrbitError> {
         self.record(&closed)?;
         let symmetry = self.search.symmetry(self.system, self.periods);
         Ok(self.orbit_of(self.omega, symmetry, closed))
     }
 }
 
-impl<'a> Shooter<'a> {
+impl<'a> ShootingSolver<'a> {
     /// # Errors
     /// Fails if no integration takes a law, or if a place has no mass.
-    pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
-        let stepping = match Kind::integrated(system, options.width) {
-            Kind::Incremental => Stepping::Incremental(Box::new(IncrementalFlow::new(system, options.width, name)?)),
-            Kind::Switched => Stepping::Switched(Box::new(SwitchedFlow::new(system, options.tolerance, name)?)),
+    pub fn new(
+        system: &'a System,
+        options: Shooting,
+        name: &'static str,
+        search: ClosingMethod,
+    ) -> Result<Self, MethodError> {
+        let stepping = match IntegratorKind::integrated(system, options.width) {
+            IntegratorKind::Incremental => {
+                StepIntegrator::Incremental(Box::new(AverageAccelerationFlow::new(system, options.width, name)?))
+            }
+            IntegratorKind::Switched => {
+                StepIntegrator::Switched(Box::new(SetValuedFlow::new(system, options.tolerance, name)?))
+            }
             // the assembly smooths exact laws if a width is given, else it refuses them
-            Kind::Smooth | Kind::Exact => {
+            IntegratorKind::Smooth | IntegratorKind::Exact => {
                 let assembly = super::flow::radau::assembly(system, options.width, name)?;
-                Stepping::Smooth(Box::new(SmoothFlow::new(assembly, options.tolerance)))
+                StepIntegrator::Smooth(Box::new(RadauFlow::new(assembly, options.tolerance)))
             }
         };
-        Ok(Shooter {
+        Ok(ShootingSolver {
             system,
             shared: Arc::new(system.clone()),
             name,
@@ -273,7 +283,7 @@ impl<'a> Shooter<'a> {
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let assembly = self.stepping.assembly();
-        let mut state = Guess::new(self.system, omega).state(assembly.n);
+        let mut state = DescribingGuess::new(self.system, omega).state(assembly.n);
         let count = assembly.states() - state.len();
         let states = states_at(self.equilibrium.as_ref(), self.system, &state[..assembly.n], count);
         state.extend(states);
@@ -281,11 +291,11 @@ impl<'a> Shooter<'a> {
     }
 
     /// Returns the orbit that the search finds.
-    fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: Aim) -> Result<Orbit, OrbitError> {
+    fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: ClosingTargets) -> Result<Orbit, OrbitError> {
         let closed = match self.stepping {
-            Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
-            Stepping::Switched(_) => self.switched_orbit(start, aim)?,
-            Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
+            StepIntegrator::Smooth(_) => self.smooth_orbit(start, aim)?,
+            StepIntegrator::Switched(_) => self.switched_orbit(start, aim)?,
+            StepIntegrator::Incremental(_) => self.stepped_orbit(start, aim)?,
         };
         Ok(self.orbit_of(aim.omega, symmetry, closed))
     }
@@ -314,13 +324,15 @@ impl<'a> Shooter<'a> {
 
     /// Finds the orbit of the stiff integration: a search, steps with the derivative of the
     /// search, and closing on fixed steps.
-    fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+    fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
         let search = self.search;
-        self.set_lengths(Lengths::Chosen);
-        if let Search::Settle { tolerance, returns } = search {
+        self.set_lengths(StepSizes::Chosen);
+        if let ClosingMethod::Settle { tolerance, returns } = search {
             let fine = self.set_tolerance(self.tolerance.max(COARSE * self.share));
-            let coarse =
-                Search::Settle { tolerance: tolerance.max(COARSE * self.share), returns: returns.min(COARSE_RETURNS) };
+            let coarse = ClosingMethod::Settle {
+                tolerance: tolerance.max(COARSE * self.share),
+                returns: returns.min(COARSE_RETURNS),
+            };
             let near = coarse.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
             self.set_tolerance(fine);
             let near = match near {
@@ -353,12 +365,12 @@ impl<'a> Shooter<'a> {
         loop {
             mesh += 1;
             if !fits {
-                self.set_lengths(Lengths::Chosen);
+                self.set_lengths(StepSizes::Chosen);
                 self.returned(&mut state.clone(), None).map_err(self.broke(aim.omega))?;
             }
-            self.set_lengths(Lengths::Repeated);
+            self.set_lengths(StepSizes::Repeated);
             self.stepping.flow().keep(true);
-            let closed = close(self, &state, Aim { residual: CLOSED, ..aim });
+            let closed = close(self, &state, ClosingTargets { residual: CLOSED, ..aim });
             self.stepping.flow().keep(false);
             let closed = closed?;
             iterations += closed.iterations;
@@ -366,7 +378,7 @@ impl<'a> Shooter<'a> {
             let moved = norm(&self.weights, &moved) / self.size(&closed.state, aim);
             if moved <= SETTLED * self.tolerance || (mesh == MESHES && moved <= ENERGY_GAP) {
                 // the last run was that of the closed state
-                return Ok(Closed { iterations, ..closed });
+                return Ok(ClosedState { iterations, ..closed });
             }
             if mesh == MESHES {
                 return Err(OrbitError::not_converged(NAME, aim.omega, iterations, moved));
@@ -377,8 +389,8 @@ impl<'a> Shooter<'a> {
 
     /// Finds the orbit between located switches. The return map is smooth to the error of its
     /// steps.
-    fn switched_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
-        let aim = Aim { residual: CLOSED_SWITCHED * self.share, ..aim };
+    fn switched_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
+        let aim = ClosingTargets { residual: CLOSED_SWITCHED * self.share, ..aim };
         let closed = self.search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
         self.record(&closed)?;
         Ok(closed)
@@ -390,13 +402,19 @@ impl<'a> Shooter<'a> {
     }
 
     /// Approaches the orbit with long steps; returns `None` if they fail.
-    fn coarsely(&mut self, start: Option<&[f64]>, aim: Aim, iterations: &mut usize) -> Option<Closed> {
+    fn coarsely(&mut self, start: Option<&[f64]>, aim: ClosingTargets, iterations: &mut usize) -> Option<ClosedState> {
         let first = match start.filter(|state| state.len() == self.weights.len()) {
             Some(start) => start.to_vec(),
             None => self.first_state(aim.omega),
         };
         let fine = self.set_tolerance(self.long_steps());
-        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, Beyond::Ends, iterations);
+        let near = descended(
+            self,
+            &first,
+            ClosingTargets { residual: COARSE_RESIDUAL, ..aim },
+            LargeIncrease::Ends,
+            iterations,
+        );
         self.set_tolerance(fine);
         near.ok()
     }
@@ -406,7 +424,12 @@ impl<'a> Shooter<'a> {
     /// It reuses the derivative of the search; its runs carry none. If the search was `fine`,
     /// the last run of the search is the first of these. Returns `None` if the steps do not
     /// shrink fast enough.
-    fn brought_near(&mut self, (near, fine): (&Closed, bool), aim: Aim, iterations: &mut usize) -> Option<Vec<f64>> {
+    fn brought_near(
+        &mut self,
+        (near, fine): (&ClosedState, bool),
+        aim: ClosingTargets,
+        iterations: &mut usize,
+    ) -> Option<Vec<f64>> {
         let (mut state, mut before) = (near.state.clone(), f64::INFINITY);
         let mut known = fine.then(|| near.gap.clone());
         for _ in 0..MESHES {
@@ -434,20 +457,20 @@ impl<'a> Shooter<'a> {
     }
 
     /// Returns the energy norm of a state, at least that of rest.
-    fn size(&self, state: &[f64], aim: Aim) -> f64 {
+    fn size(&self, state: &[f64], aim: ClosingTargets) -> f64 {
         norm(&self.weights, state).max(aim.rest).max(f64::MIN_POSITIVE)
     }
 
     /// Runs from a closed state and records the motion.
-    fn record(&mut self, closed: &Closed) -> Result<(), OrbitError> {
+    fn record(&mut self, closed: &ClosedState) -> Result<(), OrbitError> {
         self.stepping.flow().keep(true);
         let kept = self.returned(&mut closed.state.clone(), None);
         self.stepping.flow().keep(false);
         kept.map_err(self.broke(self.omega))
     }
 
-    fn set_lengths(&mut self, lengths: Lengths) {
-        if let Stepping::Smooth(flow) = &mut self.stepping {
+    fn set_lengths(&mut self, lengths: StepSizes) {
+        if let StepIntegrator::Smooth(flow) = &mut self.stepping {
             flow.lengths = lengths;
         }
     }
@@ -455,9 +478,9 @@ impl<'a> Shooter<'a> {
     /// Sets the relative error per step and returns the old one.
     fn set_tolerance(&mut self, tolerance: f64) -> f64 {
         match &mut self.stepping {
-            Stepping::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
-            Stepping::Switched(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
-            Stepping::Incremental(_) => self.tolerance,
+            StepIntegrator::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
+            StepIntegrator::Switched(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
+            StepIntegrator::Incremental(_) => self.tolerance,
         }
     }
 
@@ -469,16 +492,16 @@ impl<'a> Shooter<'a> {
     }
 
     fn set_count(&mut self, count: usize) {
-        if let Stepping::Incremental(flow) = &mut self.stepping {
+        if let StepIntegrator::Incremental(flow) = &mut self.stepping {
             flow.count = count;
         }
     }
 
     /// Finds the orbit in equal steps, and halves the steps until the estimated error is below
     /// the tolerance.
-    fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+    fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
         let tolerance = EQUAL_STEPS * self.tolerance;
-        let aim = Aim { residual: CLOSED_STEPS, ..aim };
+        let aim = ClosingTargets { residual: CLOSED_STEPS, ..aim };
         let search = self.search;
         let mut count = FIRST * self.periods;
         self.set_count(count);
@@ -511,13 +534,13 @@ impl<'a> Shooter<'a> {
             let iterations = coarse.iterations + fine.iterations;
             if error <= tolerance {
                 let missing = Some(error.max(fine.missing.unwrap_or(0.0)));
-                return Ok(Closed { iterations, missing, ..fine });
+                return Ok(ClosedState { iterations, missing, ..fine });
             }
             if count >= MOST {
                 let cause = IntegrationError::Unresolved { steps: count, estimate: error, tolerance };
                 return Err(OrbitError::Breakdown { method: self.name, omega: aim.omega, cause });
             }
-            (earlier, motion, coarse) = (Some(last), finer, Closed { iterations, ..fine });
+            (earlier, motion, coarse) = (Some(last), finer, ClosedState { iterations, ..fine });
         }
     }
 
@@ -526,7 +549,7 @@ impl<'a> Shooter<'a> {
     ///
     /// With the free offset of a stuck contact, two different motions may begin with equal
     /// states.
-    fn instants(&mut self, closed: &Closed) -> Result<Vec<Vec<f64>>, OrbitError> {
+    fn instants(&mut self, closed: &ClosedState) -> Result<Vec<Vec<f64>>, OrbitError> {
         self.record(closed)?;
         let path = self.stepping.path(&self.shared, Symmetry::FullPeriod, self.duration);
         let at = |k: usize| {
@@ -538,8 +561,8 @@ impl<'a> Shooter<'a> {
 
     /// Finds the settled orbit in finer steps by Newton's method; returns `None` if that fails
     /// or leads to another orbit.
-    fn refined(&mut self, settled: &Closed, aim: Aim) -> Option<Closed> {
-        if self.search == Search::Newton {
+    fn refined(&mut self, settled: &ClosedState, aim: ClosingTargets) -> Option<ClosedState> {
+        if self.search == ClosingMethod::Newton {
             return None;
         }
         let fine = close(self, &settled.state, aim).ok()?;
@@ -548,13 +571,13 @@ impl<'a> Shooter<'a> {
 
     /// Returns the distance of two states, or of their displacements and velocities, relative
     /// to the first.
-    fn apart(&self, state: &[f64], other: &[f64], aim: Aim) -> f64 {
+    fn apart(&self, state: &[f64], other: &[f64], aim: ClosingTargets) -> f64 {
         let change: Vec<f64> = state.iter().zip(other).map(|(a, b)| a - b).collect();
         norm(&self.weights, &change) / self.size(state, aim)
     }
 
     /// Makes the orbit from its last recorded run.
-    fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
+    fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: ClosedState) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = results(self.system, &path, omega, (symmetry, period));
@@ -597,7 +620,7 @@ impl<'a> Shooter<'a> {
     }
 }
 
-impl Solver for Shooter<'_> {
+impl Solver for ShootingSolver<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
@@ -613,11 +636,11 @@ impl Solver for Shooter<'_> {
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
-        let aim = Aim { method: self.name, omega, residual: NEAR, distance: f64::INFINITY, sign, rest };
+        let aim = ClosingTargets { method: self.name, omega, residual: NEAR, distance: f64::INFINITY, sign, rest };
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
-            self.set_lengths(Lengths::Chosen);
+            self.set_lengths(StepSizes::Chosen);
             self.set_count(FIRST * self.periods);
             let first = self.first_state(omega);
             near = approached(self, first, sign);
@@ -642,10 +665,10 @@ impl Solver for Shooter<'_> {
             // an orbit accurate as a state but not as a vibration has too few digits
             orbit = self.found(Some(&orbit.initial_state), symmetry, aim).map_err(|_| self.lost(omega, share))?;
         }
-        if self.search == Search::Newton {
+        if self.search == ClosingMethod::Newton {
             let system = self.system;
             let equilibrium = self.equilibrium.clone();
-            let aim = Aim { residual: CLOSED_STEPS, ..aim };
+            let aim = ClosingTargets { residual: CLOSED_STEPS, ..aim };
             orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
         }
         let share = self.share_in(&orbit, rest);

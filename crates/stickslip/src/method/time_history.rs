@@ -85,7 +85,7 @@ fn good(last: Option<f64>) -> String {
 const SHORTENED: usize = 6;
 
 /// The motion in an interval that starts at `begin` (s).
-struct Stretch {
+struct TimeInterval {
     begin: f64,
     length: f64,
     /// Index of its last sample, if it has one.
@@ -106,7 +106,7 @@ pub struct Instant<'a> {
     pub since: &'a dyn Fn(f64) -> Sample,
 }
 
-impl Stretch {
+impl TimeInterval {
     /// Returns the state at a time of this interval, s.
     fn at(&self, time: f64) -> Sample {
         self.path.sample((time - self.begin).clamp(0.0, self.length))
@@ -165,7 +165,7 @@ impl TimeHistory {
         state.resize(flow.states(), 0.0);
         let mut begin = 0.0;
         let mut next = 0usize; // index of the next sample
-        let mut before: Option<Stretch> = None;
+        let mut before: Option<TimeInterval> = None;
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             let omega = self.frequency(begin);
@@ -181,7 +181,7 @@ impl TimeHistory {
             let stretch = match &followed {
                 Ok(()) => {
                     let path = flow.path(&shared, Symmetry::FullPeriod, length);
-                    Some(Stretch { begin, length, last: whole, path })
+                    Some(TimeInterval { begin, length, last: whole, path })
                 }
                 Err(cause) => whole.and_then(|last| self.before(&shared, &start, (begin, next, last), cause)),
             };
@@ -218,7 +218,7 @@ impl TimeHistory {
         start: &[f64],
         (begin, first, mut last): (f64, usize, usize),
         cause: &IntegrationError,
-    ) -> Option<Stretch> {
+    ) -> Option<TimeInterval> {
         let since = |sample: usize| sample as f64 * self.step - begin;
         let mut cause = cause.clone();
         for _ in 0..SHORTENED {
@@ -233,7 +233,7 @@ impl TimeHistory {
             match flow.follow(&mut start.to_vec(), length) {
                 Ok(()) => {
                     let path = flow.path(system, Symmetry::FullPeriod, length);
-                    return Some(Stretch { begin, length, last: Some(last), path });
+                    return Some(TimeInterval { begin, length, last: Some(last), path });
                 }
                 Err(again) => cause = again,
             }

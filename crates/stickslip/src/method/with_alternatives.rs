@@ -27,7 +27,7 @@ use crate::orbit::Orbit;
 /// ```
 pub fn advised<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = method.solver(system).map_err(|error| error.with(ways(system)))?;
-    Ok(Box::new(Advised { solver, system }))
+    Ok(Box::new(WithAlternatives { solver, system }))
 }
 
 /// A width (m/s) with which to test for smoothing. Laws can be smoothed over every width or
@@ -67,12 +67,12 @@ fn among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
 }
 
 /// A solver whose errors name other methods that take the system and may find the orbit.
-struct Advised<'a> {
+struct WithAlternatives<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     system: &'a System,
 }
 
-impl Solver for Advised<'_> {
+impl Solver for WithAlternatives<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.solver.orbit(omega, start).map_err(|error| with_ways(error, self.system))
     }

@@ -1,7 +1,7 @@
 //! Arc-length continuation of a nonlinear mode from large amplitudes, and evaluation of its
 //! motions.
 
-use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
+use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep};
 use std::convert::Infallible;
 use stickslip_numerics::golden_section::golden_section;
 
@@ -403,7 +403,7 @@ impl ModeCurve {
 }
 
 /// Takes a step. `None` if the corrector fails or leaves the curve.
-fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<Step> {
+fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<ModeStep> {
     let step = equations.step(now, length, length < CORNER)?;
     let smooth = step.off <= MAX_PREDICTOR_ERROR * length
         && step.straight >= MIN_TANGENT_COSINE

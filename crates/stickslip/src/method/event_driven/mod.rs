@@ -23,19 +23,19 @@ mod tolerances;
 mod transition;
 
 pub use cost_model::{ALONE, orbit_work};
-use mechanics::Kind;
+use mechanics::PartKind;
 pub(crate) use mechanics::{Mechanics, takes};
 pub(crate) use postprocess::ExactPath;
 pub(crate) use segments::SegmentedMotion;
 pub(crate) use tolerances::MISSING_WORK;
 use tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
 
-use super::flow::excitation::Drive;
+use super::flow::excitation::HarmonicExcitation;
 use super::options::{PERIOD, periods};
-use super::orbit_search::cold_restart::Afresh;
-use super::orbit_search::describing_guess::Guess;
-use super::orbit_search::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
-use super::orbit_search::return_map::{Aim, Closed, ReturnMap, Search, approached};
+use super::orbit_search::cold_restart::ColdRestart;
+use super::orbit_search::describing_guess::DescribingGuess;
+use super::orbit_search::residual_traction::{ElasticSlider, OrbitMap, as_in_equilibrium};
+use super::orbit_search::return_map::{ClosedState, ClosingMethod, ClosingTargets, ReturnMap, approached};
 use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
 use super::{IntegrationError, Method, MethodError, MethodInfo, OrbitError, Solver};
@@ -84,7 +84,7 @@ impl Method for EventDriven {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Exact::new(system, NAME, Search::Newton, 1)?))
+        Ok(Box::new(ExactSolver::new(system, NAME, ClosingMethod::Newton, 1)?))
     }
 }
 
@@ -100,18 +100,18 @@ impl Method for Subharmonic {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Afresh(Exact::new(system, NAME, Search::Newton, self.period)?)))
+        Ok(Box::new(ColdRestart(ExactSolver::new(system, NAME, ClosingMethod::Newton, self.period)?)))
     }
 }
 
 /// Solver for orbits by exact motion, with Newton's method or by waiting.
-pub(crate) struct Exact<'a> {
+pub(crate) struct ExactSolver<'a> {
     system: &'a System,
     /// The system, shared with the returned orbits.
     shared: Arc<System>,
     /// Name of the calling method.
     name: &'static str,
-    search: Search,
+    search: ClosingMethod,
     flow: SegmentedMotion,
     weights: Vec<f64>,
     duration: f64,
@@ -122,7 +122,7 @@ pub(crate) struct Exact<'a> {
     equilibrium: Option<StaticEquilibrium>,
 }
 
-impl ReturnMap for Exact<'_> {
+impl ReturnMap for ExactSolver<'_> {
     fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         self.flow.run(state, 0.0, self.duration, derivative)
     }
@@ -131,11 +131,11 @@ impl ReturnMap for Exact<'_> {
     }
 }
 
-impl Closing for Exact<'_> {
+impl OrbitMap for ExactSolver<'_> {
     fn springs(&self) -> Vec<ElasticSlider> {
         let mechanics = &self.flow.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
-            Kind::Elastic { stiffness, limit, state } => {
+            PartKind::Elastic { stiffness, limit, state } => {
                 Some(ElasticSlider { joint: part.joint, state: 2 * mechanics.n + state, stiffness, limit })
             }
             _ => None,
@@ -147,7 +147,7 @@ impl Closing for Exact<'_> {
         let mechanics = &mut self.flow.mechanics;
         let mut parts = mechanics.parts.to_vec();
         for part in &mut parts {
-            if let Kind::Elastic { limit, .. } = &mut part.kind
+            if let PartKind::Elastic { limit, .. } = &mut part.kind
                 && let Some(spring) = springs.next()
             {
                 *limit = spring.limit;
@@ -157,7 +157,7 @@ impl Closing for Exact<'_> {
     }
     /// Creates the orbit from the segments of the last run, which started from the converged
     /// state.
-    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
+    fn finish(&mut self, closed: ClosedState) -> Result<Orbit, OrbitError> {
         let omega = self.flow.drive.omega;
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (at, closed) = ((omega, self.periods), (closed, self.weights.as_slice()));
@@ -167,16 +167,21 @@ impl Closing for Exact<'_> {
     }
 }
 
-impl<'a> Exact<'a> {
+impl<'a> ExactSolver<'a> {
     /// Creates a solver for a system.
     ///
     /// # Errors
     /// See [`Mechanics::new`].
-    pub fn new(system: &'a System, name: &'static str, search: Search, periods: usize) -> Result<Self, MethodError> {
+    pub fn new(
+        system: &'a System,
+        name: &'static str,
+        search: ClosingMethod,
+        periods: usize,
+    ) -> Result<Self, MethodError> {
         let mechanics = Mechanics::new(system, name)?;
         let weights = vec![1.0; mechanics.states()];
-        let flow = SegmentedMotion::new(mechanics, Drive::default());
-        Ok(Exact {
+        let flow = SegmentedMotion::new(mechanics, HarmonicExcitation::default());
+        Ok(ExactSolver {
             system,
             shared: Arc::new(system.clone()),
             name,
@@ -202,8 +207,13 @@ impl<'a> Exact<'a> {
     }
 
     /// Runs a search and returns its orbit.
-    fn found(&mut self, start: Option<&[f64]>, search: Search, aim: Aim) -> Result<Orbit, OrbitError> {
-        let Aim { method, omega, .. } = aim;
+    fn found(
+        &mut self,
+        start: Option<&[f64]>,
+        search: ClosingMethod,
+        aim: ClosingTargets,
+    ) -> Result<Orbit, OrbitError> {
+        let ClosingTargets { method, omega, .. } = aim;
         let closed = match search.find(self, start, |exact| exact.first_state(omega), aim) {
             Err(OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. }) if self.drifts() => {
                 // the friction forces depend on the history, so that a guess does not contain
@@ -219,7 +229,7 @@ impl<'a> Exact<'a> {
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let mechanics = &self.flow.mechanics;
-        let guess = Guess::new(self.system, omega);
+        let guess = DescribingGuess::new(self.system, omega);
         let mut state = guess.state(mechanics.n);
         let count = mechanics.states() - state.len();
         let states = states_at(self.equilibrium.as_ref(), self.system, &state[..mechanics.n], count);
@@ -228,12 +238,12 @@ impl<'a> Exact<'a> {
     }
 }
 
-impl Solver for Exact<'_> {
+impl Solver for ExactSolver<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        let drive = Drive::new(self.system, &self.flow.mechanics.owners(), omega);
+        let drive = HarmonicExcitation::new(self.system, &self.flow.mechanics.owners(), omega);
         self.flow.set_drive(drive);
         self.weights = self.flow.mechanics.weights(omega);
         let symmetry = self.search.symmetry(self.system, self.periods);
@@ -241,10 +251,10 @@ impl Solver for Exact<'_> {
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
         let rest = NEAR_REST * self.flow.energy_scale;
-        let aim = Aim { method: name, omega, residual: CLOSED, distance: NEAREST, sign, rest };
+        let aim = ClosingTargets { method: name, omega, residual: CLOSED, distance: NEAREST, sign, rest };
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
-        let start = if self.periods > 1 && search == Search::Newton && known.is_none() {
+        let start = if self.periods > 1 && search == ClosingMethod::Newton && known.is_none() {
             let first = self.first_state(omega);
             near = approached(self, first, sign);
             Some(near.as_slice())
@@ -252,7 +262,7 @@ impl Solver for Exact<'_> {
             known
         };
         let mut orbit = self.found(start, search, aim)?;
-        if search == Search::Newton {
+        if search == ClosingMethod::Newton {
             let system = self.system;
             let equilibrium = self.equilibrium.clone();
             orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);

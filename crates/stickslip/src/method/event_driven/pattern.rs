@@ -9,9 +9,9 @@
 //! A pattern does not depend on time, excitation frequency or slip direction. Its key is the
 //! set of stuck and closed parts.
 
-use super::mechanics::{Kind, Mechanics};
+use super::mechanics::{Mechanics, PartKind};
 use crate::law::Contact;
-use crate::method::flow::excitation::Drive;
+use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense::{ProductShape, multiply};
@@ -86,9 +86,9 @@ pub(crate) struct Pattern {
 
 /// Initial data of a segment.
 #[derive(Clone, Copy)]
-pub(crate) struct Beginning<'a> {
+pub(crate) struct SegmentStart<'a> {
     /// Response of the pattern to the excitation.
-    pub driven: &'a Driven,
+    pub driven: &'a ForcedResponse,
     /// Contact states.
     pub contacts: &'a [Contact],
     /// Time, s.
@@ -99,7 +99,7 @@ pub(crate) struct Beginning<'a> {
 
 /// Data of a pattern at one excitation frequency, shared by the segments of the motion.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Driven {
+pub(crate) struct ForcedResponse {
     pub basis: ExponentialBasis,
     /// Number of exponents of the basis that are modes; those of the excitation follow.
     pub modes: usize,
@@ -118,7 +118,7 @@ pub(crate) struct Driven {
     free_steady: Vec<DVector<Complex64>>,
 }
 
-impl Driven {
+impl ForcedResponse {
     /// Returns its memory, bytes.
     pub fn bytes(&self) -> usize {
         let steady = self.steady.iter().chain(&self.free_steady).map(|x| x.len()).sum::<usize>();
@@ -281,9 +281,9 @@ impl Pattern {
     }
 
     /// Computes the steady response and the basis at one excitation frequency.
-    pub fn drive(&self, mechanics: &Mechanics, drive: &Drive) -> Driven {
+    pub fn drive(&self, mechanics: &Mechanics, drive: &HarmonicExcitation) -> ForcedResponse {
         let n = mechanics.n;
-        let mut driven = Driven { modes: self.lambda.len(), ..Driven::default() };
+        let mut driven = ForcedResponse { modes: self.lambda.len(), ..ForcedResponse::default() };
         driven.basis.drifts = self.drifts();
         driven.basis.exponents = self.lambda.clone();
         driven.basis.exponents.extend(drive.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
@@ -333,9 +333,9 @@ impl Pattern {
     pub fn displacement(
         &self,
         mechanics: &Mechanics,
-        drive: &Drive,
-        Beginning { driven, contacts, time, state }: Beginning<'_>,
-        work: &mut Work,
+        drive: &HarmonicExcitation,
+        SegmentStart { driven, contacts, time, state }: SegmentStart<'_>,
+        work: &mut PatternScratch,
         out: &mut [Complex64],
     ) {
         let (n, nb, count) = (mechanics.n, driven.basis.len(), self.lambda.len());
@@ -349,8 +349,8 @@ impl Pattern {
         work.held.extend(self.held.iter().map(|&s| drive.imposed_at(s, time, 0)));
         for (i, part) in mechanics.parts.iter().enumerate() {
             let value = match (contacts[i], part.kind) {
-                (Contact::Stick, Kind::Rigid { .. }) => continue,
-                (Contact::Stick, Kind::Elastic { stiffness, .. }) => stiffness * drive.imposed_at(i, time, 0),
+                (Contact::Stick, PartKind::Rigid { .. }) => continue,
+                (Contact::Stick, PartKind::Elastic { stiffness, .. }) => stiffness * drive.imposed_at(i, time, 0),
                 (contact, _) => -part.constant_force(contact),
             };
             for row in 0..n {
@@ -417,10 +417,10 @@ impl Pattern {
     fn add_polynomials(
         &self,
         mechanics: &Mechanics,
-        drive: &Drive,
-        driven: &Driven,
+        drive: &HarmonicExcitation,
+        driven: &ForcedResponse,
         state: &[f64],
-        work: &mut Work,
+        work: &mut PatternScratch,
         out: &mut [Complex64],
     ) {
         if !self.drifts() {
@@ -463,7 +463,7 @@ impl Pattern {
         length: f64,
         values: &[Complex64],
         sensitivity: &mut DMatrix<f64>,
-        work: &mut Work,
+        work: &mut PatternScratch,
     ) {
         let (n, count, states) = (mechanics.n, self.lambda.len(), mechanics.states());
         if states == 0 {
@@ -487,7 +487,7 @@ impl Pattern {
             let (motion, springs) = column.split_at_mut(2 * n);
             self.moved_by(j, length, &work.moved, motion);
             for (part, stuck) in mechanics.parts.iter().zip(&self.stuck) {
-                if let Kind::Elastic { stiffness: kt, state, .. } = part.kind {
+                if let PartKind::Elastic { stiffness: kt, state, .. } = part.kind {
                     springs[state] = if *stuck {
                         let moved: f64 = part.direction.iter().zip(&*motion).map(|(w, x)| w * x).sum();
                         let before = if j < n { part.direction[j] } else { 0.0 };
@@ -551,7 +551,13 @@ impl Pattern {
     /// The stuck springs of one joint exert one total force and have one elongation. Therefore
     /// the motion depends on them through one number, and they depend on the motion through
     /// another.
-    fn carry_by_joints(&self, mechanics: &Mechanics, length: f64, sensitivity: &mut DMatrix<f64>, work: &mut Work) {
+    fn carry_by_joints(
+        &self,
+        mechanics: &Mechanics,
+        length: f64,
+        sensitivity: &mut DMatrix<f64>,
+        work: &mut PatternScratch,
+    ) {
         let (n, states) = (mechanics.n, mechanics.states());
         // the states of one joint's springs are adjacent; slipping springs have zero stiffness,
         // and their states are dropped
@@ -559,10 +565,10 @@ impl Pattern {
         work.stiffness.clear();
         work.kept.clear();
         for (i, part) in mechanics.parts.iter().enumerate() {
-            let Kind::Elastic { stiffness, state, .. } = part.kind else { continue };
+            let PartKind::Elastic { stiffness, state, .. } = part.kind else { continue };
             match work.springs.last_mut() {
                 Some(springs) if mechanics.parts[springs.part].joint == part.joint => springs.states.end = state + 1,
-                _ => work.springs.push(Springs { part: i, states: state..state + 1, sticking: None }),
+                _ => work.springs.push(JointSprings { part: i, states: state..state + 1, sticking: None }),
             }
             if let (true, Some(springs)) = (self.stuck[i], work.springs.last_mut()) {
                 springs.sticking.get_or_insert(state);
@@ -585,7 +591,7 @@ impl Pattern {
             let (motion, pushes) = row.split_at_mut(2 * n);
             let (from, springs) = from.split_at(2 * n);
             motion.copy_from_slice(from);
-            for (push, Springs { states, .. }) in pushes.iter_mut().zip(&work.springs) {
+            for (push, JointSprings { states, .. }) in pushes.iter_mut().zip(&work.springs) {
                 *push = sum_of_products(&work.kept[states.clone()], &springs[states.clone()]);
             }
         }
@@ -594,7 +600,7 @@ impl Pattern {
         for (c, column) in sensitivity.as_mut_slice().chunks_exact_mut(states).enumerate() {
             let moved = &work.product[c * 2 * n..(c + 1) * 2 * n];
             let (motion, springs) = column.split_at_mut(2 * n);
-            for Springs { part, states, .. } in &work.springs {
+            for JointSprings { part, states, .. } in &work.springs {
                 let part = &mechanics.parts[*part];
                 let stretch = part.along(&moved[..n]) - part.along(&motion[..n]);
                 let of_joint = work.stiffness[states.clone()].iter().zip(&work.kept[states.clone()]);
@@ -643,7 +649,7 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
 
 /// Scratch memory of the pattern's formulas.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Work {
+pub(crate) struct PatternScratch {
     force: Vec<f64>,
     held: Vec<f64>,
     shift: Vec<f64>,
@@ -661,7 +667,7 @@ pub(crate) struct Work {
     /// Data of [`Pattern::carry_by_joints`]: the springs of each joint, their stiffness,
     /// whether they stick (1 or 0), and the rows of motion and total spring force in the
     /// sensitivity.
-    springs: Vec<Springs>,
+    springs: Vec<JointSprings>,
     stiffness: Vec<f64>,
     kept: Vec<f64>,
     rows: Vec<f64>,
@@ -669,7 +675,7 @@ pub(crate) struct Work {
 
 /// The springs in series with the sliders of one joint.
 #[derive(Debug, Clone)]
-struct Springs {
+struct JointSprings {
     /// Index of the first part.
     part: usize,
     /// Indices of their forces among those of all springs.
@@ -678,11 +684,11 @@ struct Springs {
     sticking: Option<usize>,
 }
 
-impl Work {
+impl PatternScratch {
     pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
         let n = mechanics.n;
         let small = if mechanics.states() < LARGE { mechanics.states() } else { 0 };
-        Work {
+        PatternScratch {
             force: vec![0.0; n],
             held: Vec::with_capacity(mechanics.parts.len()),
             shift: vec![0.0; n],
@@ -776,13 +782,13 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = Drive::new(&system, &mechanics.owners(), OMEGA);
+        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), OMEGA);
         let pattern = Pattern::new(&mechanics, &[contact == Contact::Stick]).unwrap();
         let driven = pattern.drive(&mechanics, &drive);
-        let mut work = Work::new(&mechanics, drive.rates.len());
+        let mut work = PatternScratch::new(&mechanics, drive.rates.len());
         let mut signal = vec![ZERO; driven.basis.len()];
         let mut speed = signal.clone();
-        let beginning = Beginning { driven: &driven, contacts: &[contact], time: TIME, state };
+        let beginning = SegmentStart { driven: &driven, contacts: &[contact], time: TIME, state };
         pattern.displacement(&mechanics, &drive, beginning, &mut work, &mut signal);
         driven.basis.differentiate(&signal, &mut speed);
         let mut values = signal.clone();

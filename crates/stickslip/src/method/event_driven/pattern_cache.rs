@@ -6,9 +6,9 @@
 //! the same bits, so that the cache affects computing time only.
 
 use super::mechanics::Mechanics;
-use super::pattern::{Driven, Pattern};
+use super::pattern::{ForcedResponse, Pattern};
 use crate::law::Contact;
-use crate::method::flow::excitation::Drive;
+use crate::method::flow::excitation::HarmonicExcitation;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::quadratic_modes::DefectiveModes;
@@ -17,18 +17,18 @@ use stickslip_numerics::quadratic_modes::DefectiveModes;
 /// ring of 48 blades uses one to two hundred patterns of a quarter of a megabyte.
 const LIMIT: usize = 64 << 20;
 
-struct Slot {
+struct CachedPattern {
     pattern: Arc<Pattern>,
     /// Response to the present excitation, computed at the first use of the pattern under it.
-    driven: Option<Arc<Driven>>,
+    driven: Option<Arc<ForcedResponse>>,
     /// Time of the last use, as a counter of all uses.
     used: u64,
     bytes: usize,
 }
 
 /// Patterns by their stuck parts.
-pub(super) struct Memory {
-    slots: BTreeMap<Vec<bool>, Slot>,
+pub(super) struct PatternCache {
+    slots: BTreeMap<Vec<bool>, CachedPattern>,
     bytes: usize,
     limit: usize,
     uses: u64,
@@ -36,24 +36,24 @@ pub(super) struct Memory {
     stuck: Vec<bool>,
 }
 
-impl Default for Memory {
+impl Default for PatternCache {
     fn default() -> Self {
-        Memory { slots: BTreeMap::new(), bytes: 0, limit: LIMIT, uses: 0, stuck: Vec::new() }
+        PatternCache { slots: BTreeMap::new(), bytes: 0, limit: LIMIT, uses: 0, stuck: Vec::new() }
     }
 }
 
-impl Memory {
+impl PatternCache {
     /// Returns the pattern of these contacts, with its response to the excitation.
     pub fn pattern(
         &mut self,
         mechanics: &Mechanics,
-        drive: &Drive,
+        drive: &HarmonicExcitation,
         contacts: &[Contact],
-    ) -> Result<(Arc<Pattern>, Arc<Driven>), DefectiveModes> {
+    ) -> Result<(Arc<Pattern>, Arc<ForcedResponse>), DefectiveModes> {
         self.stuck.clear();
         self.stuck.extend(contacts.iter().map(|contact| *contact == Contact::Stick));
         self.uses += 1;
-        if let Some(Slot { pattern, driven: Some(driven), used, .. }) = self.slots.get_mut(&self.stuck) {
+        if let Some(CachedPattern { pattern, driven: Some(driven), used, .. }) = self.slots.get_mut(&self.stuck) {
             *used = self.uses;
             return Ok((pattern.clone(), driven.clone()));
         }
@@ -71,7 +71,7 @@ impl Memory {
             self.forget(self.limit / 2);
         }
         self.bytes += bytes;
-        let slot = Slot { pattern: pattern.clone(), driven: Some(driven.clone()), used: self.uses, bytes };
+        let slot = CachedPattern { pattern: pattern.clone(), driven: Some(driven.clone()), used: self.uses, bytes };
         self.slots.insert(stuck, slot);
         Ok((pattern, driven))
     }
@@ -105,7 +105,7 @@ mod tests {
     use std::sync::Arc;
 
     /// A chain of masses, each with its slider.
-    fn chain(n: usize) -> (Mechanics, Drive) {
+    fn chain(n: usize) -> (Mechanics, HarmonicExcitation) {
         let name = |i: usize| format!("m{i}");
         let before = |i: usize| if i == 0 { GROUND.to_owned() } else { name(i - 1) };
         let model = Model {
@@ -125,7 +125,7 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = Drive::new(&system, &mechanics.owners(), 3.0);
+        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), 3.0);
         (mechanics, drive)
     }
 
@@ -140,7 +140,7 @@ mod tests {
     fn memory_stays_below_its_limit() {
         let n = 8;
         let (mechanics, drive) = chain(n);
-        let mut memory = Memory::default();
+        let mut memory = PatternCache::default();
         let (first, _) = memory.pattern(&mechanics, &drive, &contacts(n, 0)).unwrap();
         let one = memory.bytes;
         assert!(one > 16 * n * n && one < 16 * 40 * n * n, "{one} bytes for a pattern of {n} places");
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn directions_share_a_pattern() {
         let (mechanics, drive) = chain(3);
-        let mut memory = Memory::default();
+        let mut memory = PatternCache::default();
         let (forward, driven) = memory.pattern(&mechanics, &drive, &[Contact::SlipForward; 3]).unwrap();
         let (backward, _) = memory.pattern(&mechanics, &drive, &[Contact::SlipBackward; 3]).unwrap();
         assert!(Arc::ptr_eq(&forward, &backward));

@@ -1,11 +1,11 @@
 //! Results of an orbit from its closed-form segments.
 
-use super::mechanics::{Part, Share};
+use super::mechanics::{JointPart, PartShare};
 use super::segments::{Segment, SegmentedMotion};
 use super::tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
 use crate::law::Contact;
 use crate::method::IntegrationError;
-use crate::method::orbit_search::return_map::{Closed, norm};
+use crate::method::orbit_search::return_map::{ClosedState, norm};
 use crate::method::orbit_search::vibration_share;
 use crate::model::{Axis, System};
 use crate::orbit::postprocess::{CONSERVATIVE_WORK, ContactFractions, ContactSummary, PathSignals, results};
@@ -27,11 +27,11 @@ const STORED: f64 = CLOSED / ENERGY_GAP;
 #[derive(Debug, Clone)]
 pub(crate) struct ExactPath {
     system: Arc<System>,
-    pieces: Vec<Piece>,
+    pieces: Vec<PathSegment>,
     /// Ideal parts of the joints.
-    parts: Arc<[Part]>,
+    parts: Arc<[JointPart]>,
     /// Shares of the joints in these parts.
-    shares: Arc<[Share]>,
+    shares: Arc<[PartShare]>,
     symmetry: Symmetry,
     period: f64,
     rates: Vec<f64>,
@@ -39,7 +39,7 @@ pub(crate) struct ExactPath {
 }
 
 #[derive(Debug, Clone)]
-struct Piece {
+struct PathSegment {
     segment: Segment,
     velocity: Vec<Complex64>,
 }
@@ -52,11 +52,11 @@ pub(super) fn orbit(
     flow: &SegmentedMotion,
     (omega, periods): (f64, usize),
     symmetry: Symmetry,
-    (closed, weights): (Closed, &[f64]),
+    (closed, weights): (ClosedState, &[f64]),
 ) -> Result<Orbit, IntegrationError> {
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
-    let measured = results(system, &Measuring::new(&path), omega, (symmetry, period))?;
+    let measured = results(system, &ExactMeasurement::new(&path), omega, (symmetry, period))?;
     let rest = NEAR_REST * flow.energy_scale;
     let share = vibration_share::share(&path, (symmetry, period), &closed.state, (weights, rest));
     let stored = share * norm(weights, &closed.state).powi(2);
@@ -102,7 +102,7 @@ impl ExactPath {
             .iter()
             .map(|segment| {
                 let basis = segment.basis();
-                Piece { velocity: derivative(basis, &segment.displacement), segment: segment.clone() }
+                PathSegment { velocity: derivative(basis, &segment.displacement), segment: segment.clone() }
             })
             .collect();
         let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
@@ -111,7 +111,7 @@ impl ExactPath {
     }
 
     /// Iterates over the shares of a joint in the parts.
-    fn of_joint(&self, joint: usize) -> impl Iterator<Item = &Share> {
+    fn of_joint(&self, joint: usize) -> impl Iterator<Item = &PartShare> {
         self.shares.iter().filter(move |share| share.joint == joint)
     }
 
@@ -119,7 +119,7 @@ impl ExactPath {
     /// one sticks, else touch if a stop touches, else open. Returns `None` for a joint without
     /// force.
     fn contact_of(&self, joint: usize, segment: &Segment) -> Option<Contact> {
-        let of_part = |share: &Share| match segment.contacts[share.part] {
+        let of_part = |share: &PartShare| match segment.contacts[share.part] {
             Contact::Stick if !self.parts[share.part].is_slider() => Contact::Touch,
             contact => share.contact(contact),
         };
@@ -133,14 +133,14 @@ impl ExactPath {
     }
 
     /// Adds `Re Σ G_h e^{jhΩt}` to a signal of the piece.
-    fn add_imposed(&self, piece: &Piece, imposed: &[(u32, Complex64)], signal: &mut [Complex64]) {
+    fn add_imposed(&self, piece: &PathSegment, imposed: &[(u32, Complex64)], signal: &mut [Complex64]) {
         for &(harmonic, amplitude) in imposed {
             self.add_harmonic(piece, (f64::from(harmonic) * self.omega, amplitude), signal);
         }
     }
 
     /// Adds `Re a e^{jωt}` of (ω, a) to a signal of the piece.
-    fn add_harmonic(&self, piece: &Piece, (rate, amplitude): (f64, Complex64), signal: &mut [Complex64]) {
+    fn add_harmonic(&self, piece: &PathSegment, (rate, amplitude): (f64, Complex64), signal: &mut [Complex64]) {
         if rate == 0.0 {
             signal[piece.basis().constant()].re += amplitude.re;
             return;
@@ -152,7 +152,7 @@ impl ExactPath {
     }
 
     /// Adds the relative displacement along an axis to a signal of the piece.
-    fn add_relative(&self, piece: &Piece, axis: &Axis, signal: &mut [Complex64]) {
+    fn add_relative(&self, piece: &PathSegment, axis: &Axis, signal: &mut [Complex64]) {
         let nb = piece.basis().len();
         for &(row, w) in axis.rows() {
             let x = &piece.segment.displacement[row * nb..(row + 1) * nb];
@@ -162,7 +162,7 @@ impl ExactPath {
     }
 
     /// Returns displacement and velocity of a moved place as signals.
-    fn moved_motion(&self, piece: &Piece, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
+    fn moved_motion(&self, piece: &PathSegment, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
         let mut motion = vec![ZERO; piece.basis().len()];
         self.add_imposed(piece, &self.system.moved_places()[m].motion, &mut motion);
         let mut speed = motion.clone();
@@ -171,7 +171,7 @@ impl ExactPath {
     }
 
     /// Returns the force that moves a place, as a signal.
-    fn reaction(&self, piece: &Piece, m: usize) -> Vec<Complex64> {
+    fn reaction(&self, piece: &PathSegment, m: usize) -> Vec<Complex64> {
         let (n, nb, place) = (self.system.dofs(), piece.basis().len(), &self.system.moved_places()[m]);
         let mut force = vec![ZERO; nb];
         let add = |force: &mut [Complex64], signal: &[Complex64], factor: f64| {
@@ -211,7 +211,7 @@ impl ExactPath {
     }
 
     /// Returns the piece at a time within the first return, and the time since its start.
-    fn piece(&self, time: f64) -> (&Piece, f64) {
+    fn piece(&self, time: f64) -> (&PathSegment, f64) {
         let index = self.pieces.partition_point(|piece| piece.segment.start <= time).max(1) - 1;
         let piece = &self.pieces[index];
         (piece, (time - piece.segment.start).clamp(0.0, piece.segment.length))
@@ -219,7 +219,7 @@ impl ExactPath {
 }
 
 /// A path during measurement, with the shared data of all integrals.
-struct Measuring<'a> {
+struct ExactMeasurement<'a> {
     path: &'a ExactPath,
     axes: Vec<&'a Axis>,
     /// First index of each piece's coefficients in a signal, and the total length.
@@ -227,21 +227,21 @@ struct Measuring<'a> {
     products: Vec<ProductIntegrals>,
     /// Entries by frequency, rad/s: the phase factor at the start of each piece, and the
     /// integrals over it.
-    fourier: RefCell<Vec<(f64, Turning)>>,
+    fourier: RefCell<Vec<(f64, PhaseIntegrals)>>,
     memory: RefCell<RangeScratch>,
 }
 
-type Turning = Vec<(Complex64, FourierIntegrals)>;
+type PhaseIntegrals = Vec<(Complex64, FourierIntegrals)>;
 
-impl<'a> Measuring<'a> {
+impl<'a> ExactMeasurement<'a> {
     fn new(path: &'a ExactPath) -> Self {
         let mut cuts = vec![0];
         for piece in &path.pieces {
             cuts.push(cuts[cuts.len() - 1] + piece.basis().len());
         }
         let products =
-            |piece: &Piece| ProductIntegrals::new(piece.basis(), &piece.segment.at_end, piece.segment.length);
-        Measuring {
+            |piece: &PathSegment| ProductIntegrals::new(piece.basis(), &piece.segment.at_end, piece.segment.length);
+        ExactMeasurement {
             path,
             axes: path.system.axes().map(|(_, axis)| axis).collect(),
             cuts,
@@ -251,8 +251,8 @@ impl<'a> Measuring<'a> {
         }
     }
 
-    fn turning(&self, omega: f64) -> Turning {
-        let of = |piece: &Piece| {
+    fn turning(&self, omega: f64) -> PhaseIntegrals {
+        let of = |piece: &PathSegment| {
             let turn = Complex64::new(0.0, -omega * piece.segment.start).exp();
             (turn, FourierIntegrals::new(piece.basis(), &piece.segment.at_end, omega, piece.segment.length))
         };
@@ -260,19 +260,19 @@ impl<'a> Measuring<'a> {
     }
 
     /// Iterates over the pieces, with the range of their coefficients in a signal.
-    fn pieces(&self) -> impl Iterator<Item = (&'a Piece, std::ops::Range<usize>)> {
+    fn pieces(&self) -> impl Iterator<Item = (&'a PathSegment, std::ops::Range<usize>)> {
         self.path.pieces.iter().zip(self.cuts.windows(2)).map(|(piece, cut)| (piece, cut[0]..cut[1]))
     }
 
     /// Builds a signal piece by piece.
-    fn made(&self, mut make: impl FnMut(&Piece, &mut [Complex64])) -> Vec<Complex64> {
+    fn made(&self, mut make: impl FnMut(&PathSegment, &mut [Complex64])) -> Vec<Complex64> {
         let mut signal = vec![ZERO; self.cuts[self.cuts.len() - 1]];
         self.pieces().for_each(|(piece, range)| make(piece, &mut signal[range]));
         signal
     }
 
     /// Copies a row of coefficients from the pieces.
-    fn kept(&self, row: usize, of: impl Fn(&Piece) -> &[Complex64]) -> Vec<Complex64> {
+    fn kept(&self, row: usize, of: impl Fn(&PathSegment) -> &[Complex64]) -> Vec<Complex64> {
         self.made(|piece, out| out.copy_from_slice(&of(piece)[row * out.len()..(row + 1) * out.len()]))
     }
 
@@ -308,7 +308,7 @@ impl<'a> Measuring<'a> {
 
 /// A signal is the list of its coefficients, piece by piece. Each law acts along one axis, so
 /// that axes and joints have the same indices.
-impl PathSignals for Measuring<'_> {
+impl PathSignals for ExactMeasurement<'_> {
     type Signal = Vec<Complex64>;
     type Error = IntegrationError;
 
@@ -338,7 +338,7 @@ impl PathSignals for Measuring<'_> {
         to.iter_mut().zip(signal).for_each(|(to, value)| *to += value * factor);
     }
     fn product(&self, a: &Vec<Complex64>, b: &Vec<Complex64>) -> f64 {
-        let integral = |((piece, range), products): ((&Piece, std::ops::Range<usize>), &ProductIntegrals)| {
+        let integral = |((piece, range), products): ((&PathSegment, std::ops::Range<usize>), &ProductIntegrals)| {
             products.integral(piece.basis(), &a[range.clone()], &b[range])
         };
         self.pieces().zip(&self.products).map(integral).sum()
@@ -386,7 +386,7 @@ impl PathSignals for Measuring<'_> {
                 sticks_throughout: false,
             };
         }
-        let contact = |piece: &Piece| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
+        let contact = |piece: &PathSegment| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
         let shares = ContactFractions::of(path.pieces.iter().map(|piece| (contact(piece), piece.segment.length)));
         let slips = |segment: &Segment| path.of_joint(joint).any(|share| segment.contacts[share.part].slips());
         let pairs = path.pieces.windows(2).map(|pair| (&pair[0].segment.contacts, &pair[1].segment.contacts));
@@ -410,7 +410,7 @@ fn derivative(basis: &ExponentialBasis, signals: &[Complex64]) -> Vec<Complex64>
     out
 }
 
-impl Piece {
+impl PathSegment {
     fn basis(&self) -> &ExponentialBasis {
         self.segment.basis()
     }
@@ -449,7 +449,7 @@ impl Path for ExactPath {
                     Some(contact) => contact,
                 };
                 let joint_displacement = along(&displacement) + sign * real_dot(&imposed, &values);
-                let of_share = |s: &Share| s.of(piece.segment.contacts[s.part]) * row(&piece.segment.force, s.part);
+                let of_share = |s: &PartShare| s.of(piece.segment.contacts[s.part]) * row(&piece.segment.force, s.part);
                 let force = self.of_joint(j).map(of_share).sum();
                 JointSample::one_dimensional(joint_displacement, joint_velocity, force, contact)
             })

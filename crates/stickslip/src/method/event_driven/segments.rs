@@ -1,14 +1,14 @@
 //! The motion over a time interval: closed-form segments joined at the switches, with exact
 //! sensitivity.
 
-use super::mechanics::{Kind, Mechanics, Part, REST};
-use super::pattern::{Beginning, Driven, Pattern, Work};
-use super::pattern_cache::Memory;
+use super::mechanics::{JointPart, Mechanics, PartKind, REST};
+use super::pattern::{ForcedResponse, Pattern, PatternScratch, SegmentStart};
+use super::pattern_cache::PatternCache;
 use super::tolerances::NEAR_REST;
-use super::transition::{AT_LIMIT, Decision};
+use super::transition::{AT_LIMIT, Transition};
 use crate::law::Contact;
 use crate::method::IntegrationError;
-use crate::method::flow::excitation::Drive;
+use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ pub(crate) struct Segment {
     /// Contact states.
     pub contacts: Vec<Contact>,
     /// Response of its pattern to the excitation, with the basis of its signals.
-    pub driven: Arc<Driven>,
+    pub driven: Arc<ForcedResponse>,
     /// Coefficients of the displacements, n × basis, row by row.
     pub displacement: Vec<Complex64>,
     /// Forces of the parts of joints, parts × basis, row by row.
@@ -66,19 +66,19 @@ impl Segment {
 /// Computes the motion; stores patterns, scratch memory and the segments of the last run.
 pub(crate) struct SegmentedMotion {
     pub mechanics: Mechanics,
-    pub drive: Drive,
+    pub drive: HarmonicExcitation,
     /// Square root of an energy that the loads can cause, √J.
     pub energy_scale: f64,
     /// A velocity well below those of the moving structure, m/s: the velocity scale near rest.
     moving: f64,
-    memory: Memory,
+    memory: PatternCache,
     segments: Vec<Segment>,
     /// Number of segments of the last run.
     used: usize,
     /// Number of switches of the last run.
     switches: usize,
-    decision: Decision,
-    work: Work,
+    decision: Transition,
+    work: PatternScratch,
     scratch: ZeroScratch,
     values: Vec<Complex64>,
     velocity: Vec<Complex64>,
@@ -102,15 +102,15 @@ pub(crate) struct SegmentedMotion {
 const PRELOADED: f64 = 10.0;
 
 impl SegmentedMotion {
-    pub fn new(mechanics: Mechanics, drive: Drive) -> Self {
-        let (work, decision) = (Work::new(&mechanics, drive.rates.len()), Decision::new(&mechanics));
+    pub fn new(mechanics: Mechanics, drive: HarmonicExcitation) -> Self {
+        let (work, decision) = (PatternScratch::new(&mechanics, drive.rates.len()), Transition::new(&mechanics));
         let states = mechanics.states();
         SegmentedMotion {
             mechanics,
             drive,
             energy_scale: 0.0,
             moving: 0.0,
-            memory: Memory::default(),
+            memory: PatternCache::default(),
             segments: Vec::new(),
             used: 0,
             switches: 0,
@@ -152,7 +152,7 @@ impl SegmentedMotion {
         let n = self.mechanics.n;
         self.from.resize(2 * n, 0.0);
         for part in self.mechanics.parts.iter() {
-            if let Kind::Elastic { limit, state: s, .. } = part.kind {
+            if let PartKind::Elastic { limit, state: s, .. } = part.kind {
                 state[2 * n + s] = state[2 * n + s].clamp(-limit, limit);
             }
         }
@@ -228,14 +228,14 @@ impl SegmentedMotion {
     }
 
     /// Changes the excitation; patterns stay.
-    pub fn set_drive(&mut self, drive: Drive) {
+    pub fn set_drive(&mut self, drive: HarmonicExcitation) {
         self.work.set_harmonics(drive.rates.len());
         let mechanics = &self.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
-            Kind::Rigid { .. } => None,
-            Kind::Elastic { stiffness, limit, .. } => Some(limit / stiffness.sqrt()),
+            PartKind::Rigid { .. } => None,
+            PartKind::Elastic { stiffness, limit, .. } => Some(limit / stiffness.sqrt()),
             // its force in the initial position
-            Kind::Stop { stiffness, gap } => Some((-gap).max(0.0) * stiffness.sqrt()),
+            PartKind::Stop { stiffness, gap } => Some((-gap).max(0.0) * stiffness.sqrt()),
         });
         let loads = drive.energy_scale(&mechanics.mass, &mechanics.stiffness);
         // a limit that the loads never reach does not affect the motion
@@ -247,7 +247,7 @@ impl SegmentedMotion {
         self.memory.change_drive();
     }
 
-    fn start_segment(&mut self, time: f64, shape: &Pattern, driven: Arc<Driven>, state: &[f64]) {
+    fn start_segment(&mut self, time: f64, shape: &Pattern, driven: Arc<ForcedResponse>, state: &[f64]) {
         if self.segments.len() == self.used {
             self.segments.push(Segment::default());
         }
@@ -258,7 +258,7 @@ impl SegmentedMotion {
         let driven = &segment.driven;
         segment.displacement.resize(n * nb, ZERO);
         segment.force.resize(parts * nb, ZERO);
-        let beginning = Beginning { driven, contacts: &segment.contacts, time, state };
+        let beginning = SegmentStart { driven, contacts: &segment.contacts, time, state };
         shape.displacement(&self.mechanics, &self.drive, beginning, &mut self.work, &mut segment.displacement);
         self.velocity.resize(n * nb, ZERO);
         self.acceleration.resize(n * nb, ZERO);
@@ -280,12 +280,14 @@ impl SegmentedMotion {
         for (i, part) in self.mechanics.parts.iter().enumerate() {
             let row = &mut force[i * nb..(i + 1) * nb];
             let (kt, begins) = match (contacts[i], part.kind) {
-                (Contact::Stick, Kind::Rigid { .. }) => continue,
-                (Contact::Stick, Kind::Elastic { stiffness, state: s, .. }) => {
+                (Contact::Stick, PartKind::Rigid { .. }) => continue,
+                (Contact::Stick, PartKind::Elastic { stiffness, state: s, .. }) => {
                     let stretch = part.along(&state[..n]) + self.drive.imposed_at(i, time, 0);
                     (stiffness, state[2 * n + s] - stiffness * stretch)
                 }
-                (contact @ Contact::Stick, Kind::Stop { stiffness, .. }) => (stiffness, part.constant_force(contact)),
+                (contact @ Contact::Stick, PartKind::Stop { stiffness, .. }) => {
+                    (stiffness, part.constant_force(contact))
+                }
                 (contact, _) => (0.0, part.constant_force(contact)),
             };
             row[constant].re = begins;
@@ -373,7 +375,7 @@ impl SegmentedMotion {
             let signal = &mut self.signals[at..];
             // signal, sign, order of the derivative, and tolerance for zero
             let (motion, sign, order, zero) = match part.kind {
-                Kind::Stop { gap, .. } => {
+                PartKind::Stop { gap, .. } => {
                     let sign = if contact == Contact::Stick { 1.0 } else { -1.0 };
                     signal[constant].re = -sign * gap;
                     (&segment.displacement, sign, 0, self.mechanics.touch(part, self.drive.omega, velocity_scale))
@@ -428,7 +430,7 @@ impl SegmentedMotion {
     /// Sets a spring force that reached its limit exactly to the limit.
     fn snap(&self, part: usize, state: &mut [f64]) {
         let old = self.segments[self.used - 1].contacts[part];
-        if let (Kind::Elastic { limit, state: s, .. }, Contact::Stick) = (self.mechanics.parts[part].kind, old) {
+        if let (PartKind::Elastic { limit, state: s, .. }, Contact::Stick) = (self.mechanics.parts[part].kind, old) {
             let force = &mut state[2 * self.mechanics.n + s];
             *force = limit.copysign(*force);
         }
@@ -450,7 +452,7 @@ impl SegmentedMotion {
             (self.before[row], self.after[row]) = (0.0, 0.0);
         }
         for (i, other) in self.mechanics.parts.iter().enumerate() {
-            if let Kind::Elastic { stiffness: kt, state: s, .. } = other.kind {
+            if let PartKind::Elastic { stiffness: kt, state: s, .. } = other.kind {
                 let velocity = other.along(&state[n..2 * n]) + self.drive.imposed_at(i, time, 1);
                 let rate = |contact: Contact| if contact == Contact::Stick { kt * velocity } else { 0.0 };
                 self.before[2 * n + s] = rate(contacts[i]);
@@ -460,14 +462,14 @@ impl SegmentedMotion {
         self.row.fill(0.0);
         let slope = match (contacts[part], body.kind) {
             // the force of a stop is continuous
-            (_, Kind::Stop { .. }) => return,
-            (Contact::Stick, Kind::Elastic { state: s, .. }) => {
+            (_, PartKind::Stop { .. }) => return,
+            (Contact::Stick, PartKind::Elastic { state: s, .. }) => {
                 self.row[2 * n + s] = 1.0;
                 self.before[2 * n + s]
             }
             // a rigid slider begins to slip with continuous forces, so that there is no jump
-            (Contact::Stick, Kind::Rigid { .. }) if !body.drops() => return,
-            (Contact::Stick, Kind::Rigid { .. }) => {
+            (Contact::Stick, PartKind::Rigid { .. }) if !body.drops() => return,
+            (Contact::Stick, PartKind::Rigid { .. }) => {
                 let Some(held) = shape.held.iter().position(|&h| h == part) else { return };
                 // the stick force: λ = multiplier (F - C v - K x - other parts) + …
                 for k in 0..n {
@@ -477,8 +479,10 @@ impl SegmentedMotion {
                 for (i, other) in self.mechanics.parts.iter().enumerate() {
                     let factor = -shape.held_by_parts[(held, i)];
                     match other.kind {
-                        Kind::Elastic { state: s, .. } if contacts[i] == Contact::Stick => self.row[2 * n + s] = factor,
-                        Kind::Stop { stiffness, .. } if contacts[i] == Contact::Stick => {
+                        PartKind::Elastic { state: s, .. } if contacts[i] == Contact::Stick => {
+                            self.row[2 * n + s] = factor
+                        }
+                        PartKind::Stop { stiffness, .. } if contacts[i] == Contact::Stick => {
                             self.row.rows_mut(0, n).axpy(factor * stiffness, &other.direction, 1.0);
                         }
                         _ => {}
@@ -514,7 +518,7 @@ impl SegmentedMotion {
 ///
 /// The parts of one joint share its displacement. Of the stuck ones, only the part that reaches
 /// its limit first is monitored; of the slipping ones, only one.
-fn nearest(parts: &[Part], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
+fn nearest(parts: &[JointPart], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
     out.clear();
     out.resize(parts.len(), [true; 2]);
     let mut first = 0;
@@ -527,7 +531,7 @@ fn nearest(parts: &[Part], contacts: &[Contact], springs: &[f64], out: &mut Vec<
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             let (mut room, mut sticking, mut slipping) = (f64::INFINITY, None, None);
             for i in range.clone() {
-                let Kind::Elastic { stiffness, limit, state } = parts[i].kind else { continue };
+                let PartKind::Elastic { stiffness, limit, state } = parts[i].kind else { continue };
                 out[i][side] = false;
                 let left = (limit - sign * springs[state]) / stiffness;
                 if contacts[i] == Contact::Stick && left < room {
@@ -592,8 +596,8 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = Drive::new(&system, &mechanics.owners(), 0.7);
-        let mut flow = SegmentedMotion::new(mechanics, Drive::default());
+        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), 0.7);
+        let mut flow = SegmentedMotion::new(mechanics, HarmonicExcitation::default());
         flow.set_drive(drive);
         flow
     }

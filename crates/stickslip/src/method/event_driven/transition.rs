@@ -19,9 +19,9 @@
 //!
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
-use super::mechanics::{Kind, Mechanics, Part, REST};
+use super::mechanics::{JointPart, Mechanics, PartKind, REST};
 use crate::law::Contact;
-use crate::method::flow::excitation::Drive;
+use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 
@@ -35,7 +35,7 @@ const LEVELS: u32 = 4;
 
 /// The contacts after a transition, with the accelerations.
 #[derive(Debug, Clone)]
-pub(crate) struct Decision {
+pub(crate) struct Transition {
     pub contacts: Vec<Contact>,
     /// Acceleration right after the instant, length n, m/s².
     pub acceleration: DVector<f64>,
@@ -53,21 +53,21 @@ pub(crate) struct Decision {
     dropped: Vec<usize>,
     /// Undecided sliders, with the sign of their force.
     undecided: Vec<(usize, f64)>,
-    problem: Problem,
+    problem: ContactProblem,
     /// x, v, a, jerk, …: each is the derivative of the previous one.
     derivatives: Vec<DVector<f64>>,
 }
 
 /// Magnitude of the terms of accelerations: the largest force on a mass (N), the imposed
 /// accelerations (m/s²), and their rates of change (rad/s) for each part.
-struct Terms<'a> {
+struct AccelerationScale<'a> {
     force: f64,
     imposed: f64,
     omega: f64,
     fastest: &'a [f64],
 }
 
-impl Terms<'_> {
+impl AccelerationScale<'_> {
     /// Returns the magnitude of the terms in the derivative of this order (2: acceleration) of
     /// the motion along a part. `response` contains the accelerations due to a unit force of
     /// the part.
@@ -79,7 +79,7 @@ impl Terms<'_> {
 
 /// The complementarity problem of the sliders at zero velocity, with its solution.
 #[derive(Debug, Clone, Default)]
-struct Problem {
+struct ContactProblem {
     /// `Wᵀ M⁻¹ W`
     delassus: DMatrix<f64>,
     push: DVector<f64>,
@@ -92,7 +92,7 @@ struct Problem {
     held: DVector<f64>,
 }
 
-impl Problem {
+impl ContactProblem {
     fn resize(&mut self, count: usize) {
         if self.push.len() != count {
             self.delassus = DMatrix::zeros(count, count);
@@ -116,7 +116,7 @@ impl Problem {
     }
 }
 
-impl Decision {
+impl Transition {
     pub fn new(mechanics: &Mechanics) -> Self {
         let count = mechanics.parts.len();
         let mut response = DMatrix::zeros(mechanics.n, count);
@@ -124,7 +124,7 @@ impl Decision {
             response.set_column(i, &(&mechanics.inverse_mass * &part.direction));
         }
         let delassus = DMatrix::from_fn(count, count, |a, b| mechanics.parts[a].direction.dot(&response.column(b)));
-        Decision {
+        Transition {
             response,
             delassus,
             contacts: vec![Contact::Stick; count],
@@ -135,7 +135,7 @@ impl Decision {
             resting: Vec::new(),
             dropped: Vec::new(),
             undecided: Vec::new(),
-            problem: Problem::default(),
+            problem: ContactProblem::default(),
             derivatives: vec![DVector::zeros(mechanics.n); LEVELS as usize + 3],
         }
     }
@@ -149,7 +149,7 @@ impl Decision {
     pub fn decide(
         &mut self,
         mechanics: &Mechanics,
-        drive: &Drive,
+        drive: &HarmonicExcitation,
         time: f64,
         state: &[f64],
         velocity_scale: f64,
@@ -163,12 +163,12 @@ impl Decision {
         for (i, part) in mechanics.parts.iter().enumerate() {
             let velocity = part.along(v) + drive.imposed_at(i, time, 1);
             self.contacts[i] = match part.kind {
-                Kind::Rigid { .. } if velocity.abs() > still => Contact::slip(velocity),
-                Kind::Rigid { .. } => {
+                PartKind::Rigid { .. } if velocity.abs() > still => Contact::slip(velocity),
+                PartKind::Rigid { .. } => {
                     self.resting.push(i);
                     Contact::Stick
                 }
-                Kind::Elastic { limit, state: s, .. } => {
+                PartKind::Elastic { limit, state: s, .. } => {
                     let force = state[2 * n + s];
                     if force.abs() < limit * (1.0 - AT_LIMIT) {
                         Contact::Stick
@@ -179,7 +179,7 @@ impl Decision {
                         Contact::Stick
                     }
                 }
-                Kind::Stop { gap, .. } => {
+                PartKind::Stop { gap, .. } => {
                     let depth = part.along(x) + drive.imposed_at(i, time, 0) - gap;
                     if depth.abs() > mechanics.touch(part, drive.omega, velocity_scale) {
                         closed(depth)
@@ -210,7 +210,7 @@ impl Decision {
     }
 
     /// Computes the accelerations without the forces of rigid sliders at zero velocity.
-    fn accelerate(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
+    fn accelerate(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) {
         let n = mechanics.n;
         let (x, v) = (&state[..n], &state[n..2 * n]);
         self.free.fill(0.0);
@@ -219,8 +219,8 @@ impl Decision {
         subtract_product(&mechanics.stiffness, x, &mut self.free);
         for (i, part) in mechanics.parts.iter().enumerate() {
             let force = match (part.kind, self.contacts[i]) {
-                (Kind::Elastic { state: s, .. }, _) => state[2 * n + s],
-                (Kind::Stop { stiffness, gap }, Contact::Stick) => {
+                (PartKind::Elastic { state: s, .. }, _) => state[2 * n + s],
+                (PartKind::Stop { stiffness, gap }, Contact::Stick) => {
                     stiffness * (part.along(x) + drive.imposed_at(i, time, 0) - gap)
                 }
                 (_, contact) => part.constant_force(contact),
@@ -235,7 +235,7 @@ impl Decision {
 
     /// Moves sliders whose force drops from `resting` to `dropped`, or returns one slider that
     /// is driven backwards. Returns whether anything changed.
-    fn let_go(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64) -> bool {
+    fn let_go(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64) -> bool {
         let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].drops();
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
@@ -270,7 +270,7 @@ impl Decision {
 
     /// Decides on rigid sliders at zero velocity: by accelerations first, then by higher
     /// derivatives for those at their limit.
-    fn settle_rigid(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) -> bool {
+    fn settle_rigid(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) -> bool {
         if self.at_rest.is_empty() {
             return true;
         }
@@ -306,14 +306,14 @@ impl Decision {
     }
 
     /// Returns the magnitude of the terms of accelerations, for all parts together.
-    fn terms<'a>(&self, mechanics: &'a Mechanics, drive: &Drive) -> Terms<'a> {
-        let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(Part::holds).fold(0.0, f64::max);
+    fn terms<'a>(&self, mechanics: &'a Mechanics, drive: &HarmonicExcitation) -> AccelerationScale<'a> {
+        let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(JointPart::holds).fold(0.0, f64::max);
         let imposed = drive
             .rates
             .iter()
             .zip(&drive.imposed)
             .map(|(rate, g)| rate * rate * g.iter().map(|g| g.norm()).fold(0.0, f64::max));
-        Terms {
+        AccelerationScale {
             force: self.pushed + limit,
             imposed: imposed.sum(),
             omega: drive.omega,
@@ -326,7 +326,14 @@ impl Decision {
     /// The unknown is their relative acceleration (`order` 2) or a higher derivative. It comes
     /// from the derivative with index `derivative`, or from the acceleration, plus the imposed
     /// motion.
-    fn pose(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, order: u32, derivative: Option<usize>) {
+    fn pose(
+        &mut self,
+        mechanics: &Mechanics,
+        drive: &HarmonicExcitation,
+        time: f64,
+        order: u32,
+        derivative: Option<usize>,
+    ) {
         let problem = &mut self.problem;
         problem.resize(self.at_rest.len());
         let motion = derivative.map_or(&self.acceleration, |at| &self.derivatives[at]);
@@ -347,7 +354,7 @@ impl Decision {
 
     /// Decides on sliders exactly at their limit with zero acceleration. `undecided` contains
     /// them with the sign of their force.
-    fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64]) {
+    fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) {
         self.begin_derivatives(mechanics.n, state);
         let terms = self.terms(mechanics, drive);
         for level in 1..LEVELS {
@@ -387,7 +394,7 @@ impl Decision {
 
     /// Computes the `level`-th derivative of all forces except those of rigid sliders at zero
     /// velocity, in `self.free`.
-    fn free_derivative(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, level: u32) {
+    fn free_derivative(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, level: u32) {
         let (l, derivatives) = (level as usize, &self.derivatives);
         self.free.fill(0.0);
         drive.add_force(time, level, &mut self.free);
@@ -403,7 +410,14 @@ impl Decision {
 
     /// Decides on sliders in series with springs at their limit and on stops at their gap, for
     /// zero relative velocity. The first nonzero derivative decides.
-    fn settle_springs(&mut self, mechanics: &Mechanics, drive: &Drive, time: f64, state: &[f64], velocity_scale: f64) {
+    fn settle_springs(
+        &mut self,
+        mechanics: &Mechanics,
+        drive: &HarmonicExcitation,
+        time: f64,
+        state: &[f64],
+        velocity_scale: f64,
+    ) {
         let n = mechanics.n;
         let still = REST * velocity_scale;
         let mut undecided: Vec<(usize, f64)> = (0..mechanics.parts.len())
@@ -411,12 +425,12 @@ impl Decision {
                 let part = &mechanics.parts[i];
                 let velocity = part.along(&state[n..2 * n]) + drive.imposed_at(i, time, 1);
                 let (at_border, sign) = match part.kind {
-                    Kind::Rigid { .. } => return None,
-                    Kind::Elastic { limit, state: s, .. } => {
+                    PartKind::Rigid { .. } => return None,
+                    PartKind::Elastic { limit, state: s, .. } => {
                         let force = state[2 * n + s];
                         (force.abs() >= limit * (1.0 - AT_LIMIT), force.signum())
                     }
-                    Kind::Stop { gap, .. } => {
+                    PartKind::Stop { gap, .. } => {
                         let depth = part.along(&state[..n]) + drive.imposed_at(i, time, 0) - gap;
                         (depth.abs() <= mechanics.touch(part, drive.omega, velocity_scale), 1.0)
                     }
@@ -507,8 +521,8 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = Drive::new(&system, &mechanics.owners(), 1.0);
-        let mut decision = Decision::new(&mechanics);
+        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), 1.0);
+        let mut decision = Transition::new(&mechanics);
         assert!(decision.decide(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));
         (decision.contacts.clone(), [decision.acceleration[0], decision.acceleration[1]])
     }

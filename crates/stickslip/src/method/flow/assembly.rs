@@ -1,7 +1,7 @@
 //! The system in the form that the time integrations use: full matrices, joint axes, and laws
 //! with the indices of their axes and states.
 
-use super::excitation::Drive;
+use super::excitation::HarmonicExcitation;
 use crate::law::SharedLaw;
 use crate::method::{IntegrationError, MethodError};
 use crate::model::{Axis, System};
@@ -22,7 +22,7 @@ pub(crate) struct Assembly {
     pub axes: Vec<Axis>,
     /// The axes as columns, n × axes.
     pub directions: DMatrix<f64>,
-    pub joints: Vec<PlacedLaw>,
+    pub joints: Vec<IndexedLaw>,
     /// Number of internal states of all laws.
     pub internal: usize,
     /// Names of the places, and their axes in the coordinates.
@@ -31,7 +31,7 @@ pub(crate) struct Assembly {
 
 /// A law with the indices of its axes and states.
 #[derive(Debug, Clone)]
-pub(crate) struct PlacedLaw {
+pub(crate) struct IndexedLaw {
     /// Name of the joint.
     pub joint: String,
     pub law: SharedLaw,
@@ -44,7 +44,7 @@ pub(crate) struct PlacedLaw {
     pub state_scale: f64,
 }
 
-impl PlacedLaw {
+impl IndexedLaw {
     /// Returns the indices of its axes.
     pub fn axes(&self) -> std::ops::Range<usize> {
         self.first_axis..self.first_axis + self.directions
@@ -100,7 +100,7 @@ impl Assembly {
             let (law, count, state_scale) =
                 states(joint.law()).map_err(|misses| MethodError::law(method, joint, misses))?;
             let directions = joint.axes().len();
-            joints.push(PlacedLaw {
+            joints.push(IndexedLaw {
                 joint: joint.name().to_owned(),
                 law,
                 first_axis,
@@ -138,7 +138,7 @@ impl Assembly {
     }
 
     /// Returns the relative displacement and velocity along an axis.
-    pub fn relative(&self, axis: usize, state: &[f64], drive: &Drive, time: f64) -> (f64, f64) {
+    pub fn relative(&self, axis: usize, state: &[f64], drive: &HarmonicExcitation, time: f64) -> (f64, f64) {
         let (g, speed) = drive.relative_at(axis, time);
         let (x, v) = state.split_at(self.n);
         (self.axes[axis].component(x) + g, self.axes[axis].component(v) + speed)
@@ -173,13 +173,13 @@ impl Assembly {
 
     /// Returns the excitation at `omega` (rad/s) along the axes; at zero, only the constant
     /// forces.
-    pub fn drive(&self, system: &System, omega: f64) -> Drive {
+    pub fn drive(&self, system: &System, omega: f64) -> HarmonicExcitation {
         let axes: Vec<usize> = (0..self.axes.len()).collect();
-        Drive::at(system, &axes, omega)
+        HarmonicExcitation::at(system, &axes, omega)
     }
 
     /// Returns the square root of an energy that the loads can supply, √J.
-    pub fn energy_scale(&self, drive: &Drive) -> f64 {
+    pub fn energy_scale(&self, drive: &HarmonicExcitation) -> f64 {
         drive.energy_scale(&self.mass, &self.stiffness)
     }
 
@@ -187,7 +187,7 @@ impl Assembly {
     ///
     /// A displacement is weighted by the larger of its stiffness and its inertia, an internal
     /// state by the scale of the motion.
-    pub fn weights(&self, drive: &Drive) -> Vec<f64> {
+    pub fn weights(&self, drive: &HarmonicExcitation) -> Vec<f64> {
         let (n, omega, rest) = (self.n, drive.omega, NEAR_REST * self.energy_scale(drive));
         let mut weights = vec![1.0; self.states()];
         for i in 0..n {
@@ -204,7 +204,7 @@ impl Assembly {
 
     /// Returns the scales of displacement and velocity for error norms. They cover the state,
     /// the imposed motion and the response to the loads.
-    pub fn scales(&self, state: &[f64], drive: &Drive) -> (f64, f64) {
+    pub fn scales(&self, state: &[f64], drive: &HarmonicExcitation) -> (f64, f64) {
         let n = self.n;
         let natural = (0..n).map(|i| (self.stiffness[(i, i)] / self.mass[(i, i)]).sqrt());
         // without excitation, the structure's natural frequencies set the time scale

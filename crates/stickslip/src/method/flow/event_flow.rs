@@ -1,7 +1,7 @@
 //! Event-driven motion as a [`Flow`].
 
 use super::Flow;
-use super::excitation::Drive;
+use super::excitation::HarmonicExcitation;
 use crate::method::IntegrationError;
 use crate::method::event_driven::{ExactPath, Mechanics, SegmentedMotion};
 use crate::model::System;
@@ -16,7 +16,7 @@ pub(crate) struct ExactFlow {
 
 impl ExactFlow {
     pub fn new(mechanics: Mechanics) -> Self {
-        ExactFlow { segments: SegmentedMotion::new(mechanics, Drive::default()) }
+        ExactFlow { segments: SegmentedMotion::new(mechanics, HarmonicExcitation::default()) }
     }
 }
 
@@ -26,7 +26,7 @@ impl Flow for ExactFlow {
     }
     fn set_drive(&mut self, system: &System, omega: f64) {
         let owners = self.segments.mechanics.owners();
-        self.segments.set_drive(Drive::at(system, &owners, omega));
+        self.segments.set_drive(HarmonicExcitation::at(system, &owners, omega));
     }
     fn weights(&self) -> Vec<f64> {
         self.segments.mechanics.weights(self.segments.drive.omega)

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 /// The excitation at one frequency.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Drive {
+pub(crate) struct HarmonicExcitation {
     /// Excitation frequency Ω, rad/s.
     pub omega: f64,
     /// Frequencies hΩ of the harmonics that occur, rad/s, in rising order.
@@ -22,7 +22,7 @@ pub(crate) struct Drive {
     pub offset: Vec<f64>,
 }
 
-impl Drive {
+impl HarmonicExcitation {
     /// Collects the excitation. `contacts` gives, for each contact (a slider or an axis), the
     /// index of its axis among the axes of all joints.
     pub fn new(system: &System, contacts: &[usize], omega: f64) -> Self {
@@ -38,7 +38,7 @@ impl Drive {
         let zero = || DVector::from_element(n, Complex64::new(0.0, 0.0));
         let axes: Vec<&Axis> = system.axes().map(|(_, axis)| axis).collect();
         let imposed_at = |h: u32| -> Vec<Complex64> { contacts.iter().map(|&axis| axes[axis].imposed_at(h)).collect() };
-        Drive {
+        HarmonicExcitation {
             omega,
             rates: harmonics.iter().map(|&h| f64::from(h) * omega).collect(),
             forces: harmonics.iter().map(|&h| force_at(h).unwrap_or_else(zero)).collect(),
@@ -50,12 +50,16 @@ impl Drive {
 
     /// Collects the excitation at this frequency; at zero, only the constant forces.
     pub fn at(system: &System, contacts: &[usize], omega: f64) -> Self {
-        if omega > 0.0 { Drive::new(system, contacts, omega) } else { Drive::without_harmonics(system, contacts) }
+        if omega > 0.0 {
+            HarmonicExcitation::new(system, contacts, omega)
+        } else {
+            HarmonicExcitation::without_harmonics(system, contacts)
+        }
     }
 
     /// Collects the constant forces alone.
     fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
-        let mut drive = Drive::new(system, contacts, 0.0);
+        let mut drive = HarmonicExcitation::new(system, contacts, 0.0);
         drive.rates.clear();
         drive.forces.clear();
         drive.imposed.clear();

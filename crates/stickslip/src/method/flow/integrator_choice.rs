@@ -2,20 +2,20 @@
 //!
 //! - [`ExactFlow`](super::event_flow::ExactFlow): laws of sliders and stops; closed forms
 //!   between switches.
-//! - [`SmoothFlow`](super::radau::step_size_control::SmoothFlow): laws with a rate; Radau IIA-9 with
+//! - [`RadauFlow`](super::radau::step_size_control::RadauFlow): laws with a rate; Radau IIA-9 with
 //!   controlled steps.
-//! - [`SwitchedFlow`](super::set_valued::located_switches::SwitchedFlow): friction that slides along a smooth
+//! - [`SetValuedFlow`](super::set_valued::located_switches::SetValuedFlow): friction that slides along a smooth
 //!   curve, together with laws with a rate; Radau IIA-9 between located switches.
-//! - [`IncrementalFlow`](super::average_acceleration::flow::IncrementalFlow): laws with a step and laws
+//! - [`AverageAccelerationFlow`](super::average_acceleration::flow::AverageAccelerationFlow): laws with a step and laws
 //!   with a rate together; average acceleration in equal steps.
 
 use super::Flow;
 use super::assembly::carries_nothing;
-use super::average_acceleration::flow::IncrementalFlow;
+use super::average_acceleration::flow::AverageAccelerationFlow;
 use super::event_flow::ExactFlow;
-use super::radau::step_size_control::SmoothFlow;
+use super::radau::step_size_control::RadauFlow;
 use super::set_valued;
-use super::set_valued::located_switches::SwitchedFlow;
+use super::set_valued::located_switches::SetValuedFlow;
 use crate::law::SharedLaw;
 use crate::method::MethodError;
 use crate::method::event_driven::{Mechanics, takes};
@@ -34,51 +34,53 @@ pub(crate) fn of(
     tolerance: f64,
     method: &'static str,
 ) -> Result<Box<dyn Flow>, MethodError> {
-    match Kind::of(system, width) {
-        Kind::Exact => Ok(Box::new(ExactFlow::new(Mechanics::new(system, method)?))),
-        Kind::Smooth => Ok(Box::new(SmoothFlow::new(super::radau::assembly(system, width, method)?, tolerance))),
-        Kind::Switched => Ok(Box::new(SwitchedFlow::new(system, tolerance, method)?)),
-        Kind::Incremental => Ok(Box::new(IncrementalFlow::new(system, width, method)?)),
+    match IntegratorKind::of(system, width) {
+        IntegratorKind::Exact => Ok(Box::new(ExactFlow::new(Mechanics::new(system, method)?))),
+        IntegratorKind::Smooth => {
+            Ok(Box::new(RadauFlow::new(super::radau::assembly(system, width, method)?, tolerance)))
+        }
+        IntegratorKind::Switched => Ok(Box::new(SetValuedFlow::new(system, tolerance, method)?)),
+        IntegratorKind::Incremental => Ok(Box::new(AverageAccelerationFlow::new(system, width, method)?)),
     }
 }
 
 /// The kind of time integration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum IntegratorKind {
     Exact,
     Smooth,
     Switched,
     Incremental,
 }
 
-impl Kind {
+impl IntegratorKind {
     /// Chooses the exact integration for sliders and stops alone, and controlled steps for laws
     /// with a rate alone. Friction on a smooth curve together with laws with a rate is
     /// integrated between switches; all other systems in equal steps.
-    pub fn of(system: &System, width: Option<f64>) -> Kind {
+    pub fn of(system: &System, width: Option<f64>) -> IntegratorKind {
         // a width that smooths no law has no effect
         let smooths = |width| system.joints().iter().any(|joint| joint.law().regularised(width).is_some());
         if !width.is_some_and(smooths) && system.joints().iter().all(|joint| takes(joint.law().as_ref())) {
-            return Kind::Exact;
+            return IntegratorKind::Exact;
         }
-        Kind::integrated(system, width)
+        IntegratorKind::integrated(system, width)
     }
 
-    /// Chooses among the integrations with steps. Returns [`Kind::Exact`] only for sliders
+    /// Chooses among the integrations with steps. Returns [`IntegratorKind::Exact`] only for sliders
     /// without a width.
-    pub fn integrated(system: &System, width: Option<f64>) -> Kind {
+    pub fn integrated(system: &System, width: Option<f64>) -> IntegratorKind {
         let all = |has: &dyn Fn(&SharedLaw) -> bool| system.joints().iter().all(|joint| has(joint.law()));
         let regular = |law: &SharedLaw| width.and_then(|width| law.regularised(width));
         // a law that carries no force counts as smooth even without a rate
         let smooth = |law: &SharedLaw| regular(law).as_ref().unwrap_or(law).rate().is_some() || carries_nothing(law);
         if all(&smooth) {
-            Kind::Smooth
+            IntegratorKind::Smooth
         } else if width.is_none() && all(&|law| law.sliders().is_some()) {
-            Kind::Exact
+            IntegratorKind::Exact
         } else if width.is_none() && set_valued::takes(system) {
-            Kind::Switched
+            IntegratorKind::Switched
         } else {
-            Kind::Incremental
+            IntegratorKind::Incremental
         }
     }
 }
@@ -106,7 +108,7 @@ mod tests {
 
     /// Laws for these tests alone.
     #[derive(Debug, Clone, Copy)]
-    enum Sample {
+    enum TestLaw {
         /// `f = 3 u + 0.2 u'` in a plane.
         Plane,
         /// Two parallel branches, each a spring in series with a damper: `f = Σ k z`,
@@ -124,13 +126,13 @@ mod tests {
         summary: "a law that only tests need",
         parameters: &[Parameter::positive("stiffness", Dimension::STIFFNESS, "not read")],
         sample: &[1.0],
-        build: |_| Arc::new(Sample::Plane),
+        build: |_| Arc::new(TestLaw::Plane),
     };
     /// Pairs (k, τ) of the relaxing law.
     const RELAXING: [(f64, f64); 2] = [(0.7, 0.5), (1.3, 2.0)];
     const SLIDING: (f64, f64) = (5.0, 0.4);
 
-    impl Law for Sample {
+    impl Law for TestLaw {
         fn info(&self) -> &'static LawInfo {
             &INFO
         }
@@ -138,31 +140,31 @@ mod tests {
             vec![1.0]
         }
         fn is_odd(&self) -> bool {
-            !matches!(self, Sample::Coupled)
+            !matches!(self, TestLaw::Coupled)
         }
         fn directions(&self) -> usize {
-            if matches!(self, Sample::Relaxing) { 1 } else { 2 }
+            if matches!(self, TestLaw::Relaxing) { 1 } else { 2 }
         }
         fn force_scale(&self) -> f64 {
-            if matches!(self, Sample::Sliding) { SLIDING.1 } else { f64::INFINITY }
+            if matches!(self, TestLaw::Sliding) { SLIDING.1 } else { f64::INFINITY }
         }
         fn rate(&self) -> Option<&dyn RateView> {
-            if matches!(self, Sample::Sliding) { None } else { Some(self) }
+            if matches!(self, TestLaw::Sliding) { None } else { Some(self) }
         }
         fn step(&self) -> Option<&dyn crate::law::StepView> {
-            if matches!(self, Sample::Sliding) { Some(self) } else { None }
+            if matches!(self, TestLaw::Sliding) { Some(self) } else { None }
         }
     }
 
-    impl RateLaw for Sample {
+    impl RateLaw for TestLaw {
         fn states(&self) -> usize {
-            if matches!(self, Sample::Plane) { 0 } else { 2 }
+            if matches!(self, TestLaw::Plane) { 0 } else { 2 }
         }
         fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, z: &[S], rate: &mut [S]) -> [S; 3] {
             let ([u, w, _], [v, q, _], zero) = (motion.displacement, motion.velocity, S::from(0.0));
             match self {
-                Sample::Plane | Sample::Sliding => [u * 3.0 + v * 0.2, w * 3.0 + q * 0.2, zero],
-                Sample::Relaxing => {
+                TestLaw::Plane | TestLaw::Sliding => [u * 3.0 + v * 0.2, w * 3.0 + q * 0.2, zero],
+                TestLaw::Relaxing => {
                     let mut force = zero;
                     for (s, (k, tau)) in RELAXING.into_iter().enumerate() {
                         rate[s] = v - z[s] / tau;
@@ -170,7 +172,7 @@ mod tests {
                     }
                     [force, zero, zero]
                 }
-                Sample::Coupled => {
+                TestLaw::Coupled => {
                     rate[0] = v - z[0] * (z[1] * z[1] + 1.0) * 2.0;
                     rate[1] = q * 0.5 + u * z[0] - z[1].sinh();
                     [z[0] * 2.0 + u * w * 0.3 + v * 0.1, z[1] + w * 2.0 + q * z[0] * 0.2, zero]
@@ -179,7 +181,7 @@ mod tests {
         }
     }
 
-    impl StepLaw for Sample {
+    impl StepLaw for TestLaw {
         fn states(&self) -> usize {
             2 // the force
         }
@@ -243,21 +245,21 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_discrete_steps() {
-        let joint = (Arc::new(Sample::Coupled) as SharedLaw, plane());
-        let relaxing = (Arc::new(Sample::Relaxing) as SharedLaw, vec![Axis::new(vec![(1, 1.0)])]);
+        let joint = (Arc::new(TestLaw::Coupled) as SharedLaw, plane());
+        let relaxing = (Arc::new(TestLaw::Relaxing) as SharedLaw, vec![Axis::new(vec![(1, 1.0)])]);
         let smooth = system(&[joint.clone(), relaxing.clone()]);
         let start = [0.3, -0.2, 0.5, 0.1, 0.2, -0.4, 0.1, 0.3];
-        let mut flow = SmoothFlow::new(super::super::radau::assembly(&smooth, None, "test").unwrap(), 1e-8);
+        let mut flow = RadauFlow::new(super::super::radau::assembly(&smooth, None, "test").unwrap(), 1e-8);
         flow.set_drive(&smooth, 1.3);
         flow.run(&mut start.to_vec(), 2.0, None).unwrap();
-        flow.lengths = super::super::radau::step_size_control::Lengths::Repeated;
+        flow.lengths = super::super::radau::step_size_control::StepSizes::Repeated;
         check_derivative(&mut flow, &smooth, &start);
         // all views together; the sliders slip during the run, at the same times for the
         // changed starts
         let jenkins = (Arc::new(Jenkins { stiffness: 4.0, limit: 0.3 }) as SharedLaw, vec![Axis::new(vec![(0, 1.0)])]);
         let gap = (Arc::new(Gap { gap: 0.1, stiffness: 2.0 }) as SharedLaw, vec![Axis::new(vec![(0, 1.0), (1, -1.0)])]);
-        let mixed = system(&[joint, (Arc::new(Sample::Sliding), plane()), jenkins, gap, relaxing]);
-        let mut flow = IncrementalFlow::new(&mixed, None, "test").unwrap();
+        let mixed = system(&[joint, (Arc::new(TestLaw::Sliding), plane()), jenkins, gap, relaxing]);
+        let mut flow = AverageAccelerationFlow::new(&mixed, None, "test").unwrap();
         flow.count = 40;
         let start = [0.3, -0.2, 0.5, 0.1, 0.2, -0.4, 0.1, -0.1, 0.05, 0.1, 0.3];
         check_derivative(&mut flow, &mixed, &start);
@@ -284,9 +286,9 @@ mod tests {
     /// A width affects only laws that it smooths. A stop is integrated exactly at any width.
     #[test]
     fn a_width_that_smooths_nothing_changes_nothing() {
-        let of = |law: SharedLaw| Kind::of(&system(&[(law, vec![Axis::new(vec![(0, 1.0)])])]), Some(1e-3));
-        assert_eq!(of(Arc::new(Gap { gap: 0.1, stiffness: 2.0 })), Kind::Exact);
-        assert_eq!(of(Arc::new(Coulomb { limit: 0.1 })), Kind::Smooth);
+        let of = |law: SharedLaw| IntegratorKind::of(&system(&[(law, vec![Axis::new(vec![(0, 1.0)])])]), Some(1e-3));
+        assert_eq!(of(Arc::new(Gap { gap: 0.1, stiffness: 2.0 })), IntegratorKind::Exact);
+        assert_eq!(of(Arc::new(Coulomb { limit: 0.1 })), IntegratorKind::Smooth);
     }
 
     /// Linear laws of one and two directions, with and without states, give the linear
@@ -296,7 +298,7 @@ mod tests {
         let omega = 1.3;
         let relaxing_axis = Axis::new(vec![(1, 1.0)]);
         let mut joints: Vec<(SharedLaw, Vec<Axis>)> =
-            vec![(Arc::new(Sample::Plane), plane()), (Arc::new(Sample::Relaxing), vec![relaxing_axis.clone()])];
+            vec![(Arc::new(TestLaw::Plane), plane()), (Arc::new(TestLaw::Relaxing), vec![relaxing_axis.clone()])];
         let s = Complex64::new(0.0, omega);
         let relaxing: Complex64 = RELAXING.iter().map(|(k, tau)| s * *tau * *k / (s * *tau + 1.0)).sum();
         let axes = plane();
@@ -323,7 +325,7 @@ mod tests {
         joints.push((Arc::new(Jenkins { stiffness: 4.0, limit: 100.0 }), vec![held.clone()]));
         parts.push((Complex64::new(4.0, 0.0), &held));
         let mixed = system(&joints);
-        assert_eq!(Kind::of(&mixed, None), Kind::Incremental);
+        assert_eq!(IntegratorKind::of(&mixed, None), IntegratorKind::Incremental);
         let orbit = shoot(&mixed, omega);
         let x = linear(omega, &parts);
         let estimate = orbit.evidence.error_estimate.unwrap();
@@ -346,7 +348,7 @@ mod tests {
             .map(|g| Axis::new(Vec::new()).with_imposed_motion([(1, g)]));
         let nothing = DMatrix::zeros(0, 0);
         let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
-        let system = System::builder(empty).joint("led", Arc::new(Sample::Sliding), circle.to_vec()).build().unwrap();
+        let system = System::builder(empty).joint("led", Arc::new(TestLaw::Sliding), circle.to_vec()).build().unwrap();
         let orbit = Transient::default().solver(&system).unwrap().orbit(2.0, None).unwrap();
         let (stiffness, limit) = SLIDING;
         let r = limit / stiffness;
@@ -452,7 +454,7 @@ mod tests {
         let omega = 1.3;
         let period = TAU / omega;
         let mut exact = of(&system, None, 1e-9, "test").unwrap();
-        let mut steps = IncrementalFlow::new(&system, None, "test").unwrap();
+        let mut steps = AverageAccelerationFlow::new(&system, None, "test").unwrap();
         let mut states = [vec![0.0; exact.states()], vec![0.0; steps.states()]];
         exact.set_drive(&system, omega);
         steps.set_drive(&system, omega);
@@ -479,15 +481,18 @@ mod tests {
     fn what_no_flow_takes_is_refused_by_name() {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
         let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.3 });
-        let system = system(&[(rigid.clone(), along(0)), (Arc::new(Sample::Sliding), plane())]);
+        let system = system(&[(rigid.clone(), along(0)), (Arc::new(TestLaw::Sliding), plane())]);
         // next to a smooth law, the switches of the rigid slider are located
-        let smooth = self::system(&[(rigid, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
-        assert_eq!((Kind::of(&smooth, None), Kind::of(&system, None)), (Kind::Switched, Kind::Incremental));
+        let smooth = self::system(&[(rigid, along(0)), (Arc::new(TestLaw::Relaxing), along(1))]);
+        assert_eq!(
+            (IntegratorKind::of(&smooth, None), IntegratorKind::of(&system, None)),
+            (IntegratorKind::Switched, IntegratorKind::Incremental)
+        );
         // a joint that carries no force does not matter
         let idle: SharedLaw = Arc::new(Coulomb { limit: 0.0 });
-        let beside = self::system(&[(idle, along(0)), (Arc::new(Sample::Relaxing), along(1))]);
-        assert_eq!(Kind::of(&beside, None), Kind::Smooth);
-        let alone = shoot(&self::system(&[(Arc::new(Sample::Relaxing), along(1))]), 1.3);
+        let beside = self::system(&[(idle, along(0)), (Arc::new(TestLaw::Relaxing), along(1))]);
+        assert_eq!(IntegratorKind::of(&beside, None), IntegratorKind::Smooth);
+        let alone = shoot(&self::system(&[(Arc::new(TestLaw::Relaxing), along(1))]), 1.3);
         let orbit = shoot(&beside, 1.3);
         near(orbit.places[0].amplitude(), alone.places[0].amplitude(), 1e-12);
         assert_eq!((orbit.joints[0].dissipation, orbit.joints[0].slip_fraction), (0.0, 1.0));
@@ -551,7 +556,7 @@ mod tests {
                 // the Runge-Kutta grid misses the turning point by up to (h v')²
                 near(orbit.places[0].maximum, largest, 1e-5);
                 assert_eq!(orbit.is_stable(), Some(true));
-                let T { start, later } = T::of(&orbit, omega);
+                let TwoInstants { start, later } = TwoInstants::of(&orbit, omega);
                 assert!((start - later).abs() > 0.1, "it repeats after one period");
                 near(orbit.sample(orbit.period() - 1e-9).displacement[0], start, 1e-6);
             }
@@ -599,14 +604,14 @@ mod tests {
     }
 
     /// Displacements at the start and one excitation period later.
-    struct T {
+    struct TwoInstants {
         start: f64,
         later: f64,
     }
 
-    impl T {
-        fn of(orbit: &Orbit, omega: f64) -> T {
-            T { start: orbit.sample(0.0).displacement[0], later: orbit.sample(TAU / omega).displacement[0] }
+    impl TwoInstants {
+        fn of(orbit: &Orbit, omega: f64) -> TwoInstants {
+            TwoInstants { start: orbit.sample(0.0).displacement[0], later: orbit.sample(TAU / omega).displacement[0] }
         }
     }
 }

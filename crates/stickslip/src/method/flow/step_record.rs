@@ -7,7 +7,7 @@ use crate::law::Contact;
 /// The record of a run: the state at instants, and values at the quadrature nodes between them.
 /// Successive runs reuse the memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Steps {
+pub(crate) struct StepRecord {
     /// Nodes and weights of the quadrature in a step, relative to its length; the last node is
     /// the end.
     pub nodes: Vec<(f64, f64)>,
@@ -15,20 +15,20 @@ pub(crate) struct Steps {
     pub spans: Vec<(f64, f64)>,
     /// Numbers of degrees of freedom, axes and joints.
     size: [usize; 3],
-    /// The values of [`Instant`], instant by instant: one more than there are steps, or two per
+    /// The values of [`RecordedInstant`], instant by instant: one more than there are steps, or two per
     /// step with `jumps`.
     instants: Vec<f64>,
     /// True if forces may jump between steps. Each step then stores both of its ends, and a
     /// contact state holds for a whole step.
     pub jumps: bool,
-    /// The values of [`Node`] without contact states, node by node.
+    /// The values of [`RecordedNode`] without contact states, node by node.
     values: Vec<f64>,
     contacts: Vec<Contact>,
 }
 
 /// The motion at an instant.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Instant<'a> {
+pub(crate) struct RecordedInstant<'a> {
     pub displacement: &'a [f64],
     pub velocity: &'a [f64],
     pub acceleration: &'a [f64],
@@ -38,7 +38,7 @@ pub(crate) struct Instant<'a> {
 
 /// The motion at a node.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Node<'a> {
+pub(crate) struct RecordedNode<'a> {
     pub displacement: &'a [f64],
     pub velocity: &'a [f64],
     /// Relative velocities and forces along the axes.
@@ -54,16 +54,16 @@ pub(crate) fn extrapolate(coarse: &mut [f64], fine: &[f64]) {
     coarse.iter_mut().zip(fine).for_each(|(coarse, fine)| *coarse = fine + (fine - *coarse) / 3.0);
 }
 
-impl Steps {
+impl StepRecord {
     pub fn new(nodes: Vec<(f64, f64)>, assembly: &Assembly) -> Self {
         let size = [assembly.n, assembly.axes.len(), assembly.joints.len()];
         let (instants, values) = (Vec::new(), Vec::new());
-        Steps { nodes, spans: Vec::new(), size, instants, jumps: false, values, contacts: Vec::new() }
+        StepRecord { nodes, spans: Vec::new(), size, instants, jumps: false, values, contacts: Vec::new() }
     }
 
     /// Makes the record of a run with forces that may jump.
     pub fn with_jumps(nodes: Vec<(f64, f64)>, assembly: &Assembly) -> Self {
-        Steps { jumps: true, ..Steps::new(nodes, assembly) }
+        StepRecord { jumps: true, ..StepRecord::new(nodes, assembly) }
     }
 
     pub fn clear(&mut self) {
@@ -97,27 +97,27 @@ impl Steps {
         self.contacts.extend(contact);
     }
 
-    fn instant(&self, at: usize) -> Instant<'_> {
+    fn instant(&self, at: usize) -> RecordedInstant<'_> {
         let [n, axes, _] = self.size;
         let (displacement, rest) = self.instants[at * (3 * n + axes)..].split_at(n);
         let (velocity, rest) = rest.split_at(n);
         let (acceleration, rest) = rest.split_at(n);
-        Instant { displacement, velocity, acceleration, force: &rest[..axes] }
+        RecordedInstant { displacement, velocity, acceleration, force: &rest[..axes] }
     }
 
     /// Returns both ends of a step.
-    pub fn ends(&self, step: usize) -> [Instant<'_>; 2] {
+    pub fn ends(&self, step: usize) -> [RecordedInstant<'_>; 2] {
         let first = if self.jumps { 2 * step } else { step };
         [self.instant(first), self.instant(first + 1)]
     }
 
-    pub fn node(&self, at: usize) -> Node<'_> {
+    pub fn node(&self, at: usize) -> RecordedNode<'_> {
         let [n, axes, joints] = self.size;
         let (displacement, rest) = self.values[at * 2 * (n + axes)..].split_at(n);
         let (velocity, rest) = rest.split_at(n);
         let (relative, rest) = rest.split_at(axes);
         let contact = &self.contacts[at * joints..(at + 1) * joints];
-        Node { displacement, velocity, relative, force: &rest[..axes], contact }
+        RecordedNode { displacement, velocity, relative, force: &rest[..axes], contact }
     }
 
     /// Returns the number of nodes.
@@ -126,7 +126,7 @@ impl Steps {
     }
 
     /// Returns all nodes in order.
-    pub fn each(&self) -> impl Iterator<Item = Node<'_>> {
+    pub fn each(&self) -> impl Iterator<Item = RecordedNode<'_>> {
         (0..self.count()).map(|at| self.node(at))
     }
 
@@ -143,7 +143,7 @@ impl Steps {
 
     /// Extrapolates the record of a run with one node per step, with `fine` as the run in half
     /// the steps.
-    pub fn extrapolated(mut self, fine: &Steps) -> Steps {
+    pub fn extrapolated(mut self, fine: &StepRecord) -> StepRecord {
         let [n, axes, joints] = self.size;
         let length = 3 * n + axes;
         for (i, instant) in self.instants.chunks_exact_mut(length.max(1)).enumerate() {

@@ -1,8 +1,8 @@
 //! The motion of an integration in steps, evaluated at any time, and its measured quantities.
 
-use super::assembly::{Assembly, PlacedLaw};
-use super::excitation::Drive;
-use super::step_record::{Instant, Steps};
+use super::assembly::{Assembly, IndexedLaw};
+use super::excitation::HarmonicExcitation;
+use super::step_record::{RecordedInstant, StepRecord};
 use crate::law::{Contact, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::{Axis, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
@@ -19,24 +19,24 @@ const ROUNDED: f64 = 1e-9;
 /// remains.
 const HALVED: usize = 20;
 
-pub(crate) struct SteppedPath {
-    steps: Steps,
+pub(crate) struct Trajectory {
+    steps: StepRecord,
     assembly: Assembly,
-    drive: Drive,
+    drive: HarmonicExcitation,
     system: Arc<System>,
     symmetry: Symmetry,
     period: f64,
 }
 
-impl SteppedPath {
+impl Trajectory {
     /// Makes the path of a recorded run that repeats after `period`.
     pub fn new(
         (system, assembly): (&Arc<System>, &Assembly),
-        drive: &Drive,
-        steps: &Steps,
+        drive: &HarmonicExcitation,
+        steps: &StepRecord,
         (symmetry, period): (Symmetry, f64),
     ) -> Self {
-        SteppedPath {
+        Trajectory {
             steps: steps.clone(),
             assembly: assembly.clone(),
             drive: drive.clone(),
@@ -56,7 +56,7 @@ impl SteppedPath {
     /// step.
     fn relative_ends(&self, step: usize, axis: usize) -> [[f64; 3]; 2] {
         let (start, length) = self.steps.spans[step];
-        let end = |instant: Instant, time: f64| {
+        let end = |instant: RecordedInstant, time: f64| {
             let (g, speed) = self.drive.relative_at(axis, time);
             let along = &self.assembly.axes[axis];
             let acceleration = along.component(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
@@ -99,7 +99,7 @@ impl SteppedPath {
     /// Returns the forces of a joint at `s` in [0, 1] of a step with the given relative motion.
     fn forces(
         &self,
-        joint: &PlacedLaw,
+        joint: &IndexedLaw,
         (step, s): (usize, f64),
         motion: &RelativeMotion<f64>,
     ) -> [f64; MAX_DIRECTIONS] {
@@ -158,7 +158,7 @@ impl SteppedPath {
     /// the structure; mirrored if `sign` is -1.
     fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
-        let sample = |(q, joint): (usize, &PlacedLaw)| {
+        let sample = |(q, joint): (usize, &IndexedLaw)| {
             let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
@@ -179,7 +179,7 @@ impl SteppedPath {
     }
 }
 
-impl Path for SteppedPath {
+impl Path for Trajectory {
     fn sample(&self, time: f64) -> Sample {
         let half = 0.5 * self.period;
         let (time, sign) = match self.symmetry {
@@ -257,7 +257,7 @@ fn reactions(system: &System, omega: f64, time: f64, [x, v, a, forces]: [&[f64];
 }
 
 /// A signal is the list of its values at the nodes.
-impl PathSignals for SteppedPath {
+impl PathSignals for Trajectory {
     type Signal = Vec<f64>;
     type Error = Infallible;
 

@@ -1,14 +1,14 @@
 //! Work limits: when a search ends, and when a point is given up.
 
 /// Work limit of one search, relative to [`WORK`].
-pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
+pub(super) const SEARCH: WorkShare = WorkShare { eliminated: 1.0, marched: 1.0 };
 /// Work limit of all searches of a point, including those of the error estimate.
 ///
 /// Newton's method, the interior point method, and the proximal point method with the
 /// slip-limit homotopy after it may each use the eliminations of one search. All together may
 /// use the time steps of one search. Measured on 173 random points with half of [`WORK`]:
 /// converged points used at most 1.01 of the 3.0 eliminations, all but one at most 0.4.
-pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
+pub(super) const POINT: WorkShare = WorkShare { eliminated: 3.0, marched: 1.0 };
 
 /// Number of consecutive failed points, each with more than [`ENOUGH`] of the work limit, after
 /// which the next points of the same solver get a smaller limit. One success restores the full
@@ -33,7 +33,7 @@ const BEGUN: f64 = 3.0;
 ///
 /// `step` is the number of multiplications of one of its Newton steps, `taken` the work used by
 /// the point, and `allowed` its limit.
-pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
+pub(super) fn is_affordable(step: f64, taken: WorkShare, allowed: WorkShare) -> bool {
     BEGUN * step <= WORK * (allowed.eliminated - taken.eliminated)
 }
 
@@ -42,43 +42,43 @@ pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
 const IMPROVES: f64 = 8.0;
 
 /// Returns the work limit of a point that found its first orbit with this work.
-pub(super) fn to_improve(taken: Work) -> Work {
+pub(super) fn to_improve(taken: WorkShare) -> WorkShare {
     taken.times(IMPROVES)
 }
 
 /// Returns the work limit of the next point after this number of consecutive failed points that
 /// used more than [`ENOUGH`].
-pub(super) fn allowed_after(in_vain: usize) -> Work {
+pub(super) fn allowed_after(in_vain: usize) -> WorkShare {
     if in_vain < IN_VAIN { POINT } else { POINT.times(ENOUGH) }
 }
 
 /// Work relative to the limit of one search.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Work {
+pub(super) struct WorkShare {
     /// Multiplications of Newton steps and evaluations.
     pub eliminated: f64,
     /// Time steps of laws with memory.
     pub marched: f64,
 }
 
-impl Work {
+impl WorkShare {
     /// Returns the sum.
-    pub fn and(self, other: Work) -> Work {
-        Work { eliminated: self.eliminated + other.eliminated, marched: self.marched + other.marched }
+    pub fn and(self, other: WorkShare) -> WorkShare {
+        WorkShare { eliminated: self.eliminated + other.eliminated, marched: self.marched + other.marched }
     }
 
     /// Returns both parts multiplied by `share`.
-    pub fn times(self, share: f64) -> Work {
-        Work { eliminated: share * self.eliminated, marched: share * self.marched }
+    pub fn times(self, share: f64) -> WorkShare {
+        WorkShare { eliminated: share * self.eliminated, marched: share * self.marched }
     }
 
     /// Returns the smaller of each part.
-    pub fn and_at_most(self, other: Work) -> Work {
-        Work { eliminated: self.eliminated.min(other.eliminated), marched: self.marched.min(other.marched) }
+    pub fn and_at_most(self, other: WorkShare) -> WorkShare {
+        WorkShare { eliminated: self.eliminated.min(other.eliminated), marched: self.marched.min(other.marched) }
     }
 
     /// Returns true if either part exceeds that of `limit`.
-    pub fn is_beyond(self, limit: Work) -> bool {
+    pub fn is_beyond(self, limit: WorkShare) -> bool {
         self.eliminated > limit.eliminated || self.marched > limit.marched
     }
 }

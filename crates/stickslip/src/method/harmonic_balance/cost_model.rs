@@ -3,8 +3,8 @@
 
 use super::aft::Ports;
 use super::budget::{FEWEST, POINT, WORK};
-use super::dynamics::banded::Sparse;
-use super::equations::harmonic_set::Kept;
+use super::dynamics::banded::BandedForm;
+use super::equations::harmonic_set::HarmonicSet;
 use super::linear_solve::newton_krylov::{by_products, step_products};
 use super::options::FIRST;
 use crate::law::IdealElement;
@@ -25,13 +25,13 @@ use num_complex::Complex64;
 /// ```
 pub fn step_work(system: &System, top: usize) -> f64 {
     let Ok((ports, _)) = Ports::of_sector(system) else { return 0.0 };
-    let harmonics = Kept::new(system, |z| z != Complex64::new(0.0, 0.0)).up_to(top).len();
-    step(Sparse::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
+    let harmonics = HarmonicSet::new(system, |z| z != Complex64::new(0.0, 0.0)).up_to(top).len();
+    step(BandedForm::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
 }
 
 /// Returns the multiplications of a step with this number of harmonics. `banded` is one
 /// harmonic in banded form, if the system has that form.
-pub(super) fn step(banded: Option<&Sparse>, ports: &Ports, harmonics: usize) -> f64 {
+pub(super) fn step(banded: Option<&BandedForm>, ports: &Ports, harmonics: usize) -> f64 {
     let size = 2 * harmonics * ports.count();
     match banded {
         Some(banded) => banded.work(harmonics),
@@ -46,7 +46,7 @@ pub(super) fn step(banded: Option<&Sparse>, ports: &Ports, harmonics: usize) -> 
 /// frequency.
 pub fn factor_bytes(system: &System) -> usize {
     let Ok((ports, _)) = Ports::of_sector(system) else { return 0 };
-    let is_banded = || Sparse::new(system, &ports, &[1]).is_some();
+    let is_banded = || BandedForm::new(system, &ports, &[1]).is_some();
     if ports.wave().is_some() || is_banded() { 0 } else { system.structure().factor_bytes() }
 }
 

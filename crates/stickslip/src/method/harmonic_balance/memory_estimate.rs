@@ -2,8 +2,8 @@
 
 use super::NAME;
 use super::aft::{Ports, at_once};
-use super::dynamics::banded::Sparse;
-use super::dynamics::linear_dynamics::{CACHED, Rest};
+use super::dynamics::banded::BandedForm;
+use super::dynamics::linear_dynamics::{CACHED, LinearDynamics};
 use super::linear_solve::newton_krylov;
 use crate::method::MethodError;
 use crate::method::options::PERIOD;
@@ -39,7 +39,7 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
 /// It includes the Jacobians of the ports, the receptances and the preconditioners. With
 /// uncoupled modes it includes the modes along the axes and their factor instead. `always`
 /// states that the Jacobian is always a matrix; otherwise it is counted if its size allows one.
-pub(super) fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool) -> f64 {
+pub(super) fn memory(ports: &Ports, rest: &LinearDynamics, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
     let structure = match rest.modes_for(ports).filter(|_| !always) {
@@ -64,9 +64,9 @@ pub(super) fn memory(ports: &Ports, rest: &Rest, harmonics: usize, always: bool)
 /// Returns the memory of the equations with this number of harmonics and samples, in bytes.
 /// `banded` is one harmonic in banded form, if the system has that form.
 pub(super) fn level_memory(
-    banded: Option<&Sparse>,
+    banded: Option<&BandedForm>,
     ports: &Ports,
-    rest: &Rest,
+    rest: &LinearDynamics,
     (harmonics, samples): (usize, usize),
 ) -> f64 {
     let equations = match banded {
@@ -90,9 +90,9 @@ fn tangents(ports: &Ports, harmonics: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::aft::Ports;
-    use super::super::dynamics::linear_dynamics::Rest;
+    use super::super::dynamics::linear_dynamics::LinearDynamics;
     use super::super::dynamics::receptance::Receptance;
-    use super::super::equations::Level;
+    use super::super::equations::Discretization;
     use super::memory;
     use crate::law::{Coulomb, Jenkins2d, SharedLaw};
     use crate::model::{Axis, System};
@@ -124,9 +124,9 @@ mod tests {
         for (joints, law) in [(20, &plane), (70, &plane), (30, &rigid)] {
             let system = row(joints, law);
             let ports = Ports::new(&system).unwrap();
-            let rest = Rest::new(&system, &ports);
+            let rest = LinearDynamics::new(&system, &ports);
             let harmonics = [1, 3, 5, 7, 9, 11, 13];
-            let mut level = Level::new(harmonics.to_vec(), 128, &ports, None);
+            let mut level = Discretization::new(harmonics.to_vec(), 128, &ports, None);
             level.drive(&system, &ports, &rest, 0.9).unwrap();
             let start = level.begin(&system, &ports, None, 0.9);
             level.solve(&ports, 0.9, start).unwrap();

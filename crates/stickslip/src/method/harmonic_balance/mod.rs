@@ -59,10 +59,10 @@ use crate::dimension::Dimension;
 use crate::model::System;
 pub use cost_model::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 pub(crate) use modes::branch_equations::BranchEquations;
-pub(crate) use modes::mode_continuation::{ModeArc, Step as ModeStep};
+pub(crate) use modes::mode_continuation::{ModeArc, ModeStep};
 pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState};
 pub use options::{HarmonicBalance, NAME};
-use solver::Balance;
+use solver::HarmonicBalanceSolver;
 pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
 
@@ -112,6 +112,6 @@ impl Method for HarmonicBalance {
         false
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Balance::new(system.clone(), *self, 1)?))
+        Ok(Box::new(HarmonicBalanceSolver::new(system.clone(), *self, 1)?))
     }
 }

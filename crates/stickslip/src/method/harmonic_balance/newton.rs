@@ -6,12 +6,12 @@
 //! search is a homotopy in the slip limits, from the solution in which all joints stick.
 
 use super::aft::{Port, Ports};
-use super::budget::{FEWEST, SEARCH, WORK, Work};
-use super::dynamics::banded::Along;
-use super::equations::{Level, Slopes, Solution};
+use super::budget::{FEWEST, SEARCH, WORK, WorkShare};
+use super::dynamics::banded::StepParameters;
+use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use super::globalization::found_by::FoundBy;
-use super::globalization::homotopy::{Ease, GIVEN, SOLVED};
-use super::linear_solve::newton_krylov::{FORMED, Near, product_work};
+use super::globalization::homotopy::{GIVEN, Homotopy, SOLVED};
+use super::linear_solve::newton_krylov::{FORMED, StepStart, product_work};
 use num_complex::Complex64;
 use stickslip_numerics::{dense, interrupt};
 
@@ -97,7 +97,7 @@ const PRODUCTS: f64 = 30.0;
 
 /// Residual at which a search ends.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Goal {
+pub(super) enum StopCriterion {
     /// The tolerance [`SOLVED`].
     Solved,
     /// This residual, on coarse samples.
@@ -108,7 +108,7 @@ pub(super) enum Goal {
 
 /// Failure of a search.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lost {
+pub(super) struct SolveError {
     pub iterations: usize,
     pub residual: f64,
     /// A resonance without damping, rad/s.
@@ -117,19 +117,19 @@ pub(super) struct Lost {
     pub away: bool,
 }
 
-impl Lost {
+impl SolveError {
     /// Failure of the iteration after `iterations` with this residual.
     pub fn after(iterations: usize, residual: f64) -> Self {
-        Lost { iterations, residual, resonance: None, away: false }
+        SolveError { iterations, residual, resonance: None, away: false }
     }
 
     /// Failure at a resonance without damping, rad/s.
     pub fn at(resonance: f64) -> Self {
-        Lost { resonance: Some(resonance), ..Lost::after(0, f64::INFINITY) }
+        SolveError { resonance: Some(resonance), ..SolveError::after(0, f64::INFINITY) }
     }
 }
 
-impl Level {
+impl Discretization {
     /// Newton's method.
     ///
     /// If there are coarse samples, it first iterates on them, and then on all samples with the
@@ -138,17 +138,17 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Solution,
-        ease: Ease,
-        (most, goal): (usize, Goal),
-    ) -> Result<(), Lost> {
+        motion: &mut HarmonicSolution,
+        ease: Homotopy,
+        (most, goal): (usize, StopCriterion),
+    ) -> Result<(), SolveError> {
         if !self.sketches || self.sketch.is_none() {
             return self.search(ports, omega, motion, ease, (most, goal));
         }
         let start = motion.clone();
         let taken = (self.assembled, self.eliminated, self.products);
         self.exchange_samples();
-        let rough = self.search(ports, omega, motion, ease, (most, Goal::Rough(self.rough())));
+        let rough = self.search(ports, omega, motion, ease, (most, StopCriterion::Rough(self.rough())));
         if rough.is_ok() {
             // the periodic state is known on these samples
             self.follow_slopes(ports, omega, motion, (ease, false));
@@ -163,7 +163,7 @@ impl Level {
         (self.assembled, self.eliminated, self.products) = taken;
         self.spent.eliminated += before - self.taken(ports).eliminated;
         self.sketches = false;
-        *motion = Solution { iterations: motion.iterations, ..start };
+        *motion = HarmonicSolution { iterations: motion.iterations, ..start };
         self.search(ports, omega, motion, ease, (most, goal))
     }
 
@@ -181,18 +181,18 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Solution,
-        ease: Ease,
-        (most, goal): (usize, Goal),
-    ) -> Result<(), Lost> {
-        let rough = matches!(goal, Goal::Rough(_));
+        motion: &mut HarmonicSolution,
+        ease: Homotopy,
+        (most, goal): (usize, StopCriterion),
+    ) -> Result<(), SolveError> {
+        let rough = matches!(goal, StopCriterion::Rough(_));
         let mut length = self.length(motion);
         self.nearby = self.sketches;
-        let mut residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
+        let mut residual = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap);
         let solved = match goal {
-            Goal::Solved => SOLVED,
-            Goal::Rough(solved) => solved,
-            Goal::Share(share) => SOLVED.max(share * residual),
+            StopCriterion::Solved => SOLVED,
+            StopCriterion::Rough(solved) => solved,
+            StopCriterion::Share(share) => SOLVED.max(share * residual),
         };
         let mut sketched = self.sketches && !rough;
         let mut kept = self.keeps_slopes && sketched;
@@ -212,7 +212,7 @@ impl Level {
             if !kept {
                 rough_slopes = self.follow_slopes(ports, omega, motion, (ease, sketched));
             }
-            let near = Near { length, residual, sketched: rough_slopes || rough, kept };
+            let near = StepStart { length, residual, sketched: rough_slopes || rough, kept };
             self.before.copy(motion);
             if !self.bounded_step(ports, (omega, ease), motion, near) {
                 break;
@@ -227,7 +227,7 @@ impl Level {
                     fraction = 1.0;
                 }
                 self.advance(ports, motion, fraction, length);
-                after = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
+                after = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap);
                 if after < (1.0 - SHORTENS * fraction) * beaten || self.is_exhausted(ports) {
                     break;
                 }
@@ -256,7 +256,7 @@ impl Level {
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from its initial guess; rescale with its own size
                 length = now;
-                residual = self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap);
+                residual = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap);
                 recent = [residual; REMEMBERED];
                 least = f64::INFINITY;
             }
@@ -266,7 +266,7 @@ impl Level {
             motion.c.clone_from(&self.best.c);
             motion.force.clone_from(&self.best.force);
             motion.iterations = iterations;
-            residual = self.evaluate(ports, omega, motion, ease, length, Slopes::None);
+            residual = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::None);
         }
         self.nearby = false;
         self.keeps_slopes = false;
@@ -274,7 +274,7 @@ impl Level {
         if residual <= solved || (waited > PATIENCE && residual <= ROUNDED) {
             Ok(())
         } else {
-            Err(Lost { away: self.is_away(motion), ..Lost::after(motion.iterations, residual) })
+            Err(SolveError { away: self.is_away(motion), ..SolveError::after(motion.iterations, residual) })
         }
     }
 
@@ -285,7 +285,13 @@ impl Level {
     /// the restoring stiffness. A step that moves the mean far is then compared with
     /// regularized ones, in which springs hold the mean. Their stiffness rises from soft to
     /// stiff. The step with the least residual is taken.
-    fn bounded_step(&mut self, ports: &Ports, (omega, ease): (f64, Ease), motion: &mut Solution, at: Near) -> bool {
+    fn bounded_step(
+        &mut self,
+        ports: &Ports,
+        (omega, ease): (f64, Homotopy),
+        motion: &mut HarmonicSolution,
+        at: StepStart,
+    ) -> bool {
         if !self.newton_step(ports, omega, ease, at) {
             return false;
         }
@@ -300,17 +306,17 @@ impl Level {
                 // restore the residual at the start of the step; evaluations without
                 // derivatives keep the tangents
                 motion.copy(&self.before);
-                self.evaluate(ports, omega, motion, ease, at.length, Slopes::None);
+                self.evaluate(ports, omega, motion, ease, at.length, DerivativeScope::None);
                 for (p, port) in ports.iter().enumerate() {
                     self.add_springs(p, port, share - held);
                 }
                 held = share;
-                if !self.newton_step(ports, omega, ease, Near { kept: false, ..at }) {
+                if !self.newton_step(ports, omega, ease, StepStart { kept: false, ..at }) {
                     break;
                 }
             }
             self.advance(ports, motion, 1.0, at.length);
-            let after = self.evaluate(ports, omega, motion, ease, at.length, Slopes::None);
+            let after = self.evaluate(ports, omega, motion, ease, at.length, DerivativeScope::None);
             // a step that moves the mean far must lead almost to the solution
             let near = self.mean_step(ports, at.length) <= AWAY * extent || after <= NEARLY * at.residual;
             if near && after < best.0 {
@@ -335,7 +341,7 @@ impl Level {
 
     /// Returns the extent of a motion, m: the largest of the displacements in static
     /// equilibrium, the harmonics without joints, and the harmonics of this motion.
-    fn extent(&self, motion: &Solution) -> f64 {
+    fn extent(&self, motion: &HarmonicSolution) -> f64 {
         let nh = self.harmonics().len();
         let swing = motion.c.iter().enumerate().filter(|(i, _)| i % nh > 0).map(|(_, c)| c.norm());
         let still = self.at_rest(1.0).c.into_iter().step_by(nh).map(|c| c.norm());
@@ -343,14 +349,14 @@ impl Level {
     }
 
     /// Returns true if the mean displacement left the contacts that alone support a body.
-    fn is_away(&self, motion: &Solution) -> bool {
+    fn is_away(&self, motion: &HarmonicSolution) -> bool {
         let nh = self.harmonics().len();
         let mean = motion.c.iter().step_by(nh).fold(0.0, |m: f64, c| m.max(c.norm()));
         self.stands() && mean > AWAY * self.extent(motion)
     }
 
     /// Returns the work of the present search relative to [`WORK`] and [`MARCHED`].
-    pub(super) fn taken(&self, ports: &Ports) -> Work {
+    pub(super) fn taken(&self, ports: &Ports) -> WorkShare {
         let size = self.residual.len() as f64;
         let of_port =
             |port: &Port| port.axes as f64 * if port.least_penalty > 0.0 { EVALUATED_FALLING } else { EVALUATED };
@@ -366,11 +372,11 @@ impl Level {
         let counted = taken as f64 * one + if self.coupled.is_some() { 0.0 } else { evaluated };
         let most = if self.prolongs && ports.has_forces() { WORK } else { WORK.max(fewest * one) };
         let marched = EVALUATIONS * PERIODS * self.all_samples().min(SAMPLES) * ports.len();
-        Work { eliminated: counted / most, marched: self.alternation.marched as f64 / MARCHED.max(marched) as f64 }
+        WorkShare { eliminated: counted / most, marched: self.alternation.marched as f64 / MARCHED.max(marched) as f64 }
     }
 
     /// Returns the work of all searches of the point on these equations.
-    pub(super) fn taken_of_point(&self, ports: &Ports) -> Work {
+    pub(super) fn taken_of_point(&self, ports: &Ports) -> WorkShare {
         self.spent.and(self.taken(ports))
     }
 
@@ -380,10 +386,10 @@ impl Level {
     }
 
     /// Solves for the Newton step into `self.step`, in units of the unknowns.
-    pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
+    pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
         self.eliminated += 1;
         if let Some(sparse) = &mut self.sparse {
-            let along = Along { penalty: &self.penalty, ease };
+            let along = StepParameters { penalty: &self.penalty, ease };
             if !sparse.linearise(ports, &along, &self.tangents) {
                 return false;
             }
@@ -393,7 +399,7 @@ impl Level {
 
     /// Solves for the step of another residual with the Jacobian of the last step. The banded
     /// form reuses its factors.
-    pub(super) fn newton_step_again(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
+    pub(super) fn newton_step_again(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
         let pair = 2 * self.harmonics().len();
         self.step.copy_from_slice(&self.residual);
         match &mut self.sparse {
@@ -424,7 +430,7 @@ impl Level {
     }
 
     /// Sets `motion` to `self.before` minus a fraction of the step.
-    pub(super) fn advance(&self, ports: &Ports, motion: &mut Solution, fraction: f64, length: f64) {
+    pub(super) fn advance(&self, ports: &Ports, motion: &mut HarmonicSolution, fraction: f64, length: f64) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let range = port.first * nh..(port.first + port.axes) * nh;
@@ -438,29 +444,46 @@ impl Level {
     }
 
     /// Returns an approximate solution near `start`, on the coarse samples if there are any.
-    pub fn approach(&mut self, ports: &Ports, omega: f64, start: &Solution) -> Option<Solution> {
+    pub fn approach(&mut self, ports: &Ports, omega: f64, start: &HarmonicSolution) -> Option<HarmonicSolution> {
         self.begin_anew(ports);
-        let mut motion = Solution { iterations: 0, ..start.clone() };
+        let mut motion = HarmonicSolution { iterations: 0, ..start.clone() };
         self.exchange_samples();
-        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, Goal::Rough(self.rough())));
+        let found = self.search(ports, omega, &mut motion, GIVEN, (ITERATIONS, StopCriterion::Rough(self.rough())));
         self.exchange_samples();
         (found.is_ok() && !self.is_away(&motion)).then_some(motion)
     }
 
     /// Newton's method from a `motion` near the solution, with at most `most` iterations.
-    pub fn polish(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, most: usize) -> Result<(), Lost> {
+    pub fn polish(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut HarmonicSolution,
+        most: usize,
+    ) -> Result<(), SolveError> {
         self.begin_anew(ports);
-        self.newton(ports, omega, motion, GIVEN, (most, Goal::Solved))
+        self.newton(ports, omega, motion, GIVEN, (most, StopCriterion::Solved))
     }
 
     /// Solves from the initial guess `start`.
-    pub fn solve(&mut self, ports: &Ports, omega: f64, start: Solution) -> Result<Solution, Lost> {
-        self.solve_to(ports, omega, start, Goal::Solved)
+    pub fn solve(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        start: HarmonicSolution,
+    ) -> Result<HarmonicSolution, SolveError> {
+        self.solve_to(ports, omega, start, StopCriterion::Solved)
     }
 
     /// Solves from the initial guess `start`. Newton's method stops at `goal`; the searches that
     /// follow it ignore `goal`.
-    pub fn solve_to(&mut self, ports: &Ports, omega: f64, mut start: Solution, goal: Goal) -> Result<Solution, Lost> {
+    pub fn solve_to(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        mut start: HarmonicSolution,
+        goal: StopCriterion,
+    ) -> Result<HarmonicSolution, SolveError> {
         start.iterations = 0;
         self.begin_anew(ports);
         let mut motion = start.clone();
@@ -470,30 +493,30 @@ impl Level {
         let mut nearest = f64::INFINITY;
         if ports.has_forces() {
             let iterations = motion.iterations;
-            motion = Solution { iterations, ..start.clone() };
+            motion = HarmonicSolution { iterations, ..start.clone() };
             if self.by_interior_points(ports, omega, &mut motion).is_ok() {
-                return Ok(Solution { found_by: FoundBy::InteriorPoints, ..motion });
+                return Ok(HarmonicSolution { found_by: FoundBy::InteriorPoints, ..motion });
             }
-            motion = Solution { iterations: motion.iterations, ..start };
+            motion = HarmonicSolution { iterations: motion.iterations, ..start };
             match self.by_proximal_points(ports, omega, &mut motion) {
-                Ok(()) => return Ok(Solution { found_by: FoundBy::ProximalPoints, ..motion }),
+                Ok(()) => return Ok(HarmonicSolution { found_by: FoundBy::ProximalPoints, ..motion }),
                 Err(lost) => nearest = lost.residual,
             }
         }
         let away = self.is_away(&motion);
         match self.lower_limits(ports, omega, &mut motion) {
-            Ok(()) if !self.is_away(&motion) => Ok(Solution { found_by: FoundBy::SlipLimitHomotopy, ..motion }),
-            Ok(()) => Err(Lost { away: true, ..Lost::after(motion.iterations, motion.residual) }),
-            Err(lost) => Err(Lost { away: away || lost.away, residual: lost.residual.min(nearest), ..lost }),
+            Ok(()) if !self.is_away(&motion) => Ok(HarmonicSolution { found_by: FoundBy::SlipLimitHomotopy, ..motion }),
+            Ok(()) => Err(SolveError { away: true, ..SolveError::after(motion.iterations, motion.residual) }),
+            Err(lost) => Err(SolveError { away: away || lost.away, residual: lost.residual.min(nearest), ..lost }),
         }
     }
 
     /// Homotopy in the slip limits, from limits at which all joints stick to the given ones.
-    fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
-        let mut good = Solution { iterations: motion.iterations, ..self.unhindered() };
+    fn lower_limits(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> Result<(), SolveError> {
+        let mut good = HarmonicSolution { iterations: motion.iterations, ..self.unhindered() };
         let mut limits: f64 = 1.0;
         // with all joints stuck, the equations are linear
-        let mut held = Err(Lost::after(good.iterations, f64::INFINITY));
+        let mut held = Err(SolveError::after(good.iterations, f64::INFINITY));
         for attempt in 0..60 {
             limits *= 4.0;
             if attempt == 1 {
@@ -503,11 +526,11 @@ impl Level {
             }
             let iterations = good.iterations;
             good = match self.stands() {
-                true => Solution { iterations, ..self.at_rest(limits) },
-                false => Solution { iterations, ..self.unhindered() },
+                true => HarmonicSolution { iterations, ..self.at_rest(limits) },
+                false => HarmonicSolution { iterations, ..self.unhindered() },
             };
             let most = if self.stands() { STICKS } else { ITERATIONS };
-            held = self.newton(ports, omega, &mut good, Ease { limits, ..GIVEN }, (most, Goal::Solved));
+            held = self.newton(ports, omega, &mut good, Homotopy { limits, ..GIVEN }, (most, StopCriterion::Solved));
             if held.is_ok() || self.is_exhausted(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
@@ -517,7 +540,13 @@ impl Level {
         while limits > 1.0 {
             motion.copy(&good);
             let next = (limits * factor).max(1.0);
-            let done = self.newton(ports, omega, motion, Ease { limits: next, ..GIVEN }, (ITERATIONS, Goal::Solved));
+            let done = self.newton(
+                ports,
+                omega,
+                motion,
+                Homotopy { limits: next, ..GIVEN },
+                (ITERATIONS, StopCriterion::Solved),
+            );
             good.iterations = motion.iterations;
             match done {
                 Ok(()) => {

@@ -78,7 +78,7 @@ impl HarmonicBalance {
     /// The user's number of samples applies to the user's number of harmonics. The finer
     /// solution that checks the error takes as many samples as it needs, so that its estimate
     /// shows if the user's number is too small. For `steep`, see [`Ports::has_steep`] and
-    /// [`Level::jumps`](equations::Level::jumps).
+    /// [`Discretization::jumps`](equations::Discretization::jumps).
     pub(super) fn samples_at(&self, top: usize, ports: &Ports, steep: bool) -> usize {
         let each = if steep { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
         let remembered = ports.iter().any(Port::marches);

@@ -1,10 +1,10 @@
 //! The orbit of a solution: displacements, energies, evidence, and the motion at any time.
 
-use super::aft::{Member, Ports};
-use super::dynamics::linear_dynamics::Rest;
-use super::equations::{Level, Solution};
+use super::aft::{PortMember, Ports};
+use super::dynamics::linear_dynamics::LinearDynamics;
+use super::equations::{Discretization, HarmonicSolution};
 use crate::law::{Contact, MAX_DIRECTIONS};
-use crate::method::orbit_search::evidence::{Judge, Judged};
+use crate::method::orbit_search::evidence::{OrbitCheck, ReturnEvidence};
 use crate::model::{Axis, MovedPlace, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results, sticks};
 use crate::orbit::{
@@ -25,10 +25,10 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// # Errors
 /// A resonance without damping, rad/s.
 pub(super) fn places(
-    level: &mut Level,
-    rest: &Rest,
+    level: &mut Discretization,
+    rest: &LinearDynamics,
     omega: f64,
-    motion: &Solution,
+    motion: &HarmonicSolution,
 ) -> Result<Vec<DVector<Complex64>>, f64> {
     let nh = level.harmonics().len();
     let acting = level.acting(motion).to_vec();
@@ -62,7 +62,12 @@ const ROUNDING: f64 = 1e3;
 
 /// Returns true if the mean forces balance without the springs that regularize unsupported
 /// directions.
-pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DVector<Complex64>]) -> bool {
+pub(super) fn stays(
+    setting: &OrbitInput,
+    level: &Discretization,
+    motion: &HarmonicSolution,
+    x: &[DVector<Complex64>],
+) -> bool {
     let (system, nh) = (setting.system, level.harmonics().len());
     if level.harmonics()[0] != 0 {
         return true;
@@ -95,7 +100,7 @@ pub(super) fn stays(setting: &Setting, level: &Level, motion: &Solution, x: &[DV
 
 #[derive(Debug, Clone)]
 /// Motion as a Fourier series, with the joint forces at the samples.
-struct Series {
+struct FourierPath {
     system: Arc<System>,
     omega: f64,
     harmonics: Vec<usize>,
@@ -107,7 +112,7 @@ struct Series {
 }
 
 /// Data of the solver for the orbit of a solution.
-pub(super) struct Setting<'a> {
+pub(super) struct OrbitInput<'a> {
     pub system: &'a Arc<System>,
     pub ports: &'a Ports,
     /// Ports of the whole ring, if one of its sectors was solved.
@@ -120,29 +125,29 @@ pub(super) struct Setting<'a> {
     pub truncation: Option<f64>,
     /// Tolerance of the truncation error.
     pub tolerance: f64,
-    pub judge: Option<&'a mut Judge>,
+    pub judge: Option<&'a mut OrbitCheck>,
 }
 
 /// Makes the orbit of a solution. Returns `None` if its mean forces do not balance.
 pub(super) fn orbit(
-    setting: Setting,
-    level: &mut Level,
-    motion: &Solution,
+    setting: OrbitInput,
+    level: &mut Discretization,
+    motion: &HarmonicSolution,
     x: Vec<DVector<Complex64>>,
 ) -> Option<Orbit> {
     if let (Some(wave), Some(ports)) = (setting.ports.wave(), setting.around) {
         let (mut level, motion) = level.around(wave, ports, motion);
-        return orbit(Setting { ports, around: None, ..setting }, &mut level, &motion, x);
+        return orbit(OrbitInput { ports, around: None, ..setting }, &mut level, &motion, x);
     }
     if !stays(&setting, level, motion, &x) {
         return None;
     }
     let harmonics = level.harmonics().to_vec();
-    let Samples { force, contact, states } = sampled(&setting, level, motion, &x);
-    let Setting { system, ports, omega, first, odd, truncation, tolerance, judge, around: _ } = setting;
+    let JointSamples { force, contact, states } = sampled(&setting, level, motion, &x);
+    let OrbitInput { system, ports, omega, first, odd, truncation, tolerance, judge, around: _ } = setting;
     let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
     let period = TAU / omega;
-    let measuring = Measuring {
+    let measuring = SolutionSignals {
         axes: system.axes().map(|(_, axis)| axis).collect(),
         ports: ports_of_axes(system, ports),
         motion,
@@ -163,9 +168,10 @@ pub(super) fn orbit(
     start.extend(states);
     let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
     let top = harmonics.last().copied();
-    let path = Series { system: system.clone(), omega, harmonics, x, force, contact };
-    let Judged { derivative, defect } = judge
-        .map_or_else(Judged::default, |judge| judge.judge(system, omega, (&path, symmetry), &start, &path.stuck()));
+    let path = FourierPath { system: system.clone(), omega, harmonics, x, force, contact };
+    let ReturnEvidence { derivative, defect } = judge.map_or_else(ReturnEvidence::default, |judge| {
+        judge.judge(system, omega, (&path, symmetry), &start, &path.stuck())
+    });
     // Where a normal force changes the slip limit, or vanishes, a series with twice the harmonics may
     // be as wrong as the shorter one. The return defect shows it, except on an unstable orbit, whose
     // return multiplies the error.
@@ -210,14 +216,19 @@ pub(super) fn orbit(
 
 /// Joint forces and contact states at the samples of a period, and the internal states at
 /// t = 0.
-struct Samples {
+struct JointSamples {
     force: Vec<Vec<[f64; MAX_DIRECTIONS]>>,
     contact: Vec<Vec<Contact>>,
     states: Vec<f64>,
 }
 
-fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector<Complex64>]) -> Samples {
-    let Setting { system, ports, omega, .. } = *setting;
+fn sampled(
+    setting: &OrbitInput,
+    level: &mut Discretization,
+    motion: &HarmonicSolution,
+    x: &[DVector<Complex64>],
+) -> JointSamples {
+    let OrbitInput { system, ports, omega, .. } = *setting;
     let harmonics = level.harmonics().to_vec();
     let samples = level.alternation.samples();
     let mut force = vec![vec![[0.0; MAX_DIRECTIONS]; samples]; system.joints().len()];
@@ -228,7 +239,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
         // without a port the joint carries no force and slips permanently
         let mut told = false;
         for (p, port) in ports.iter().enumerate() {
-            let Some(&Member { share, .. }) = port.member(j) else { continue };
+            let Some(&PortMember { share, .. }) = port.member(j) else { continue };
             level.sample(ports, p, omega, motion);
             let alternation = &level.alternation;
             for (a, own) in alternation.force.iter().enumerate().take(port.axes) {
@@ -274,7 +285,7 @@ fn sampled(setting: &Setting, level: &mut Level, motion: &Solution, x: &[DVector
             *contact = joint.law().contact_state(&now[..axes.len()], &force[..axes.len()]);
         }
     }
-    Samples { force, contact, states }
+    JointSamples { force, contact, states }
 }
 
 /// Returns the harmonics of the relative displacement along an axis.
@@ -284,7 +295,7 @@ fn relative(axis: &Axis, harmonics: &[usize], x: &[DVector<Complex64>]) -> Vec<C
 
 /// Returns the unknowns along each axis, by their numbers among all ports, with the share of
 /// the joint.
-fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<(usize, Member)>> {
+fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<(usize, PortMember)>> {
     let mut firsts = Vec::with_capacity(system.joints().len());
     let mut count = 0;
     for joint in system.joints() {
@@ -301,11 +312,11 @@ fn ports_of_axes(system: &System, ports: &Ports) -> Vec<Vec<(usize, Member)>> {
 }
 
 /// View of a solution for the measurement of its results.
-struct Measuring<'a> {
+struct SolutionSignals<'a> {
     axes: Vec<&'a Axis>,
     /// Unknowns along each axis, see [`ports_of_axes`].
-    ports: Vec<Vec<(usize, Member)>>,
-    motion: &'a Solution,
+    ports: Vec<Vec<(usize, PortMember)>>,
+    motion: &'a HarmonicSolution,
     x: &'a [DVector<Complex64>],
     harmonics: &'a [usize],
     /// Contact states per joint and sample of the full period.
@@ -314,10 +325,10 @@ struct Measuring<'a> {
     /// Number of returns per period.
     halves: usize,
     /// Scratch memory of the transforms.
-    level: RefCell<&'a mut Level>,
+    level: RefCell<&'a mut Discretization>,
 }
 
-impl Measuring<'_> {
+impl SolutionSignals<'_> {
     /// Returns the duration of a return, s.
     fn length(&self) -> f64 {
         TAU / (self.omega * self.halves as f64)
@@ -342,7 +353,7 @@ impl Measuring<'_> {
 
 /// Signals are lists of harmonics. If the motion has a half-period symmetry, all harmonics are
 /// odd and orthogonal over half a period too.
-impl PathSignals for Measuring<'_> {
+impl PathSignals for SolutionSignals<'_> {
     type Signal = Vec<Complex64>;
     type Error = Infallible;
 
@@ -360,7 +371,7 @@ impl PathSignals for Measuring<'_> {
         // use the unknown, not the displacement under the forces: the energies then balance
         // only as well as the equations hold
         let nh = self.harmonics.len();
-        let unknown = self.ports[axis].first().map(|(q, Member { factor, .. })| {
+        let unknown = self.ports[axis].first().map(|(q, PortMember { factor, .. })| {
             let along = &self.motion.c[q * nh..(q + 1) * nh];
             along.iter().map(|c| c * factor).collect()
         });
@@ -454,14 +465,14 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
     force
 }
 
-impl Series {
+impl FourierPath {
     /// Returns the joints that never slip.
     fn stuck(&self) -> Vec<usize> {
         (0..self.contact.len()).filter(|&joint| sticks(self.contact[joint].iter().copied())).collect()
     }
 }
 
-impl Path for Series {
+impl Path for FourierPath {
     fn sample(&self, time: f64) -> Sample {
         let n = self.system.dofs();
         let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -538,12 +549,17 @@ impl Path for Series {
     }
 
     fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
-        let judged =
-            Judge::of_any_size(&self.system).judge(&self.system, self.omega, (self, symmetry), start, &self.stuck());
+        let judged = OrbitCheck::of_any_size(&self.system).judge(
+            &self.system,
+            self.omega,
+            (self, symmetry),
+            start,
+            &self.stuck(),
+        );
         judged.derivative
     }
 
     fn return_defect(&self, start: &[f64], symmetry: Symmetry) -> Option<f64> {
-        Judge::of_any_size(&self.system).defect(&self.system, self.omega, (self, symmetry), start)
+        OrbitCheck::of_any_size(&self.system).defect(&self.system, self.omega, (self, symmetry), start)
     }
 }

@@ -1,21 +1,21 @@
 //! The solver of harmonic balance: one orbit after another, with warm starts.
 
 use super::aft::Ports;
-use super::budget::{self, POINT, Work, is_affordable};
-use super::dynamics::banded::{self, Sparse};
-use super::dynamics::linear_dynamics::Rest;
-use super::equations::harmonic_set::Kept;
-use super::equations::{self, Level, Solution};
+use super::budget::{self, POINT, WorkShare, is_affordable};
+use super::dynamics::banded::{self, BandedForm};
+use super::dynamics::linear_dynamics::LinearDynamics;
+use super::equations::harmonic_set::HarmonicSet;
+use super::equations::{self, Discretization, HarmonicSolution};
 use super::globalization::found_by::FoundBy;
 use super::linear_solve::newton_krylov;
 use super::memory_estimate::{MEMORY, check_memory, level_memory};
-use super::newton::Lost;
+use super::newton::SolveError;
 use super::options::{FIRST, HarmonicBalance, NAME, TOLERANCE};
 use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
-use super::warm_start::{RECENT, Recent};
+use super::warm_start::{RECENT, RecentOrbit};
 use super::{cost_model, postprocess};
-use crate::method::orbit_search::describing_guess::Guess;
-use crate::method::orbit_search::evidence::Judge;
+use crate::method::orbit_search::describing_guess::DescribingGuess;
+use crate::method::orbit_search::evidence::OrbitCheck;
 use crate::method::{MethodError, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::{ObservedMotion, Orbit};
@@ -37,7 +37,7 @@ pub(super) const LARGEST: usize = 2600;
 const ESTIMATED: f64 = 1e7;
 
 /// Solver of a system.
-pub(super) struct Balance {
+pub(super) struct HarmonicBalanceSolver {
     pub(super) system: Arc<System>,
     pub(super) method: HarmonicBalance,
     /// Number of excitation periods in one period of the orbit. Harmonics are multiples of the
@@ -51,30 +51,30 @@ pub(super) struct Balance {
     /// Ports of the whole ring, for a travelling wave.
     pub(super) around: Option<Ports>,
     /// Receptance of the linear part.
-    pub(super) rest: Rest,
+    pub(super) rest: LinearDynamics,
     /// One harmonic in banded form, if the system has that form. It sizes the work and memory
     /// of longer series.
-    pub(super) banded: Option<Sparse>,
+    pub(super) banded: Option<BandedForm>,
     /// Set of harmonics in a series.
-    pub(super) kept: Kept,
+    pub(super) kept: HarmonicSet,
     /// Highest harmonic of the first series.
     pub(super) first: usize,
     /// True once a law was met whose force jumps between two samples.
     pub(super) steep: bool,
     /// Check of orbits by time integration.
-    pub(super) judge: Judge,
+    pub(super) judge: OrbitCheck,
     /// State in static equilibrium: displacements, velocities (zero), internal states of the
     /// joints.
     pub(super) static_start: Option<Vec<f64>>,
     /// Equations by their highest harmonic.
-    pub(super) levels: BTreeMap<usize, Level>,
+    pub(super) levels: BTreeMap<usize, Discretization>,
     /// Number of consecutive failed points that used much of the work limit, see
     /// [`budget::ENOUGH`].
     pub(super) in_vain: usize,
     /// Lower work limit of the present point, if it has an orbit whose error it tries to reduce.
-    pub(super) limit: Option<Work>,
+    pub(super) limit: Option<WorkShare>,
     /// The last orbits, newest first.
-    pub(super) recent: VecDeque<Recent>,
+    pub(super) recent: VecDeque<RecentOrbit>,
     /// Frequency (rad/s) and state from which the next searches continue, see
     /// [`Solver::begin_at`].
     pub(super) begun: Option<(f64, Vec<f64>)>,
@@ -85,26 +85,26 @@ pub(super) struct Balance {
     pub(super) tried_in_time: usize,
     /// By highest harmonic, in systems with many contacts: the last solution whose error was
     /// estimated, and the finer solution with twice the harmonics.
-    pub(super) compared: BTreeMap<usize, [Solution; 2]>,
+    pub(super) compared: BTreeMap<usize, [HarmonicSolution; 2]>,
 }
 
-impl Balance {
+impl HarmonicBalanceSolver {
     pub(super) fn new(system: System, method: HarmonicBalance, periods: usize) -> Result<Self, MethodError> {
         let kept = if periods > 1 {
-            Kept::slowed(&system, periods)
+            HarmonicSet::slowed(&system, periods)
         } else {
-            Kept::new(&system, |z| z != Complex64::new(0.0, 0.0))
+            HarmonicSet::new(&system, |z| z != Complex64::new(0.0, 0.0))
         };
         method.check(kept.highest)?;
         if let Some(error) = MethodError::empty(NAME, &system) {
             return Err(error);
         }
         let (mut ports, mut around) = Ports::of_sector(&system)?;
-        let rest = Rest::new(&system, &ports);
+        let rest = LinearDynamics::new(&system, &ports);
         let system = Arc::new(system);
         let first = (FIRST * kept.scale).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
-        let banded = Sparse::new(&system, &ports, &[1]);
+        let banded = BandedForm::new(&system, &ports, &[1]);
         let steep = ports.has_steep();
         let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports, steep);
         let bytes = level_memory(banded.as_ref(), &ports, &rest, (harmonics.len(), samples));
@@ -118,7 +118,7 @@ impl Balance {
             around.iter_mut().for_each(|around| around.begin_at(&states));
             static_start = Some(orbit.initial_state);
         }
-        Ok(Balance {
+        Ok(HarmonicBalanceSolver {
             method,
             periods,
             drive: 0.0,
@@ -129,7 +129,7 @@ impl Balance {
             kept,
             first,
             steep,
-            judge: Judge::new(&system),
+            judge: OrbitCheck::new(&system),
             system,
             static_start,
             levels: BTreeMap::new(),
@@ -147,15 +147,15 @@ impl Balance {
     ///
     /// # Errors
     /// A resonance without damping.
-    pub(super) fn level(&mut self, top: usize, omega: f64) -> Result<&mut Level, Lost> {
+    pub(super) fn level(&mut self, top: usize, omega: f64) -> Result<&mut Discretization, SolveError> {
         let harmonics = self.kept.up_to(top);
         let samples = self.method.samples_at(top, &self.ports, self.steep);
         let (system, ports) = (&self.system, &self.ports);
         let level = self.levels.entry(top).or_insert_with(|| {
-            let sparse = Sparse::new(system, ports, &harmonics);
-            Level::new(harmonics, samples, ports, sparse)
+            let sparse = BandedForm::new(system, ports, &harmonics);
+            Discretization::new(harmonics, samples, ports, sparse)
         });
-        level.drive(&self.system, &self.ports, &self.rest, omega).map_err(Lost::at)?;
+        level.drive(&self.system, &self.ports, &self.rest, omega).map_err(SolveError::at)?;
         let elsewhere = self.taken(Some(top));
         let allowed = self.allowed();
         let level = self.levels.get_mut(&top).expect("made above");
@@ -167,18 +167,18 @@ impl Balance {
     pub(super) fn begin_point(&mut self, drive: f64) {
         self.drive = drive;
         self.limit = None;
-        self.levels.values_mut().for_each(Level::begin_point);
+        self.levels.values_mut().for_each(Discretization::begin_point);
     }
 
     /// Returns the work of the point so far, without that of the equations up to harmonic
     /// `but`.
-    pub(super) fn taken(&self, but: Option<usize>) -> Work {
+    pub(super) fn taken(&self, but: Option<usize>) -> WorkShare {
         let counted = self.levels.iter().filter(|(top, _)| but != Some(**top));
-        counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(Work::default(), Work::and)
+        counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(WorkShare::default(), WorkShare::and)
     }
 
     /// Returns the work limit of the point.
-    fn allowed(&self) -> Work {
+    fn allowed(&self) -> WorkShare {
         let allowed = budget::allowed_after(self.in_vain);
         self.limit.map_or(allowed, |limit| limit.and_at_most(allowed))
     }
@@ -201,7 +201,7 @@ impl Balance {
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in
     /// memory. The budget of a point that has used `taken` must cover it too.
-    pub(super) fn can_compare(&self, top: usize, taken: Work) -> bool {
+    pub(super) fn can_compare(&self, top: usize, taken: WorkShare) -> bool {
         let harmonics = self.kept.up_to(self.kept.double(top)).len();
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
@@ -225,7 +225,12 @@ impl Balance {
     ///
     /// If the solution shows that a law is steep, the method solves again with the samples that
     /// steep laws need. All later solutions use these samples too.
-    pub(super) fn solve(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
+    pub(super) fn solve(
+        &mut self,
+        top: usize,
+        omega: f64,
+        from: Option<(usize, &HarmonicSolution)>,
+    ) -> Result<HarmonicSolution, SolveError> {
         let motion = self.solve_as_known(top, omega, from)?;
         if self.steep || !self.levels[&top].jumps(&self.ports, &motion) {
             return Ok(motion);
@@ -237,7 +242,12 @@ impl Balance {
     }
 
     /// Solves with the number of samples that is set.
-    fn solve_as_known(&mut self, top: usize, omega: f64, from: Option<(usize, &Solution)>) -> Result<Solution, Lost> {
+    fn solve_as_known(
+        &mut self,
+        top: usize,
+        omega: f64,
+        from: Option<(usize, &HarmonicSolution)>,
+    ) -> Result<HarmonicSolution, SolveError> {
         let start = match from {
             Some((other, motion)) => {
                 let harmonics = self.kept.up_to(other);
@@ -250,7 +260,7 @@ impl Balance {
             None => {
                 // the initial guess solves the whole structure densely; large systems start
                 // without friction
-                let guess = (self.system.dofs() < banded::GUESSED).then(|| Guess::new(&self.system, omega));
+                let guess = (self.system.dofs() < banded::GUESSED).then(|| DescribingGuess::new(&self.system, omega));
                 self.level(top, omega)?;
                 let begun = self.levels[&top].begin(&self.system, &self.ports, guess.as_ref(), omega);
                 self.approached(top, omega, guess.as_ref()).unwrap_or(begun)
@@ -261,7 +271,7 @@ impl Balance {
     }
 
     /// Converts the failure of a search to the error of the method.
-    pub(super) fn lost(&self, lost: Lost) -> OrbitError {
+    pub(super) fn lost(&self, lost: SolveError) -> OrbitError {
         if let Some(resonance) = lost.resonance {
             return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
         }
@@ -283,9 +293,10 @@ impl Balance {
         &mut self,
         top: usize,
         omega: f64,
-        motion: &Solution,
-    ) -> Result<Vec<DVector<Complex64>>, Lost> {
-        postprocess::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion).map_err(Lost::at)
+        motion: &HarmonicSolution,
+    ) -> Result<Vec<DVector<Complex64>>, SolveError> {
+        postprocess::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion)
+            .map_err(SolveError::at)
     }
 
     /// Makes the orbit of a solution, checks its energy balance, and keeps it for warm starts.
@@ -293,13 +304,13 @@ impl Balance {
         &mut self,
         top: usize,
         omega: f64,
-        motion: Solution,
+        motion: HarmonicSolution,
         x: Vec<DVector<Complex64>>,
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
         let orbit = self.orbit_of(top, omega, &motion, x, truncation)?;
         self.recent.truncate(RECENT - 1);
-        self.recent.push_front(Recent { start: orbit.initial_state.clone(), omega, top, motion });
+        self.recent.push_front(RecentOrbit { start: orbit.initial_state.clone(), omega, top, motion });
         Ok(orbit)
     }
 
@@ -308,11 +319,11 @@ impl Balance {
         &mut self,
         top: usize,
         omega: f64,
-        motion: &Solution,
+        motion: &HarmonicSolution,
         x: Vec<DVector<Complex64>>,
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
-        let setting = postprocess::Setting {
+        let setting = postprocess::OrbitInput {
             system: &self.system,
             ports: &self.ports,
             around: self.around.as_ref(),
@@ -326,27 +337,27 @@ impl Balance {
         let level = self.levels.get_mut(&top).expect("solved");
         let orbit = postprocess::orbit(setting, level, motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
         if !postprocess::balances(&self.system, &orbit) {
-            let lost = Lost::after(motion.iterations, orbit.evidence.energy_gap);
+            let lost = SolveError::after(motion.iterations, orbit.evidence.energy_gap);
             return Err(self.lost(lost));
         }
         Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
     }
 
     /// Finds the solution near another one, without an error estimate and without the
-    /// slip-limit homotopy of [`Level::solve`].
+    /// slip-limit homotopy of [`Discretization::solve`].
     ///
     /// Searches between orbits use it. They can do without a failed point.
-    pub(super) fn nearby(&mut self, top: usize, omega: f64, near: &Solution) -> Result<Orbit, OrbitError> {
+    pub(super) fn nearby(&mut self, top: usize, omega: f64, near: &HarmonicSolution) -> Result<Orbit, OrbitError> {
         self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
-        let mut motion = Solution { iterations: 0, ..near.clone() };
+        let mut motion = HarmonicSolution { iterations: 0, ..near.clone() };
         let level = self.levels.get_mut(&top).expect("made above");
         let mut found = level.polish(&self.ports, omega, &mut motion, NEARBY);
         if found.is_err() && self.ports.has_forces() {
-            motion = Solution { iterations: motion.iterations, ..near.clone() };
+            motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
             found = level.by_interior_points(&self.ports, omega, &mut motion);
             motion.found_by = FoundBy::InteriorPoints;
             if found.is_err() {
-                motion = Solution { iterations: motion.iterations, ..near.clone() };
+                motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
                 found = level.by_proximal_points(&self.ports, omega, &mut motion);
                 motion.found_by = FoundBy::ProximalPoints;
             }
@@ -362,7 +373,7 @@ impl Balance {
         &mut self,
         first: usize,
         omega: f64,
-        warm: Option<(usize, Solution)>,
+        warm: Option<(usize, HarmonicSolution)>,
     ) -> Result<Orbit, OrbitError> {
         match self.method.harmonics {
             Some(top) => self.fixed(top, omega, warm),
@@ -377,7 +388,7 @@ impl Balance {
     /// friction the set of slipping samples changes abruptly, and extrapolation does not help.
     pub(super) fn goes_ahead(&self, top: usize) -> bool {
         let unique = self.judge.proves() && !self.ports.has_forces();
-        unique || self.levels.get(&top).is_some_and(Level::is_coupled)
+        unique || self.levels.get(&top).is_some_and(Discretization::is_coupled)
     }
 
     /// Returns the initial guess.
@@ -385,7 +396,7 @@ impl Balance {
     /// If `start` belongs to an orbit of this solver, the guess is a warm start. If it belongs
     /// to an orbit of another solver and several orbits may exist, the guess comes from a time
     /// integration that begins there.
-    pub(super) fn near(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
+    pub(super) fn near(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
         let foreign = start.filter(|start| self.recent.iter().all(|recent| recent.start != *start));
         let led = foreign.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.led(start, omega));
         led.or_else(|| self.warm(start, omega))
@@ -414,23 +425,23 @@ impl Balance {
 
     /// Returns the warm start from the recent orbit with this start, or otherwise from the last
     /// orbit. Both are closer than an initial guess.
-    pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, Solution)> {
+    pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
         self.warm_by(self.same(start?).unwrap_or(0), omega)
     }
 
     /// Returns the warm start from a recent orbit.
-    fn warm_by(&self, at: usize, omega: f64) -> Option<(usize, Solution)> {
+    fn warm_by(&self, at: usize, omega: f64) -> Option<(usize, HarmonicSolution)> {
         let near = self.recent.get(at)?;
         let before = self.recent.iter().skip(at + 1).find(|recent| recent.top == near.top);
         let motion = match before {
             Some(before) if self.goes_ahead(near.top) => near.towards(before, omega),
             _ => near.motion.clone(),
         };
-        Some((near.top, Solution { found_by: FoundBy::Newton, ..motion }))
+        Some((near.top, HarmonicSolution { found_by: FoundBy::Newton, ..motion }))
     }
 }
 
-impl Solver for Balance {
+impl Solver for HarmonicBalanceSolver {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
@@ -471,7 +482,7 @@ impl Solver for Balance {
     }
 
     fn effort(&self) -> f64 {
-        let Work { eliminated, marched } = self.taken(None);
+        let WorkShare { eliminated, marched } = self.taken(None);
         (eliminated / POINT.eliminated).max(marched / POINT.marched)
     }
 }
@@ -520,9 +531,9 @@ mod tests {
     #[test]
     fn points_in_vain_leave_less_to_the_next() {
         let system = example::blade_couple_massless().assemble().unwrap();
-        let mut balance = Balance::new(system, HarmonicBalance::default(), 1).unwrap();
+        let mut balance = HarmonicBalanceSolver::new(system, HarmonicBalance::default(), 1).unwrap();
         let omega = std::f64::consts::TAU * 121.0;
-        let vain = |balance: &mut Balance, marched: usize| {
+        let vain = |balance: &mut HarmonicBalanceSolver, marched: usize| {
             balance.begin_point(omega);
             balance.level(7, omega).unwrap().alternation.marched = marched;
             balance.end_point(Err(OrbitError::Frequency { omega })).unwrap_err();

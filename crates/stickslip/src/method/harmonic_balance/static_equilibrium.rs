@@ -15,9 +15,9 @@
 //! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
 
 use super::aft::{Ports, StaticState};
-use super::dynamics::banded::Sparse;
-use super::dynamics::linear_dynamics::Rest;
-use super::equations::{Level, Solution, Tether};
+use super::dynamics::banded::BandedForm;
+use super::dynamics::linear_dynamics::LinearDynamics;
+use super::equations::{Discretization, HarmonicSolution, ProximalSprings};
 use super::postprocess;
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -37,7 +37,7 @@ const SAMPLES: usize = 8;
 /// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     let (ports, around) = Ports::of_sector(system).ok()?;
-    let rest = Rest::new(system, &ports);
+    let rest = LinearDynamics::new(system, &ports);
     let system = Arc::new(system.clone());
     static_equilibrium(&system, (&ports, around.as_ref()), &rest).map(|found| found.orbit)
 }
@@ -55,12 +55,12 @@ pub(super) struct SolvedEquilibrium {
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, around): (&Ports, Option<&Ports>),
-    rest: &Rest,
+    rest: &LinearDynamics,
 ) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
     let omega = scale_of_rates(system);
-    let sparse = Sparse::new(system, ports, &harmonics);
-    let mut level = Level::new(harmonics, SAMPLES, ports, sparse);
+    let sparse = BandedForm::new(system, ports, &harmonics);
+    let mut level = Discretization::new(harmonics, SAMPLES, ports, sparse);
     level.drive(system, ports, rest, omega).ok()?;
     let start = if level.stands() { level.at_rest(1.0) } else { level.unhindered() };
     let mut solution = start;
@@ -74,7 +74,7 @@ pub(super) fn static_equilibrium(
         }
     }
     let x = postprocess::places(&mut level, rest, omega, &solution).ok()?;
-    let setting = postprocess::Setting {
+    let setting = postprocess::OrbitInput {
         system,
         ports,
         around,
@@ -98,7 +98,7 @@ pub(super) fn static_equilibrium(
 /// structure that sinks under its load.
 ///
 /// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
-fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) -> Option<()> {
+fn found(level: &mut Discretization, ports: &Ports, omega: f64, solution: &mut HarmonicSolution) -> Option<()> {
     let begin = solution.clone();
     if level.polish(ports, omega, solution, ITERATIONS).is_ok() {
         return Some(());
@@ -110,7 +110,7 @@ fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) 
     let (mut share, mut softer) = (STIFFEST, 0.1f64);
     for _ in 0..POINTS {
         let anchor = solution.c.iter().map(|c| c.re).collect();
-        level.tether = Some(Tether { share, anchor });
+        level.tether = Some(ProximalSprings { share, anchor });
         let mut next = solution.clone();
         let tied = level.polish(ports, omega, &mut next, ITERATIONS).is_ok();
         level.tether = None;
@@ -169,7 +169,7 @@ mod tests {
 
     fn equilibrium(system: &Arc<System>) -> Option<SolvedEquilibrium> {
         let ports = Ports::new(system).unwrap();
-        static_equilibrium(system, (&ports, None), &Rest::new(system, &ports))
+        static_equilibrium(system, (&ports, None), &LinearDynamics::new(system, &ports))
     }
 
     /// In stick, `z (kn sin² + kt cos²) = Q`. In slip, `z kn (sin² + µ sin cos) = Q`. The

@@ -1,6 +1,6 @@
 //! The last orbits, for warm starts, with a secant predictor.
 
-use super::equations::Solution;
+use super::equations::HarmonicSolution;
 use num_complex::Complex64;
 
 /// Number of orbits that are kept for warm starts. A peak is refined between that many.
@@ -9,20 +9,20 @@ pub(super) const RECENT: usize = 8;
 const AHEAD: f64 = 1.5;
 
 /// An orbit that was found.
-pub(super) struct Recent {
+pub(super) struct RecentOrbit {
     /// State at t = 0.
     pub(super) start: Vec<f64>,
     /// Frequency of the orbit, rad/s.
     pub(super) omega: f64,
     /// Highest harmonic.
     pub(super) top: usize,
-    pub(super) motion: Solution,
+    pub(super) motion: HarmonicSolution,
 }
 
-impl Recent {
+impl RecentOrbit {
     /// Returns the motion at `omega` on the line through this orbit and the previous one
     /// (secant predictor). Returns this motion if the extrapolation is longer than [`AHEAD`].
-    pub(super) fn towards(&self, before: &Recent, omega: f64) -> Solution {
+    pub(super) fn towards(&self, before: &RecentOrbit, omega: f64) -> HarmonicSolution {
         let share = (omega - self.omega) / (self.omega - before.omega);
         let mut motion = self.motion.clone();
         if share.abs() <= AHEAD {

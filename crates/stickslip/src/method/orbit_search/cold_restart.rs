@@ -9,9 +9,9 @@ use crate::method::{OrbitError, Solver};
 use crate::orbit::Orbit;
 
 /// A solver that searches again without a warm start if the warm-started orbit is unstable.
-pub(crate) struct Afresh<S>(pub S);
+pub(crate) struct ColdRestart<S>(pub S);
 
-impl<S: Solver> Solver for Afresh<S> {
+impl<S: Solver> Solver for ColdRestart<S> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         let near = self.0.orbit(omega, start)?;
         if start.is_none() || near.is_stable() != Some(false) {

@@ -16,7 +16,7 @@ const ROUNDS: usize = 60;
 const SETTLED: f64 = 1e-3;
 
 /// Displacements by harmonic, and the stiffness of each joint.
-pub(crate) struct Guess {
+pub(crate) struct DescribingGuess {
     /// Pairs of the frequency hΩ and the complex displacements.
     pub harmonics: Vec<(f64, DVector<Complex64>)>,
     /// Complex stiffness of each joint, directions × directions.
@@ -72,10 +72,10 @@ pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
     })
 }
 
-impl Guess {
+impl DescribingGuess {
     /// Iterates the describing functions at the excitation frequency `omega`. The displacements
     /// are zero where the linear system is singular.
-    pub fn new(system: &System, omega: f64) -> Guess {
+    pub fn new(system: &System, omega: f64) -> DescribingGuess {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let mut harmonics: Vec<u32> = excitation.iter().map(|(h, _)| *h).collect();
@@ -84,7 +84,7 @@ impl Guess {
         harmonics.dedup();
         let mut amplitudes = vec![f64::INFINITY; system.joints().len()];
         let none = |d: usize| DMatrix::from_element(d, d, Complex64::new(0.0, 0.0));
-        let mut guess = Guess { harmonics: Vec::new(), joints: Vec::new() };
+        let mut guess = DescribingGuess { harmonics: Vec::new(), joints: Vec::new() };
         for _ in 0..ROUNDS {
             let joints = system.joints().iter().zip(&amplitudes);
             guess.joints = joints

@@ -14,8 +14,8 @@ use super::return_map::{newton_step, norm};
 use super::vibration_share;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::NEAR_REST;
-use crate::method::flow::average_acceleration::flow::IncrementalFlow;
-use crate::method::flow::integrator_choice::{self, Kind};
+use crate::method::flow::average_acceleration::flow::AverageAccelerationFlow;
+use crate::method::flow::integrator_choice::{self, IntegratorKind};
 use crate::model::{CyclicSymmetry, System};
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -60,15 +60,15 @@ const STEPS: usize = 4096;
 /// assert_eq!(evidence_steps(&couple), None); // from event to event
 /// ```
 pub fn evidence_steps(system: &System) -> Option<(usize, bool)> {
-    if system.dofs() > LARGEST || Kind::of(system, None) != Kind::Incremental {
+    if system.dofs() > LARGEST || IntegratorKind::of(system, None) != IntegratorKind::Incremental {
         return None;
     }
-    let judge = Judge::new(system);
+    let judge = OrbitCheck::new(system);
     judge.flow.as_ref().map(|_| (STEPS, !judge.proven))
 }
 
 /// Integrates a system over one return and compares the end with the start.
-pub(crate) struct Judge {
+pub(crate) struct OrbitCheck {
     /// `None` if the system is too large, or if no integration takes its laws.
     flow: Option<Box<dyn Flow>>,
     /// True if stability is proven: no two motions of the system separate.
@@ -77,7 +77,7 @@ pub(crate) struct Judge {
 
 /// Evidence from the time integration of an orbit.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Judged {
+pub(crate) struct ReturnEvidence {
     /// Derivative of the return by the state at t = 0. `None` if stability is proven, or if no
     /// integration follows the motion.
     pub derivative: Option<DMatrix<f64>>,
@@ -85,28 +85,32 @@ pub(crate) struct Judged {
     pub defect: Option<f64>,
 }
 
-impl Judge {
+impl OrbitCheck {
     pub fn new(system: &System) -> Self {
         let proven = system.is_incrementally_stable();
         if system.dofs() > LARGEST || (proven && system.joints().len() > JOINTS) {
-            return Judge { flow: None, proven };
+            return OrbitCheck { flow: None, proven };
         }
-        Judge { proven, ..Judge::of_any_size(system) }
+        OrbitCheck { proven, ..OrbitCheck::of_any_size(system) }
     }
 
-    /// Makes a [`Judge`] for any system, even where stability is proven or the integration is
+    /// Makes a [`OrbitCheck`] for any system, even where stability is proven or the integration is
     /// slow.
     pub fn of_any_size(system: &System) -> Self {
         let name = "the judge of stability"; // this name appears in no message
-        let flow: Option<Box<dyn Flow>> = match Kind::of(system, None) {
+        let flow: Option<Box<dyn Flow>> = match IntegratorKind::of(system, None) {
             _ if system.dofs() == 0 => None,
-            Kind::Incremental => IncrementalFlow::new(system, None, name).ok().map(|mut flow| -> Box<dyn Flow> {
-                flow.count = STEPS;
-                Box::new(flow)
-            }),
-            Kind::Exact | Kind::Smooth | Kind::Switched => integrator_choice::of(system, None, TOLERANCE, name).ok(),
+            IntegratorKind::Incremental => {
+                AverageAccelerationFlow::new(system, None, name).ok().map(|mut flow| -> Box<dyn Flow> {
+                    flow.count = STEPS;
+                    Box::new(flow)
+                })
+            }
+            IntegratorKind::Exact | IntegratorKind::Smooth | IntegratorKind::Switched => {
+                integrator_choice::of(system, None, TOLERANCE, name).ok()
+            }
         };
-        Judge { flow, proven: false }
+        OrbitCheck { flow, proven: false }
     }
 
     /// Returns true if stability is proven.
@@ -150,7 +154,7 @@ impl Judge {
         (path, symmetry): (&dyn Path, Symmetry),
         start: &[f64],
         stuck: &[usize],
-    ) -> Judged {
+    ) -> ReturnEvidence {
         self.follow(system, omega, (path, symmetry), start, (!self.proven).then_some(stuck))
     }
 
@@ -173,9 +177,9 @@ impl Judge {
         (path, symmetry): (&dyn Path, Symmetry),
         start: &[f64],
         sensitive: Option<&[usize]>,
-    ) -> Judged {
-        let Some(flow) = &mut self.flow else { return Judged::default() };
-        let back = Return::of(system, symmetry);
+    ) -> ReturnEvidence {
+        let Some(flow) = &mut self.flow else { return ReturnEvidence::default() };
+        let back = ReturnSymmetry::of(system, symmetry);
         flow.set_drive(system, omega);
         let (weights, rest) = (flow.weights(), NEAR_REST * flow.energy_scale());
         let share = vibration_share::share(path, (symmetry, TAU / omega), start, (&weights, rest));
@@ -189,7 +193,7 @@ impl Judge {
         let stuck = sensitive.unwrap_or_default();
         let alone = derivative.as_mut().filter(|_| stuck.is_empty());
         if flow.run(&mut state, duration, alone).is_err() {
-            return Judged::default();
+            return ReturnEvidence::default();
         }
         // a joint may stick right up to its limit. The error of the orbit would make it slip
         // for an instant, and the derivative would be that of slip
@@ -222,13 +226,13 @@ impl Judge {
                 of_the_orbit_beside(&mut **flow, (start, gap, of_series), (&back, system.dofs()), (duration, &weights));
             of_return = near.or(of_return);
         }
-        Judged { derivative: of_return.map(|derivative| back.whole(&derivative, system.dofs())), defect }
+        ReturnEvidence { derivative: of_return.map(|derivative| back.whole(&derivative, system.dofs())), defect }
     }
 }
 
 /// The fraction of a period after which a motion returns, and the transformation of the return:
 /// a sign, or a rotation of a ring by some sectors.
-struct Return {
+struct ReturnSymmetry {
     /// Fraction of the period.
     part: f64,
     /// Fraction of the steps of a full period.
@@ -241,11 +245,11 @@ struct Return {
     times: usize,
 }
 
-impl Return {
+impl ReturnSymmetry {
     fn of(system: &System, symmetry: Symmetry) -> Self {
-        let whole = Return { part: 1.0, share: 1.0, sign: 1.0, sectors: 1, turned: 0, times: 1 };
+        let whole = ReturnSymmetry { part: 1.0, share: 1.0, sign: 1.0, sectors: 1, turned: 0, times: 1 };
         match (symmetry, system.cyclic()) {
-            (Symmetry::HalfPeriod, _) => Return { part: 0.5, sign: -1.0, ..whole },
+            (Symmetry::HalfPeriod, _) => ReturnSymmetry { part: 0.5, sign: -1.0, ..whole },
             (Symmetry::FullPeriod, Some(CyclicSymmetry { sectors, order })) if order > 0 => {
                 // each sector repeats the motion of the first, `order/sectors` of a period
                 // earlier per sector
@@ -255,7 +259,14 @@ impl Return {
                 }
                 let turned = (1..=sectors).find(|turned| order * turned % sectors == a % sectors).unwrap_or(0);
                 let times = sectors / a;
-                Return { part: 1.0 / times as f64, share: 1.0 / times as f64, sign: 1.0, sectors, turned, times }
+                ReturnSymmetry {
+                    part: 1.0 / times as f64,
+                    share: 1.0 / times as f64,
+                    sign: 1.0,
+                    sectors,
+                    turned,
+                    times,
+                }
             }
             (Symmetry::FullPeriod, _) => whole,
         }
@@ -306,7 +317,7 @@ impl Return {
 fn of_the_orbit_beside(
     flow: &mut dyn Flow,
     (start, mut gap, of_series): (&[f64], DVector<f64>, &DMatrix<f64>),
-    (back, dofs): (&Return, usize),
+    (back, dofs): (&ReturnSymmetry, usize),
     (duration, weights): (f64, &[f64]),
 ) -> Option<DMatrix<f64>> {
     let (mut state, mut nearer) = (start.to_vec(), None);
@@ -425,10 +436,10 @@ mod tests {
         let orbit = method.solver(&wave).unwrap().orbit(omega, None).unwrap();
         let judged = |system: &System| {
             let path = (orbit.path.as_ref(), Symmetry::FullPeriod);
-            Judge::new(system).judge(system, omega, path, &orbit.initial_state, &[])
+            OrbitCheck::new(system).judge(system, omega, path, &orbit.initial_state, &[])
         };
         let (part, all) = (judged(&wave), judged(&whole));
-        let largest = |judged: &Judged| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
+        let largest = |judged: &ReturnEvidence| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
         let (of_part, of_all) = (largest(&part), largest(&all));
         // the integrated motion differs from the orbit by the defect, and the parts of the
         // period differ by that
@@ -450,7 +461,7 @@ mod tests {
         let system = couple(Arc::new(Jenkins { stiffness: 2e4, limit: 4.0 }));
         let omega = TAU * 120.75;
         let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
-        let mut judge = Judge::new(&system);
+        let mut judge = OrbitCheck::new(&system);
         assert!(judge.proves());
         let mut defect =
             |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;

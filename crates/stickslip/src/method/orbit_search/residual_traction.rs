@@ -12,7 +12,7 @@
 //! Newton's method on a return map may find any orbit of the continuum. This file replaces the
 //! rows of such sliders by `z = kt (u - o)` and iterates `o`.
 
-use super::return_map::{Aim, Closed, ReturnMap, close};
+use super::return_map::{ClosedState, ClosingTargets, ReturnMap, close};
 use crate::method::OrbitError;
 use crate::method::static_equilibrium::StaticEquilibrium;
 use crate::model::System;
@@ -48,7 +48,7 @@ pub(crate) struct ElasticSlider {
 
 /// A slider that is held for the whole period, and the place of its relaxed spring.
 #[derive(Debug, Clone)]
-struct Pin {
+struct HeldSlider {
     spring: ElasticSlider,
     /// Projection of the displacements onto the joint's axis.
     direction: DVector<f64>,
@@ -56,7 +56,7 @@ struct Pin {
     place: f64,
 }
 
-impl Pin {
+impl HeldSlider {
     fn force(&self, state: &[f64]) -> f64 {
         let along: f64 = self.direction.iter().zip(state).map(|(w, x)| w * x).sum();
         self.spring.stiffness * (along - self.place)
@@ -65,14 +65,14 @@ impl Pin {
 
 /// A return map with held sliders: their forces follow from the given places instead of the
 /// return.
-struct Pinned<'m> {
-    map: &'m mut dyn Closing,
-    pins: &'m [Pin],
+struct HeldMap<'m> {
+    map: &'m mut dyn OrbitMap,
+    pins: &'m [HeldSlider],
     /// Derivative of the last return without the held sliders.
     own: DMatrix<f64>,
 }
 
-impl ReturnMap for Pinned<'_> {
+impl ReturnMap for HeldMap<'_> {
     fn returned(
         &mut self,
         state: &mut [f64],
@@ -101,14 +101,14 @@ impl ReturnMap for Pinned<'_> {
 }
 
 /// A return map that can make orbits from closed states.
-pub(crate) trait Closing: ReturnMap {
+pub(crate) trait OrbitMap: ReturnMap {
     /// Returns its sliders in series with springs.
     fn springs(&self) -> Vec<ElasticSlider>;
     /// Sets the limits of the sliders to those in `springs`, which lists all of
-    /// [`Closing::springs`].
+    /// [`OrbitMap::springs`].
     fn limit(&mut self, springs: &[ElasticSlider]);
     /// Makes the orbit of the last closed state.
-    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError>;
+    fn finish(&mut self, closed: ClosedState) -> Result<Orbit, OrbitError>;
 }
 
 /// Returns the orbit of the continuum around `first` in which held sliders keep their static
@@ -116,10 +116,10 @@ pub(crate) trait Closing: ReturnMap {
 ///
 /// Returns `first` if it is a single orbit, or if the iteration fails.
 pub(crate) fn as_in_equilibrium(
-    map: &mut dyn Closing,
+    map: &mut dyn OrbitMap,
     (system, equilibrium): (&System, Option<&StaticEquilibrium>),
     first: Orbit,
-    aim: Aim,
+    aim: ClosingTargets,
 ) -> Orbit {
     if first.symmetry == Symmetry::HalfPeriod || first.evidence.history_dependent.is_empty() {
         return first;
@@ -132,27 +132,27 @@ pub(crate) fn as_in_equilibrium(
 }
 
 fn iterate(
-    map: &mut dyn Closing,
+    map: &mut dyn OrbitMap,
     system: &System,
     first: &Orbit,
     (springs, equilibrium): (&[ElasticSlider], &[f64]),
-    aim: Aim,
+    aim: ClosingTargets,
 ) -> Option<Orbit> {
-    let (mut orbit, mut rounds) = (first.clone(), Rounds::default());
+    let (mut orbit, mut rounds) = (first.clone(), AndersonHistory::default());
     for _ in 0..ROUNDS {
         let held = held(&orbit, springs, equilibrium);
         if held.iter().all(|slider| slider.gap().abs() <= RELAXED * slider.spring.limit / slider.spring.stiffness) {
             return Some(orbit);
         }
         let places = rounds.next(&held);
-        let pins: Vec<Pin> = held
+        let pins: Vec<HeldSlider> = held
             .iter()
             .zip(&places)
             .map(|(slider, place)| {
                 let direction = system.joints()[slider.spring.joint].axes()[0].dense(system.dofs());
                 let imposed =
                     slider.begin - direction.iter().zip(&orbit.initial_state).map(|(w, x)| w * x).sum::<f64>();
-                Pin { spring: slider.spring, direction, place: place - imposed }
+                HeldSlider { spring: slider.spring, direction, place: place - imposed }
             })
             .collect();
         let mut state = orbit.initial_state.clone();
@@ -165,18 +165,18 @@ fn iterate(
         }
         map.limit(&limits);
         let own = DMatrix::zeros(state.len(), state.len());
-        let mut pinned = Pinned { map: &mut *map, pins: &pins, own };
+        let mut pinned = HeldMap { map: &mut *map, pins: &pins, own };
         let closed = close(&mut pinned, &state, aim).ok()?;
         let derivative = pinned.own;
         let iterations = orbit.evidence.iterations + closed.iterations;
         let missing = orbit.evidence.error_estimate;
-        orbit = map.finish(Closed { iterations, missing, derivative, ..closed }).ok()?;
+        orbit = map.finish(ClosedState { iterations, missing, derivative, ..closed }).ok()?;
     }
     None
 }
 
 /// A slider that is held in an orbit.
-struct Held {
+struct StuckSlider {
     spring: ElasticSlider,
     /// Relative displacement at t = 0, m.
     begin: f64,
@@ -185,7 +185,7 @@ struct Held {
     ought: f64,
 }
 
-impl Held {
+impl StuckSlider {
     fn gap(&self) -> f64 {
         self.ought - self.is
     }
@@ -200,7 +200,7 @@ fn place(system: &System, equilibrium: Option<&StaticEquilibrium>, spring: &Elas
     displacement - force / spring.stiffness
 }
 
-fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<Held> {
+fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<StuckSlider> {
     let begin = orbit.sample(0.0);
     springs
         .iter()
@@ -215,30 +215,30 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<He
             let reach = (reach * (1.0 - 2.0 * RELAXED)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
             let is = begin - orbit.initial_state[spring.state] / spring.stiffness;
-            Some(Held { spring, begin, is, ought: place.max(high - reach).min(low + reach) })
+            Some(StuckSlider { spring, begin, is, ought: place.max(high - reach).min(low + reach) })
         })
         .collect()
 }
 
 /// Places and gaps of the rounds in which the same sliders are held.
 #[derive(Default)]
-struct Rounds {
+struct AndersonHistory {
     states: Vec<usize>,
     places: Vec<DVector<f64>>,
     gaps: Vec<DVector<f64>>,
 }
 
-impl Rounds {
+impl AndersonHistory {
     /// Returns the next places: those at which a linear map through the last rounds has no gap.
     ///
     /// Source: Walker and Ni (2011), "Anderson acceleration for fixed-point iterations".
-    fn next(&mut self, held: &[Held]) -> DVector<f64> {
+    fn next(&mut self, held: &[StuckSlider]) -> DVector<f64> {
         let states: Vec<usize> = held.iter().map(|slider| slider.spring.state).collect();
         if states != self.states {
-            *self = Rounds { states, ..Rounds::default() };
+            *self = AndersonHistory { states, ..AndersonHistory::default() };
         }
         let place = DVector::from_iterator(held.len(), held.iter().map(|slider| slider.is));
-        let gap = DVector::from_iterator(held.len(), held.iter().map(Held::gap));
+        let gap = DVector::from_iterator(held.len(), held.iter().map(StuckSlider::gap));
         let mut next = &place + &gap;
         let count = self.places.len();
         if count > 0 {

@@ -30,7 +30,7 @@ pub(crate) trait ReturnMap {
 
 /// Targets of the iteration.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Aim {
+pub(crate) struct ClosingTargets {
     /// Name of the method, for errors.
     pub method: &'static str,
     /// Excitation frequency, rad/s.
@@ -49,7 +49,7 @@ pub(crate) struct Aim {
 
 /// A closed orbit.
 #[derive(Debug)]
-pub(crate) struct Closed {
+pub(crate) struct ClosedState {
     pub state: Vec<f64>,
     /// The state minus its return.
     pub gap: DVector<f64>,
@@ -64,7 +64,7 @@ pub(crate) struct Closed {
 
 /// The algorithm that searches for the closed orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Search {
+pub(crate) enum ClosingMethod {
     /// Newton's method.
     Newton,
     /// Iteration of the map until the transient has decayed.
@@ -77,21 +77,23 @@ pub(crate) enum Search {
     },
 }
 
-impl Search {
+impl ClosingMethod {
     /// Returns the symmetry of the return. A stuck contact keeps its offset, and half a period
     /// would mirror it in every return; iteration therefore uses whole periods.
     pub fn symmetry(self, system: &System, periods: usize) -> Symmetry {
         match self {
-            Search::Newton => Symmetry::of(system, periods),
-            Search::Settle { .. } => Symmetry::FullPeriod,
+            ClosingMethod::Newton => Symmetry::of(system, periods),
+            ClosingMethod::Settle { .. } => Symmetry::FullPeriod,
         }
     }
 
     /// Returns the search for a vibration that is this fraction of the size of its states.
-    pub fn of_share(self, share: f64) -> Search {
+    pub fn of_share(self, share: f64) -> ClosingMethod {
         match self {
-            Search::Newton => Search::Newton,
-            Search::Settle { tolerance, returns } => Search::Settle { tolerance: share * tolerance, returns },
+            ClosingMethod::Newton => ClosingMethod::Newton,
+            ClosingMethod::Settle { tolerance, returns } => {
+                ClosingMethod::Settle { tolerance: share * tolerance, returns }
+            }
         }
     }
 
@@ -103,8 +105,8 @@ impl Search {
         map: &mut M,
         neighbour: Option<&[f64]>,
         guess: impl FnOnce(&M) -> Vec<f64>,
-        aim: Aim,
-    ) -> Result<Closed, OrbitError> {
+        aim: ClosingTargets,
+    ) -> Result<ClosedState, OrbitError> {
         let states = map.weights().len();
         if let Some(start) = neighbour.filter(|state| state.len() == states)
             && let Ok(closed) = self.close(map, start, aim)
@@ -121,10 +123,10 @@ impl Search {
     }
 
     /// Closes the orbit from `start`.
-    pub fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+    pub fn close(self, map: &mut dyn ReturnMap, start: &[f64], aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
         match self {
-            Search::Newton => close(map, start, aim),
-            Search::Settle { tolerance, returns } => settle(map, start, aim, tolerance, returns),
+            ClosingMethod::Newton => close(map, start, aim),
+            ClosingMethod::Settle { tolerance, returns } => settle(map, start, aim, tolerance, returns),
         }
     }
 }
@@ -160,10 +162,10 @@ const FIRST_WINDOW: usize = 8;
 fn settle(
     map: &mut dyn ReturnMap,
     start: &[f64],
-    aim: Aim,
+    aim: ClosingTargets,
     tolerance: f64,
     returns: usize,
-) -> Result<Closed, OrbitError> {
+) -> Result<ClosedState, OrbitError> {
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let n = start.len();
     let mut state = start.to_vec();
@@ -238,7 +240,7 @@ fn settle(
         }
         let residual = norm(map.weights(), gap.as_slice()) / size;
         let missing = if at_rounding { ROUNDING } else { missing };
-        return Ok(Closed { state, gap, derivative, residual, iterations: count, missing: Some(missing) });
+        return Ok(ClosedState { state, gap, derivative, residual, iterations: count, missing: Some(missing) });
     }
     Err(OrbitError::not_converged(aim.method, aim.omega, returns, smallest))
 }
@@ -298,7 +300,7 @@ const FAR: f64 = 1e6;
 
 /// Returns true if the state of an undamped resonance is so large that the work of the loads is
 /// lost in rounding.
-fn too_large(size: f64, aim: Aim) -> bool {
+fn too_large(size: f64, aim: ClosingTargets) -> bool {
     aim.rest > 0.0 && size > LARGEST * aim.rest
 }
 /// A Newton step must leave at most this fraction of the residual.
@@ -308,12 +310,12 @@ const CONTINUUM: f64 = 1e-10;
 
 /// Closes an orbit by Newton's method. Where it stalls, lets the transient decay before the
 /// next attempt.
-pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<Closed, OrbitError> {
+pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
     let mut state = start.to_vec();
     for rescue in 0..=RESCUES {
-        let end = descended(map, &state, aim, Beyond::Shortens, &mut iterations)?;
+        let end = descended(map, &state, aim, LargeIncrease::Shortens, &mut iterations)?;
         if end.residual <= aim.residual {
             return nearer(map, end, aim);
         }
@@ -339,7 +341,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: Aim) -> Result<
 ///
 /// Near a resonance the residual is a small fraction of that distance, and the result would
 /// depend on the path of the iteration.
-fn nearer(map: &mut dyn ReturnMap, closed: Closed, aim: Aim) -> Result<Closed, OrbitError> {
+fn nearer(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
     if closed.residual <= ROUNDING || aim.distance == f64::INFINITY {
         return Ok(closed);
     }
@@ -353,7 +355,14 @@ fn nearer(map: &mut dyn ReturnMap, closed: Closed, aim: Aim) -> Result<Closed, O
     if let Ok(gap) = evaluate(map, &state, aim, &mut derivative) {
         let residual = norm(map.weights(), gap.as_slice()) / size(map, &state);
         if residual <= closed.residual {
-            return Ok(Closed { state, gap, derivative, residual, iterations: closed.iterations + 1, missing: None });
+            return Ok(ClosedState {
+                state,
+                gap,
+                derivative,
+                residual,
+                iterations: closed.iterations + 1,
+                missing: None,
+            });
         }
     }
     // the last run must be that of the closed state
@@ -384,7 +393,7 @@ const MOSTLY: f64 = 1e-3;
 
 /// Reaction to a full step that increases the residual by more than [`WILD`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Beyond {
+pub(crate) enum LargeIncrease {
     /// The solver shortens the step.
     Shortens,
     /// The search ends. The integration steps jump over the layers of a law, so the derivative
@@ -400,15 +409,15 @@ pub(crate) enum Beyond {
 pub(crate) fn descended(
     map: &mut dyn ReturnMap,
     start: &[f64],
-    aim: Aim,
-    beyond: Beyond,
+    aim: ClosingTargets,
+    beyond: LargeIncrease,
     iterations: &mut usize,
-) -> Result<Closed, OrbitError> {
+) -> Result<ClosedState, OrbitError> {
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     // a single increase is allowed only for cheap maps: an integration may take forever from a
     // remote state
-    let (mut state, mut bold) = (start.to_vec(), beyond == Beyond::Ends || aim.distance.is_finite());
+    let (mut state, mut bold) = (start.to_vec(), beyond == LargeIncrease::Ends || aim.distance.is_finite());
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
     let mut left = None; // state before the single increase, until the residual is below that again
@@ -452,7 +461,7 @@ pub(crate) fn descended(
                         accepted = true;
                         break;
                     }
-                    if beyond == Beyond::Ends && fraction <= 1.0 && after > WILD * before {
+                    if beyond == LargeIncrease::Ends && fraction <= 1.0 && after > WILD * before {
                         break;
                     }
                 }
@@ -462,13 +471,13 @@ pub(crate) fn descended(
             // undo the single increase, since no later step improved on it
             if residual > aim.residual
                 && *iterations < ITERATIONS
-                && beyond == Beyond::Shortens
+                && beyond == LargeIncrease::Shortens
                 && let Some((from, _, its_gap, its_derivative)) = left.take()
             {
                 (state, gap, derivative) = (from, its_gap, its_derivative);
                 continue;
             }
-            return Ok(Closed { state, gap, derivative, residual, iterations: *iterations, missing: None });
+            return Ok(ClosedState { state, gap, derivative, residual, iterations: *iterations, missing: None });
         }
     }
 }
@@ -477,7 +486,7 @@ pub(crate) fn descended(
 fn evaluate(
     map: &mut dyn ReturnMap,
     state: &[f64],
-    aim: Aim,
+    aim: ClosingTargets,
     derivative: &mut DMatrix<f64>,
 ) -> Result<DVector<f64>, IntegrationError> {
     let mut end = state.to_vec();

@@ -5,8 +5,8 @@
 
 use crate::law::Contact;
 use crate::method::flow::Flow;
-use crate::method::flow::average_acceleration::flow::IncrementalFlow;
-use crate::method::flow::integrator_choice::Kind;
+use crate::method::flow::average_acceleration::flow::AverageAccelerationFlow;
+use crate::method::flow::integrator_choice::IntegratorKind;
 use crate::model::{Axis, System};
 use crate::orbit::{ObservedMotion, Path, Sample, Symmetry};
 use std::collections::VecDeque;
@@ -49,10 +49,13 @@ type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
 ///
 /// Returns `None` if no integration in equal steps takes the system, or if it breaks down.
 pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option<Followed> {
-    if system.dofs() > LARGEST || system.joints().len() > JOINTS || Kind::of(system, None) != Kind::Incremental {
+    if system.dofs() > LARGEST
+        || system.joints().len() > JOINTS
+        || IntegratorKind::of(system, None) != IntegratorKind::Incremental
+    {
         return None;
     }
-    let mut flow = IncrementalFlow::new(system, None, "what follows a motion").ok()?;
+    let mut flow = AverageAccelerationFlow::new(system, None, "what follows a motion").ok()?;
     flow.count = STEPS;
     let (n, period) = (system.dofs(), TAU / omega);
     start.resize(flow.states(), 0.0);

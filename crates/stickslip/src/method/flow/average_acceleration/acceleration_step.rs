@@ -5,17 +5,17 @@
 //! `w = (linear in the state and the loads) - h/2 G (f₀ + f₁)`. Newton's method has one unknown
 //! per axis, for any number of masses.
 
-use super::law_step::{At, Follower};
+use super::law_step::{LawInstant, LawIntegrator};
 use crate::law::RelativeMotion;
-use crate::method::flow::assembly::{Assembly, PlacedLaw};
-use crate::method::flow::excitation::Drive;
+use crate::method::flow::assembly::{Assembly, IndexedLaw};
+use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
 use stickslip_numerics::small_lu::SmallLu;
 
 /// The eliminated structure for one step size.
 #[derive(Debug, Clone)]
-pub(super) struct Eliminated {
+pub(super) struct AccelerationElimination {
     pub length: f64,
     /// Matrices of the velocities at the end, as a function of displacements and velocities at
     /// the start (n × 2n). `from_load` multiplies the sum of the loads at start and end
@@ -30,7 +30,7 @@ pub(super) struct Eliminated {
     pub from_force_transposed: DMatrix<f64>,
 }
 
-impl Eliminated {
+impl AccelerationElimination {
     /// Eliminates the structure. Returns `None` if the matrix is singular.
     pub fn new(assembly: &Assembly, h: f64) -> Option<Self> {
         let n = assembly.n;
@@ -42,7 +42,7 @@ impl Eliminated {
         right.view_mut((0, n), (n, n)).copy_from(&(&assembly.mass - c - k));
         let from_force = &inverse * &assembly.directions * (-0.5 * h);
         let from_state = &inverse * right;
-        Some(Eliminated {
+        Some(AccelerationElimination {
             length: h,
             from_state_transposed: from_state.transpose(),
             from_force_transposed: from_force.transpose(),
@@ -59,9 +59,9 @@ type Relatives = Vec<RelativeMotion<f64>>;
 
 /// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
-pub(super) struct Step {
+pub(super) struct AccelerationStep {
     /// Evaluated laws, one per joint.
-    pub laws: Vec<Follower>,
+    pub laws: Vec<LawIntegrator>,
     /// Forces along the axes at the start and at the end, N.
     pub before: DVector<f64>,
     pub force: DVector<f64>,
@@ -91,12 +91,12 @@ const SMALL: f64 = 1e-13;
 /// Relative correction that is accepted if rounding prevents further convergence.
 const ENOUGH: f64 = 1e-9;
 
-impl Step {
+impl AccelerationStep {
     pub fn new(assembly: &Assembly) -> Self {
         let (n, j) = (assembly.n, assembly.axes.len());
         let still = vec![RelativeMotion::along(0.0, 0.0); assembly.joints.len()];
-        Step {
-            laws: assembly.joints.iter().map(Follower::new).collect(),
+        AccelerationStep {
+            laws: assembly.joints.iter().map(LawIntegrator::new).collect(),
             before: DVector::zeros(j),
             force: DVector::zeros(j),
             from: still.clone(),
@@ -113,13 +113,13 @@ impl Step {
     }
 
     /// Starts a run with the forces of the initial state.
-    pub fn start(&mut self, assembly: &Assembly, state: &[f64], drive: &Drive) {
+    pub fn start(&mut self, assembly: &Assembly, state: &[f64], drive: &HarmonicExcitation) {
         let n = assembly.n;
         drive.load(0.0, &mut self.loads[1]);
         for (q, joint) in assembly.joints.iter().enumerate() {
             self.to[q] = relative(assembly, q, state, drive, 0.0);
             let internal = joint.internal();
-            let at = At { motion: self.to[q], z: &state[2 * n + internal.start..2 * n + internal.end] };
+            let at = LawInstant { motion: self.to[q], z: &state[2 * n + internal.start..2 * n + internal.end] };
             let law = &mut self.laws[q];
             law.rest(&joint.law, at);
             joint.axes().zip(&law.force).for_each(|(axis, force)| self.force[axis] = *force);
@@ -131,8 +131,8 @@ impl Step {
     pub fn advance(
         &mut self,
         assembly: &Assembly,
-        eliminated: &Eliminated,
-        drive: &Drive,
+        eliminated: &AccelerationElimination,
+        drive: &HarmonicExcitation,
         (time, state): (f64, &mut [f64]),
         scale: f64,
     ) -> bool {
@@ -154,7 +154,7 @@ impl Step {
             self.unknown[axis] = along.component(&state[n..2 * n]);
         }
         for (q, joint) in assembly.joints.iter().enumerate() {
-            let at = At { motion: self.from[q], z: &self.z[joint.internal()] };
+            let at = LawInstant { motion: self.from[q], z: &self.z[joint.internal()] };
             self.laws[q].begin(&joint.law, at);
         }
         let mut converged = j == 0;
@@ -194,8 +194,8 @@ impl Step {
     }
 
     /// Returns the joint whose law returned NaN in the last attempt.
-    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a PlacedLaw> {
-        let broken = |law: &Follower| law.force.iter().chain(&law.state).any(|value| value.is_nan());
+    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a IndexedLaw> {
+        let broken = |law: &LawIntegrator| law.force.iter().chain(&law.state).any(|value| value.is_nan());
         assembly.joints.iter().zip(&self.laws).find_map(|(joint, law)| broken(law).then_some(joint))
     }
 
@@ -204,8 +204,8 @@ impl Step {
     fn evaluate(
         &mut self,
         assembly: &Assembly,
-        eliminated: &Eliminated,
-        drive: &Drive,
+        eliminated: &AccelerationElimination,
+        drive: &HarmonicExcitation,
         (time, v): (f64, &[f64]),
     ) -> bool {
         let (j, h) = (assembly.axes.len(), eliminated.length);
@@ -223,7 +223,7 @@ impl Step {
                 self.to[q].velocity[d] = self.unknown[axis] + speed;
             }
             let law = &mut self.laws[q];
-            let from = At { motion: self.from[q], z: &self.z[joint.internal()] };
+            let from = LawInstant { motion: self.from[q], z: &self.z[joint.internal()] };
             if !law.advance(&joint.law, from, &self.to[q], h) {
                 return false;
             }
@@ -243,7 +243,13 @@ impl Step {
 }
 
 /// Returns the motion of a joint in a state.
-fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f64) -> RelativeMotion<f64> {
+fn relative(
+    assembly: &Assembly,
+    q: usize,
+    state: &[f64],
+    drive: &HarmonicExcitation,
+    time: f64,
+) -> RelativeMotion<f64> {
     let mut motion = RelativeMotion::along(0.0, 0.0);
     for (d, axis) in assembly.joints[q].axes().enumerate() {
         (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, drive, time);
@@ -253,8 +259,8 @@ fn relative(assembly: &Assembly, q: usize, state: &[f64], drive: &Drive, time: f
 
 #[cfg(test)]
 mod tests {
-    use super::super::flow::IncrementalFlow;
-    use super::super::sensitivity::Carried;
+    use super::super::flow::AverageAccelerationFlow;
+    use super::super::sensitivity::Sensitivity;
     use super::*;
     use crate::law::{Cubic, Jenkins2d, SharedLaw};
     use crate::model::{Axis, System};
@@ -274,7 +280,7 @@ mod tests {
             builder = builder.joint("j".to_owned(), law, (0..n).map(|i| Axis::new(vec![(i, 1.0)])).collect());
         }
         let system = builder.build().unwrap();
-        let flow = IncrementalFlow::new(&system, None, "test").unwrap();
+        let flow = AverageAccelerationFlow::new(&system, None, "test").unwrap();
         (system, flow.assembly)
     }
 
@@ -285,11 +291,11 @@ mod tests {
         (h, count): (f64, usize),
         start: &[f64],
     ) -> (Vec<f64>, DMatrix<f64>) {
-        let (eliminated, drive) = (Eliminated::new(assembly, h).unwrap(), assembly.drive(system, 1.0));
-        let (mut step, mut state) = (Step::new(assembly), start.to_vec());
+        let (eliminated, drive) = (AccelerationElimination::new(assembly, h).unwrap(), assembly.drive(system, 1.0));
+        let (mut step, mut state) = (AccelerationStep::new(assembly), start.to_vec());
         let mut derivative = DMatrix::identity(start.len(), start.len());
         step.start(assembly, &state, &drive);
-        let mut carried = Carried::new(assembly, &step.laws, &derivative);
+        let mut carried = Sensitivity::new(assembly, &step.laws, &derivative);
         for k in 0..count {
             assert!(step.advance(assembly, &eliminated, &drive, (k as f64 * h, &mut state), 1.0));
             carried.advance(assembly, &eliminated, &step.laws, &step.lu);

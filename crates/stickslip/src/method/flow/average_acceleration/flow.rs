@@ -1,14 +1,14 @@
 //! Equal steps over a time interval, with their number controlled by the estimated error.
 
-use super::acceleration_step::{Eliminated, Step};
+use super::acceleration_step::{AccelerationElimination, AccelerationStep};
 use super::law_step;
-use super::sensitivity::Carried;
+use super::sensitivity::Sensitivity;
 use crate::law::IdealElement;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::{Assembly, NEAR_REST};
-use crate::method::flow::excitation::Drive;
-use crate::method::flow::step_record::{Steps, extrapolate};
-use crate::method::flow::trajectory::SteppedPath;
+use crate::method::flow::excitation::HarmonicExcitation;
+use crate::method::flow::step_record::{StepRecord, extrapolate};
+use crate::method::flow::trajectory::Trajectory;
 use crate::method::orbit_search::residual_traction::ElasticSlider;
 use crate::method::orbit_search::return_map::norm;
 use crate::method::{IntegrationError, MethodError};
@@ -36,16 +36,16 @@ const DROPS: &str =
     "its friction drops abruptly at the onset of slip; only a law with a `velocity` above zero can be regularized";
 
 /// Flow of a structure with any laws except rigid sliders.
-pub(crate) struct IncrementalFlow {
+pub(crate) struct AverageAccelerationFlow {
     pub assembly: Assembly,
-    pub drive: Drive,
+    pub drive: HarmonicExcitation,
     /// Number of steps of a run; the run uses the fraction `share` of it.
     pub count: usize,
     share: f64,
     keep: bool,
-    steps: Steps,
-    step: Step,
-    eliminated: Option<Eliminated>,
+    steps: StepRecord,
+    step: AccelerationStep,
+    eliminated: Option<AccelerationElimination>,
     /// Scratch memory: the loads at an instant.
     load: Vec<f64>,
 }
@@ -60,7 +60,7 @@ pub(crate) fn estimate(earlier: Option<f64>, last: f64) -> f64 {
     last / (ratio - 1.0)
 }
 
-impl IncrementalFlow {
+impl AverageAccelerationFlow {
     /// Creates the flow of a system.
     ///
     /// # Errors
@@ -81,13 +81,13 @@ impl IncrementalFlow {
                 None => Err("it defines neither a step view nor a rate view"),
             }
         })?;
-        Ok(IncrementalFlow {
-            drive: Drive::default(),
+        Ok(AverageAccelerationFlow {
+            drive: HarmonicExcitation::default(),
             count: FIRST,
             share: 1.0,
             keep: false,
-            steps: Steps::new(vec![(1.0, 1.0)], &assembly),
-            step: Step::new(&assembly),
+            steps: StepRecord::new(vec![(1.0, 1.0)], &assembly),
+            step: AccelerationStep::new(&assembly),
             eliminated: None,
             load: vec![0.0; assembly.n],
             assembly,
@@ -110,7 +110,7 @@ impl IncrementalFlow {
         springs
     }
 
-    /// Sets the limits of all sliders of [`IncrementalFlow::springs`].
+    /// Sets the limits of all sliders of [`AverageAccelerationFlow::springs`].
     pub fn limit(&mut self, springs: &[ElasticSlider]) {
         let mut limits = springs.iter().map(|spring| spring.limit);
         self.step.laws.iter_mut().for_each(|law| law.limit(&mut limits));
@@ -122,10 +122,10 @@ impl IncrementalFlow {
     }
 
     /// Runs from `state` and returns the end state with the record of the run.
-    fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, Steps), IntegrationError> {
+    fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, StepRecord), IntegrationError> {
         let mut end = state.to_vec();
         self.run(&mut end, duration, None)?;
-        let empty = Steps::new(self.steps.nodes.clone(), &self.assembly);
+        let empty = StepRecord::new(self.steps.nodes.clone(), &self.assembly);
         Ok((end, std::mem::replace(&mut self.steps, empty)))
     }
 
@@ -150,12 +150,12 @@ impl IncrementalFlow {
     }
 
     /// Returns the path of the last stored run, which repeats after `period`.
-    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
-        SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
+    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
+        Trajectory::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
     }
 }
 
-impl Flow for IncrementalFlow {
+impl Flow for AverageAccelerationFlow {
     fn states(&self) -> usize {
         self.assembly.states()
     }
@@ -185,13 +185,13 @@ impl Flow for IncrementalFlow {
         let count = (self.count as f64 * self.share).ceil();
         let h = duration / count;
         if self.eliminated.as_ref().is_none_or(|eliminated| eliminated.length != h) {
-            self.eliminated = Eliminated::new(&self.assembly, h);
+            self.eliminated = AccelerationElimination::new(&self.assembly, h);
         }
         let eliminated = self.eliminated.take().ok_or(IntegrationError::OutOfRange { time: 0.0 })?;
         self.steps.clear();
         self.step.start(&self.assembly, state, &self.drive);
         let mut carried =
-            sensitivity.as_deref().map(|sensitivity| Carried::new(&self.assembly, &self.step.laws, sensitivity));
+            sensitivity.as_deref().map(|sensitivity| Sensitivity::new(&self.assembly, &self.step.laws, sensitivity));
         // a preloaded joint can start the motion of a system at rest without loads
         let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
         let scale = self.assembly.scales(state, &self.drive).1.max(pushed);

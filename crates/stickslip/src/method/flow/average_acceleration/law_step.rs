@@ -7,7 +7,7 @@
 //! view is integrated by the trapezoidal rule, `z₁ = z₀ + h/2 (g₀ + g₁)`.
 
 use crate::law::{Contact, IdealElement, MAX_DIRECTIONS, RatePoint, RelativeMotion, SharedLaw, StepPoint};
-use crate::method::flow::assembly::PlacedLaw;
+use crate::method::flow::assembly::IndexedLaw;
 use stickslip_numerics::small_lu::SmallLu;
 
 /// The view used to evaluate a law.
@@ -65,7 +65,7 @@ pub(crate) fn moved(
     (from, states): ([f64; MAX_DIRECTIONS], &[f64]),
     to: [f64; MAX_DIRECTIONS],
 ) -> Vec<f64> {
-    let placed = PlacedLaw {
+    let placed = IndexedLaw {
         joint: String::new(),
         law: law.clone(),
         first_axis: 0,
@@ -74,7 +74,7 @@ pub(crate) fn moved(
         states: states.len(),
         state_scale,
     };
-    let mut follower = Follower::new(&placed);
+    let mut follower = LawIntegrator::new(&placed);
     let steps = if follower.view == View::Rate { SLOW_STEPS } else { 1 };
     let at = |step: usize| RelativeMotion {
         displacement: std::array::from_fn(|a| from[a] + (to[a] - from[a]) * step as f64 / steps as f64),
@@ -82,7 +82,7 @@ pub(crate) fn moved(
     };
     let mut z = states.to_vec();
     for step in 1..=steps {
-        let begin = At { motion: at(step - 1), z: &z };
+        let begin = LawInstant { motion: at(step - 1), z: &z };
         follower.begin(law, begin);
         if !follower.advance(law, begin, &at(step), 1.0 / steps as f64) {
             return states.to_vec();
@@ -111,14 +111,14 @@ pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
 
 /// Motion and states of a law at one instant.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct At<'a> {
+pub(super) struct LawInstant<'a> {
     pub motion: RelativeMotion<f64>,
     pub z: &'a [f64],
 }
 
 /// Integrates one law, with its scratch memory.
 #[derive(Debug, Clone)]
-pub(super) struct Follower {
+pub(super) struct LawIntegrator {
     view: View,
     pieces: Vec<IdealElement>,
     directions: usize,
@@ -149,11 +149,11 @@ const SMALL: f64 = 1e-13;
 /// Relative change that is accepted if rounding prevents further convergence.
 const ENOUGH: f64 = 1e-9;
 
-impl Follower {
+impl LawIntegrator {
     /// Creates it for a law with [`states`].
-    pub fn new(joint: &PlacedLaw) -> Self {
+    pub fn new(joint: &IndexedLaw) -> Self {
         let (directions, states) = (joint.directions, joint.states);
-        Follower {
+        LawIntegrator {
             view: view(&joint.law).unwrap_or(View::Rate),
             pieces: pieces(&joint.law),
             directions,
@@ -211,7 +211,7 @@ impl Follower {
 
     /// Evaluates the force of a state, as a step of zero length. The derivatives with respect
     /// to the motion are stored at u₁ and u₁'.
-    pub fn rest(&mut self, law: &SharedLaw, at: At) {
+    pub fn rest(&mut self, law: &SharedLaw, at: LawInstant) {
         if self.view == View::Rate {
             self.slopes.fill(0.0);
             let (directions, states, width) = (self.directions, self.states, self.arguments());
@@ -233,7 +233,7 @@ impl Follower {
     }
 
     /// Prepares for a step from this instant.
-    pub fn begin(&mut self, law: &SharedLaw, from: At) {
+    pub fn begin(&mut self, law: &SharedLaw, from: LawInstant) {
         self.state.copy_from_slice(from.z);
         if let (View::Rate, Some(rate)) = (self.view, law.rate()) {
             rate.evaluate_with_derivatives(self.directions, &from.motion, from.z, &mut self.before);
@@ -242,7 +242,7 @@ impl Follower {
 
     /// Evaluates the step of size `h` (s) from `from` to `to`. Returns false if the states at
     /// its end are not found.
-    pub fn advance(&mut self, law: &SharedLaw, from: At, to: &RelativeMotion<f64>, h: f64) -> bool {
+    pub fn advance(&mut self, law: &SharedLaw, from: LawInstant, to: &RelativeMotion<f64>, h: f64) -> bool {
         self.slopes.fill(0.0);
         match self.view {
             View::Pieces => {
@@ -258,7 +258,7 @@ impl Follower {
     }
 
     /// Evaluates one step of a law with a step view; in a plane, also two half steps.
-    fn step_over(&mut self, law: &SharedLaw, from: At, to: &RelativeMotion<f64>) {
+    fn step_over(&mut self, law: &SharedLaw, from: LawInstant, to: &RelativeMotion<f64>) {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(step) = law.step() else { return };
         let (start, end) = (&from.motion.displacement, &to.displacement);
@@ -308,7 +308,7 @@ impl Follower {
     }
 
     /// Evaluates stops and ideal sliders in series with springs, whose forces are the states.
-    fn slide(&mut self, from: At, to: &RelativeMotion<f64>) {
+    fn slide(&mut self, from: LawInstant, to: &RelativeMotion<f64>) {
         let (states, width) = (self.states, self.arguments());
         let (u0, u1) = (from.motion.displacement[0], to.displacement[0]);
         let (z, after) = (2, 2 + states); // arguments: u₀, u₀', z₀, u₁, u₁'
@@ -346,7 +346,7 @@ impl Follower {
     }
 
     /// Solves `z₁ = z₀ + h/2 (g₀ + g₁)` by Newton's method, and computes the derivatives.
-    fn integrate(&mut self, law: &SharedLaw, from: At, to: &RelativeMotion<f64>, h: f64) -> bool {
+    fn integrate(&mut self, law: &SharedLaw, from: LawInstant, to: &RelativeMotion<f64>, h: f64) -> bool {
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(rate) = law.rate() else { return false };
         let half = 0.5 * h;

@@ -4,15 +4,15 @@
 //! axis velocities at its end through the laws. Each derivative of a coordinate is contiguous
 //! in memory, with one entry per column, so that all columns are carried at once.
 
-use super::acceleration_step::Eliminated;
-use super::law_step::Follower;
-use crate::method::flow::assembly::{Assembly, PlacedLaw};
+use super::acceleration_step::AccelerationElimination;
+use super::law_step::LawIntegrator;
+use crate::method::flow::assembly::{Assembly, IndexedLaw};
 use nalgebra::DMatrix;
 use stickslip_numerics::small_lu::SmallLu;
 
 /// Derivatives with respect to the initial state of a run. Each matrix has one column per
 /// coordinate.
-pub(super) struct Carried {
+pub(super) struct Sensitivity {
     /// Derivatives of the state, columns × states.
     state: DMatrix<f64>,
     /// Derivatives of the forces along the axes, N, columns × axes.
@@ -36,11 +36,11 @@ fn add(out: &mut [f64], factor: f64, column: &[f64]) {
     }
 }
 
-impl Carried {
+impl Sensitivity {
     /// Starts a run after the laws were evaluated for a step of zero length.
-    pub fn new(assembly: &Assembly, laws: &[Follower], sensitivity: &DMatrix<f64>) -> Self {
+    pub fn new(assembly: &Assembly, laws: &[LawIntegrator], sensitivity: &DMatrix<f64>) -> Self {
         let (n, axes, columns) = (assembly.n, assembly.axes.len(), sensitivity.ncols());
-        let mut carried = Carried {
+        let mut carried = Sensitivity {
             state: sensitivity.transpose(),
             force: DMatrix::zeros(columns, axes),
             velocity: DMatrix::zeros(columns, n),
@@ -70,7 +70,13 @@ impl Carried {
     }
 
     /// Carries the derivatives over the last step of the laws, whose equations are factored.
-    pub fn advance(&mut self, assembly: &Assembly, eliminated: &Eliminated, laws: &[Follower], lu: &SmallLu) {
+    pub fn advance(
+        &mut self,
+        assembly: &Assembly,
+        eliminated: &AccelerationElimination,
+        laws: &[LawIntegrator],
+        lu: &SmallLu,
+    ) {
         let (n, axes, h) = (assembly.n, assembly.axes.len(), eliminated.length);
         let columns = self.state.nrows();
         if columns == 0 {
@@ -152,7 +158,7 @@ fn row(rows: &[f64], index: usize, columns: usize) -> &[f64] {
 fn known(
     out: &mut [f64],
     slope: &[f64],
-    (joint, axes): (&PlacedLaw, usize),
+    (joint, axes): (&IndexedLaw, usize),
     (along, state, first): (&[f64], &DMatrix<f64>, usize),
     h: f64,
 ) {

@@ -8,7 +8,7 @@
 //! estimate is eliminated in the same way.
 
 use crate::law::{RatePoint, RelativeMotion};
-use crate::method::flow::assembly::{Assembly, PlacedLaw};
+use crate::method::flow::assembly::{Assembly, IndexedLaw};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
 use stickslip_numerics::radau::{BUTCHER_MATRIX, ERROR_WEIGHTS, NODES, REAL_EIGENVALUE, STAGES, matrix_squared};
@@ -17,7 +17,7 @@ use stickslip_numerics::small_matvec::{add_matmul_row_major, add_matvec, axpy};
 
 /// The eliminated structure for one step size.
 #[derive(Debug, Clone)]
-pub(crate) struct Eliminated {
+pub(crate) struct RadauElimination {
     pub length: f64,
     /// The Runge-Kutta matrix times the step size.
     weights: [[f64; STAGES]; STAGES],
@@ -40,7 +40,7 @@ pub(crate) struct Eliminated {
     filter: [DMatrix<f64>; 3],
 }
 
-impl Eliminated {
+impl RadauElimination {
     pub fn new(assembly: &Assembly, h: f64) -> Self {
         let (n, j) = (assembly.n, assembly.axes.len());
         let a2 = matrix_squared();
@@ -109,7 +109,7 @@ impl Eliminated {
         let rate = REAL_EIGENVALUE / h;
         let p = inverted(&assembly.mass * rate + &assembly.damping + &assembly.stiffness / rate);
         let pw = &p * &assembly.directions;
-        Eliminated {
+        RadauElimination {
             length: h,
             weights: BUTCHER_MATRIX.map(|row| row.map(|a| h * a)),
             velocity_from_state: velocity(&stage_from_state),
@@ -144,7 +144,7 @@ pub(crate) struct StageLoads {
 
 /// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
-pub(crate) struct Step {
+pub(crate) struct RadauStep {
     /// Unknowns: stage velocities along the axes (stage by stage), then internal states (stage
     /// by stage).
     pub unknown: Vec<f64>,
@@ -157,7 +157,7 @@ pub(crate) struct Step {
     pub points: Vec<RatePoint>,
     /// Displacements and velocities at the start.
     linear: DVector<f64>,
-    /// All stage displacements and velocities, X₁…X₅V₁…V₅, valid after [`Step::set_stages`].
+    /// All stage displacements and velocities, X₁…X₅V₁…V₅, valid after [`RadauStep::set_stages`].
     pub stages: DVector<f64>,
     free: DVector<f64>,
     structural: Vec<f64>,
@@ -195,10 +195,10 @@ fn at_state(assembly: &Assembly, stage: usize, s: usize) -> usize {
     STAGES * assembly.axes.len() + stage * assembly.internal + s
 }
 
-impl Step {
+impl RadauStep {
     pub fn new(assembly: &Assembly) -> Self {
         let (j, unknowns) = (assembly.axes.len(), STAGES * (assembly.axes.len() + assembly.internal));
-        Step {
+        RadauStep {
             unknown: vec![0.0; unknowns],
             held: vec![false; j],
             force: DVector::zeros(STAGES * j),
@@ -219,12 +219,12 @@ impl Step {
 
     /// Solves the step from `state`, with `self.unknown` as the initial guess.
     ///
-    /// `derivatives` requests the factors at the solution for [`Step::carry`]. Returns false if
+    /// `derivatives` requests the factors at the solution for [`RadauStep::carry`]. Returns false if
     /// the iteration does not converge.
     pub fn solve(
         &mut self,
         assembly: &Assembly,
-        eliminated: &Eliminated,
+        eliminated: &RadauElimination,
         loads: &StageLoads,
         state: &[f64],
         (velocity_scale, derivatives): (f64, bool),
@@ -284,14 +284,14 @@ impl Step {
     }
 
     /// Returns the joint whose law returned NaN in the last attempt.
-    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a PlacedLaw> {
+    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a IndexedLaw> {
         let broken = |point: &RatePoint| point.force.iter().chain(&point.rate).any(|value| value.is_nan());
         let joints = assembly.joints.iter().cycle();
         joints.zip(&self.points).find_map(|(joint, point)| broken(point).then_some(joint))
     }
 
     /// Evaluates the laws at the present unknowns.
-    fn evaluate(&mut self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads) {
+    fn evaluate(&mut self, assembly: &Assembly, eliminated: &RadauElimination, loads: &StageLoads) {
         let j = assembly.axes.len();
         let (unknown, stages) = (&self.unknown[..STAGES * j], &loads.stage[..STAGES * j]);
         for (axis, moving) in self.moving.iter_mut().enumerate() {
@@ -323,7 +323,7 @@ impl Step {
     }
 
     /// Computes residual and Jacobian from the laws at the present unknowns.
-    fn linearise(&mut self, assembly: &Assembly, eliminated: &Eliminated, state: &[f64]) {
+    fn linearise(&mut self, assembly: &Assembly, eliminated: &RadauElimination, state: &[f64]) {
         // constant sizes for the compiler: one axis, without states
         match (assembly.axes.len(), self.unknown.len()) {
             (1, STAGES) => self.differentiate(assembly, eliminated, state, (1, STAGES)),
@@ -335,7 +335,7 @@ impl Step {
     fn differentiate(
         &mut self,
         assembly: &Assembly,
-        eliminated: &Eliminated,
+        eliminated: &RadauElimination,
         state: &[f64],
         (j, unknowns): (usize, usize),
     ) {
@@ -413,7 +413,7 @@ impl Step {
     }
 
     /// Computes the state at the end of the last solved step.
-    pub fn end(&self, assembly: &Assembly, eliminated: &Eliminated, loads: &StageLoads, out: &mut [f64]) {
+    pub fn end(&self, assembly: &Assembly, eliminated: &RadauElimination, loads: &StageLoads, out: &mut [f64]) {
         let n = assembly.n;
         self.combine(&eliminated.end, loads, &mut out[..2 * n]);
         let last = at_state(assembly, STAGES - 1, 0);
@@ -421,7 +421,7 @@ impl Step {
     }
 
     /// Computes the displacements and velocities at all stages of the last solved step.
-    pub fn set_stages(&mut self, eliminated: &Eliminated, loads: &StageLoads) {
+    pub fn set_stages(&mut self, eliminated: &RadauElimination, loads: &StageLoads) {
         let out = &mut self.stages;
         out.gemv(1.0, &eliminated.stage_from_state, &self.linear, 0.0);
         out.gemv(1.0, &eliminated.stage_from_load, &loads.force, 1.0);
@@ -438,7 +438,13 @@ impl Step {
     /// Carries a sensitivity over the last solved step: row by row, states × columns. The
     /// operations act on whole rows, because these matrices are small and only the rows are
     /// long.
-    pub fn carry(&mut self, assembly: &Assembly, eliminated: &Eliminated, derivative: &mut [f64], columns: usize) {
+    pub fn carry(
+        &mut self,
+        assembly: &Assembly,
+        eliminated: &RadauElimination,
+        derivative: &mut [f64],
+        columns: usize,
+    ) {
         if derivative.is_empty() {
             return; // a joint with imposed motion only, without states
         }
@@ -528,7 +534,7 @@ impl Step {
     pub fn raw_error(
         &self,
         assembly: &Assembly,
-        eliminated: &Eliminated,
+        eliminated: &RadauElimination,
         loads: &StageLoads,
         (state, slope): (&[f64], &[f64]),
         out: &mut [f64],
@@ -546,18 +552,18 @@ impl Step {
 
     /// Prepares the filter for the laws `at` the start of the step. Returns false if it is
     /// singular.
-    pub fn prepare_filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint]) -> bool {
+    pub fn prepare_filter(&mut self, assembly: &Assembly, eliminated: &RadauElimination, at: &[RatePoint]) -> bool {
         self.filter.prepare(assembly, eliminated, at, &self.held)
     }
 
     /// Applies the filter to an error estimate, so that stiff components do not dominate.
-    pub fn filter(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
+    pub fn filter(&mut self, assembly: &Assembly, eliminated: &RadauElimination, at: &[RatePoint], error: &mut [f64]) {
         self.filter.apply(assembly, eliminated, at, error);
     }
 
     /// Applies the filter with the laws at the end of the last solved step. Returns false if
     /// that filter is singular.
-    pub fn filter_at_end(&mut self, assembly: &Assembly, eliminated: &Eliminated, error: &mut [f64]) -> bool {
+    pub fn filter_at_end(&mut self, assembly: &Assembly, eliminated: &RadauElimination, error: &mut [f64]) -> bool {
         let at = &self.points[(STAGES - 1) * assembly.joints.len()..];
         let regular = self.filter.prepare(assembly, eliminated, at, &self.held);
         if regular {
@@ -620,7 +626,7 @@ impl Filter {
         }
     }
 
-    fn prepare(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], held: &[bool]) -> bool {
+    fn prepare(&mut self, assembly: &Assembly, eliminated: &RadauElimination, at: &[RatePoint], held: &[bool]) -> bool {
         let (rate, j) = (REAL_EIGENVALUE / eliminated.length, assembly.axes.len());
         self.rate = rate;
         for (q, (joint, point)) in assembly.joints.iter().zip(at).enumerate() {
@@ -662,7 +668,7 @@ impl Filter {
         self.axes.factor()
     }
 
-    fn apply(&mut self, assembly: &Assembly, eliminated: &Eliminated, at: &[RatePoint], error: &mut [f64]) {
+    fn apply(&mut self, assembly: &Assembly, eliminated: &RadauElimination, at: &[RatePoint], error: &mut [f64]) {
         let (n, rate) = (assembly.n, self.rate);
         let [p, pw, g] = &eliminated.filter;
         let (linear, internal) = error.split_at_mut(2 * n);
@@ -743,8 +749,8 @@ mod tests {
         load: &dyn Fn(f64) -> f64,
         start: &[f64],
     ) -> (Vec<f64>, Vec<f64>) {
-        let (eliminated, states) = (Eliminated::new(assembly, h), assembly.states());
-        let mut step = Step::new(assembly);
+        let (eliminated, states) = (RadauElimination::new(assembly, h), assembly.states());
+        let mut step = RadauStep::new(assembly);
         let mut state = start.to_vec();
         let mut derivative = DMatrix::<f64>::identity(states, states).as_slice().to_vec();
         for k in 0..count {

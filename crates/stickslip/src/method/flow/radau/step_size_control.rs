@@ -4,14 +4,14 @@
 //! Therefore all steps of one size share one elimination of the structure, and every run over
 //! the same interval ends exactly at its end.
 
-use super::radau_step::{Eliminated, StageLoads, Step, points};
+use super::radau_step::{RadauElimination, RadauStep, StageLoads, points};
 use crate::law::{RatePoint, RelativeMotion};
 use crate::method::IntegrationError;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::Assembly;
-use crate::method::flow::excitation::Drive;
-use crate::method::flow::step_record::Steps;
-use crate::method::flow::trajectory::SteppedPath;
+use crate::method::flow::excitation::HarmonicExcitation;
+use crate::method::flow::step_record::StepRecord;
+use crate::method::flow::trajectory::Trajectory;
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
@@ -41,7 +41,7 @@ const GROWN: usize = 2;
 
 /// The source of the step sizes of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Lengths {
+pub(crate) enum StepSizes {
     /// The error estimate of each step.
     Chosen,
     /// The steps of the last run, halved where the error requires it.
@@ -55,14 +55,14 @@ pub(crate) enum Lengths {
 }
 
 /// Flow of a structure with smooth laws.
-pub(crate) struct SmoothFlow {
+pub(crate) struct RadauFlow {
     pub assembly: Assembly,
-    pub drive: Drive,
+    pub drive: HarmonicExcitation,
     /// Relative error per step.
     pub tolerance: f64,
     keep: bool,
-    steps: Steps,
-    pub lengths: Lengths,
+    steps: StepRecord,
+    pub lengths: StepSizes,
     /// Levels of the accepted steps of the last run, in order. `chosen` is their number when
     /// they were chosen.
     mesh: Vec<usize>,
@@ -73,11 +73,11 @@ pub(crate) struct SmoothFlow {
     rejected: usize,
     again: bool,
     stretch: f64,
-    eliminated: Vec<Option<Eliminated>>,
+    eliminated: Vec<Option<RadauElimination>>,
     /// Extrapolation weights from the stages of one step to those of the next one, by the
     /// difference of their levels.
     onward: Vec<Option<[[f64; STAGES]; STAGES]>>,
-    step: Step,
+    step: RadauStep,
     loads: StageLoads,
     level: usize,
     /// The laws and the time derivative of the state at the start of the step.
@@ -96,16 +96,16 @@ pub(crate) struct SmoothFlow {
     force: Vec<f64>,
 }
 
-impl SmoothFlow {
+impl RadauFlow {
     pub fn new(assembly: Assembly, tolerance: f64) -> Self {
         let (states, n, j) = (assembly.states(), assembly.n, assembly.axes.len());
         let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
-        SmoothFlow {
-            drive: Drive::default(),
+        RadauFlow {
+            drive: HarmonicExcitation::default(),
             tolerance,
             keep: false,
-            steps: Steps::new(nodes, &assembly),
-            lengths: Lengths::Chosen,
+            steps: StepRecord::new(nodes, &assembly),
+            lengths: StepSizes::Chosen,
             mesh: Vec::new(),
             chosen: 0,
             accepted: 0,
@@ -114,7 +114,7 @@ impl SmoothFlow {
             stretch: 0.0,
             eliminated: vec![None; LEVELS + 1],
             onward: vec![None; 2 * LEVELS + 1],
-            step: Step::new(&assembly),
+            step: RadauStep::new(&assembly),
             loads: StageLoads::default(),
             level: FIRST_LEVEL,
             laws: points(&assembly),
@@ -332,8 +332,8 @@ impl SmoothFlow {
 
     /// Returns the size of the next attempt (s), or `None` at the step limit. Sets the level if
     /// the mesh is given.
-    fn attempt(&mut self, lengths: Lengths, tick: f64) -> Option<f64> {
-        if lengths != Lengths::Chosen {
+    fn attempt(&mut self, lengths: StepSizes, tick: f64) -> Option<f64> {
+        if lengths != StepSizes::Chosen {
             // the mesh covers the interval exactly
             self.level = self.mesh[self.accepted];
         }
@@ -342,15 +342,15 @@ impl SmoothFlow {
             return None;
         }
         if self.eliminated[self.level].is_none() {
-            self.eliminated[self.level] = Some(Eliminated::new(&self.assembly, h));
+            self.eliminated[self.level] = Some(RadauElimination::new(&self.assembly, h));
         }
         Some(h)
     }
 
     /// Reduces the step after a failed attempt. Returns false if it is already the smallest.
-    fn shorten(&mut self, lengths: Lengths, error: f64) -> bool {
+    fn shorten(&mut self, lengths: StepSizes, error: f64) -> bool {
         self.rejected += 1;
-        if lengths != Lengths::Chosen {
+        if lengths != StepSizes::Chosen {
             // a layer has moved out of its small steps; split this step of the mesh into two
             // halves
             if self.level == LEVELS {
@@ -389,7 +389,7 @@ pub(in crate::method) fn slope(
     assembly: &Assembly,
     (state, load, force): (&[f64], &mut [f64], &mut [f64]),
     laws: &[RatePoint],
-    drive: &Drive,
+    drive: &HarmonicExcitation,
     time: f64,
     out: &mut [f64],
 ) {
@@ -405,7 +405,7 @@ pub(in crate::method) fn slope(
     }
 }
 
-impl Flow for SmoothFlow {
+impl Flow for RadauFlow {
     fn states(&self) -> usize {
         self.assembly.states()
     }
@@ -447,11 +447,11 @@ impl Flow for SmoothFlow {
         // same level, for equal bits
         self.level = FIRST_LEVEL;
         let lengths = match self.lengths {
-            Lengths::Halved if self.mesh.len() > GROWN * self.chosen => Lengths::Chosen,
-            _ if self.mesh.is_empty() => Lengths::Chosen,
+            StepSizes::Halved if self.mesh.len() > GROWN * self.chosen => StepSizes::Chosen,
+            _ if self.mesh.is_empty() => StepSizes::Chosen,
             lengths => lengths,
         };
-        if lengths == Lengths::Chosen {
+        if lengths == StepSizes::Chosen {
             self.mesh.clear();
         }
         let joints = self.assembly.joints.len();
@@ -478,8 +478,8 @@ impl Flow for SmoothFlow {
             let how = (scale.1, sensitivity.is_some());
             let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, how);
             let error = match (solved, lengths) {
-                (true, Lengths::Repeated) => 0.0,
-                (true, Lengths::Chosen | Lengths::Halved) => self.error(state, time, scale),
+                (true, StepSizes::Repeated) => 0.0,
+                (true, StepSizes::Chosen | StepSizes::Halved) => self.error(state, time, scale),
                 (false, _) => f64::INFINITY,
             };
             self.again = !error.is_finite() || error > 1.0;
@@ -501,7 +501,7 @@ impl Flow for SmoothFlow {
             }
             // the last stage is the end of the step
             self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
-            if lengths != Lengths::Repeated {
+            if lengths != StepSizes::Repeated {
                 let work = (self.next.as_slice(), self.load.as_mut_slice(), self.force.as_mut_slice());
                 slope(&self.assembly, work, &self.laws, &self.drive, time + h, &mut self.next_slope);
                 std::mem::swap(&mut self.slope, &mut self.next_slope);
@@ -515,7 +515,7 @@ impl Flow for SmoothFlow {
             std::mem::swap(&mut self.previous, &mut self.step.unknown);
             self.step.unknown.resize(self.previous.len(), 0.0);
             self.accepted += 1;
-            if lengths == Lengths::Chosen {
+            if lengths == StepSizes::Chosen {
                 self.mesh.push(self.level);
             }
             position += ticks;
@@ -528,7 +528,7 @@ impl Flow for SmoothFlow {
                 self.level -= 1;
             }
         }
-        if lengths == Lengths::Chosen {
+        if lengths == StepSizes::Chosen {
             self.chosen = self.mesh.len();
         }
         if let Some(sensitivity) = sensitivity {
@@ -549,9 +549,9 @@ impl Flow for SmoothFlow {
     }
 }
 
-impl SmoothFlow {
+impl RadauFlow {
     /// Returns the path of the last stored run, which repeats after `period`.
-    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
-        SteppedPath::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
+    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
+        Trajectory::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
     }
 }

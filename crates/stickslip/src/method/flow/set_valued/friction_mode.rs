@@ -6,18 +6,18 @@ use stickslip_numerics::dual::Real;
 
 /// The mode of a joint until the next switch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Mode {
+pub(super) enum FrictionMode {
     /// The joint sticks: its relative velocity is zero, and the force is the reaction.
     Held,
     /// The joint slips in the direction of this sign.
     Slip(f64),
 }
 
-impl Mode {
+impl FrictionMode {
     pub fn contact(self) -> Contact {
         match self {
-            Mode::Held => Contact::Stick,
-            Mode::Slip(sign) => Contact::slip(sign),
+            FrictionMode::Held => Contact::Stick,
+            FrictionMode::Slip(sign) => Contact::slip(sign),
         }
     }
 }
@@ -25,20 +25,20 @@ impl Mode {
 /// A law of friction in one mode. In stick, the unknown is the force instead of the velocity,
 /// scaled like a damper with coefficient `unit`.
 #[derive(Debug, Clone)]
-struct InMode {
+struct LawInMode {
     law: SharedLaw,
-    mode: Mode,
+    mode: FrictionMode,
     /// Force per unknown of a stuck joint, N s/m. It gives the unknown the magnitude of a
     /// velocity.
     unit: f64,
 }
 
 /// Returns the law of a joint in a mode.
-pub(super) fn in_mode(law: &SharedLaw, mode: Mode, unit: f64) -> SharedLaw {
-    Arc::new(InMode { law: law.clone(), mode, unit })
+pub(super) fn in_mode(law: &SharedLaw, mode: FrictionMode, unit: f64) -> SharedLaw {
+    Arc::new(LawInMode { law: law.clone(), mode, unit })
 }
 
-impl Law for InMode {
+impl Law for LawInMode {
     fn info(&self) -> &'static LawInfo {
         self.law.info()
     }
@@ -56,12 +56,12 @@ impl Law for InMode {
     }
 }
 
-impl RateLaw for InMode {
+impl RateLaw for LawInMode {
     fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; MAX_DIRECTIONS] {
         let v = motion.velocity[0];
         let force = match self.mode {
-            Mode::Held => v * self.unit,
-            Mode::Slip(sign) => {
+            FrictionMode::Held => v * self.unit,
+            FrictionMode::Slip(sign) => {
                 let (force, slope) = self.law.sliding().map_or((0.0, 0.0), |law| law.slip_force(v.re()));
                 ((v - v.re()) * slope + force) * sign
             }

@@ -10,16 +10,16 @@
 //! order 9. The motion continues in the new modes. The first steps after a switch return to the
 //! ticks.
 
-use super::friction_mode::{Mode, in_mode};
+use super::friction_mode::{FrictionMode, in_mode};
 use super::transition::{decide, mobility, saltate, stop};
 use crate::law::{RatePoint, RelativeMotion, SharedLaw};
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::Assembly;
-use crate::method::flow::excitation::Drive;
-use crate::method::flow::radau::radau_step::{Eliminated, StageLoads, Step, points};
+use crate::method::flow::excitation::HarmonicExcitation;
+use crate::method::flow::radau::radau_step::{RadauElimination, RadauStep, StageLoads, points};
 use crate::method::flow::radau::step_size_control::{onward, slope};
-use crate::method::flow::step_record::Steps;
-use crate::method::flow::trajectory::SteppedPath;
+use crate::method::flow::step_record::StepRecord;
+use crate::method::flow::trajectory::Trajectory;
 use crate::method::{IntegrationError, MethodError};
 use crate::model::System;
 use crate::orbit::{Path, Symmetry};
@@ -48,13 +48,13 @@ const LOOKS: usize = 8;
 const LOCATED: usize = 12;
 
 /// A joint with set-valued friction.
-struct Friction {
+struct FrictionJoint {
     joint: usize,
     axis: usize,
     law: SharedLaw,
     /// Static limit of the force, N.
     limit: f64,
-    mode: Mode,
+    mode: FrictionMode,
     /// Its law in each mode, for the present velocity scale: stuck, forward slip, backward
     /// slip.
     laws: [SharedLaw; 3],
@@ -62,22 +62,22 @@ struct Friction {
     unit: f64,
 }
 
-impl Friction {
+impl FrictionJoint {
     fn in_modes(law: &SharedLaw, unit: f64) -> [SharedLaw; 3] {
-        [Mode::Held, Mode::Slip(1.0), Mode::Slip(-1.0)].map(|mode| in_mode(law, mode, unit))
+        [FrictionMode::Held, FrictionMode::Slip(1.0), FrictionMode::Slip(-1.0)].map(|mode| in_mode(law, mode, unit))
     }
 
     fn now(&self) -> &SharedLaw {
         match self.mode {
-            Mode::Held => &self.laws[0],
-            Mode::Slip(sign) => &self.laws[if sign > 0.0 { 1 } else { 2 }],
+            FrictionMode::Held => &self.laws[0],
+            FrictionMode::Slip(sign) => &self.laws[if sign > 0.0 { 1 } else { 2 }],
         }
     }
 }
 
 /// Start of the present step, s, and its tick.
 #[derive(Clone, Copy)]
-struct Begin {
+struct StepBegin {
     time: f64,
     /// Number of the tick; `None` after a switch, when the time is between two ticks.
     tick: Option<u64>,
@@ -92,20 +92,20 @@ struct Switch {
 }
 
 /// Flow of a structure with set-valued friction and smooth laws.
-pub(crate) struct SwitchedFlow {
+pub(crate) struct SetValuedFlow {
     /// The assembly with the laws of the present modes.
     pub assembly: Assembly,
     /// The assembly with the original laws.
     plain: Assembly,
-    pub drive: Drive,
+    pub drive: HarmonicExcitation,
     /// Relative error per step.
     pub tolerance: f64,
     keep: bool,
-    steps: Steps,
-    frictions: Vec<Friction>,
+    steps: StepRecord,
+    frictions: Vec<FrictionJoint>,
     stretch: f64,
-    eliminated: Vec<Option<Eliminated>>,
-    step: Step,
+    eliminated: Vec<Option<RadauElimination>>,
+    step: RadauStep,
     loads: StageLoads,
     level: usize,
     tried: usize,
@@ -121,7 +121,7 @@ pub(crate) struct SwitchedFlow {
     force: Vec<f64>,
 }
 
-impl SwitchedFlow {
+impl SetValuedFlow {
     /// Creates the flow of a system.
     ///
     /// # Errors
@@ -131,23 +131,24 @@ impl SwitchedFlow {
         let frictions = plain.joints.iter().enumerate().filter_map(|(joint, placed)| {
             let law = placed.law.clone();
             let limit = law.sliding()?.slip_force(0.0).0;
-            let laws = Friction::in_modes(&law, 1.0);
-            let friction = Friction { joint, axis: placed.first_axis, law, limit, mode: Mode::Held, laws, unit: 1.0 };
+            let laws = FrictionJoint::in_modes(&law, 1.0);
+            let friction =
+                FrictionJoint { joint, axis: placed.first_axis, law, limit, mode: FrictionMode::Held, laws, unit: 1.0 };
             (limit > 0.0).then_some(friction)
         });
         let frictions = frictions.collect();
         let (states, n, j) = (plain.states(), plain.n, plain.axes.len());
         let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
-        Ok(SwitchedFlow {
+        Ok(SetValuedFlow {
             assembly: plain.clone(),
-            drive: Drive::default(),
+            drive: HarmonicExcitation::default(),
             tolerance,
             keep: false,
-            steps: Steps::with_jumps(nodes, &plain),
+            steps: StepRecord::with_jumps(nodes, &plain),
             frictions,
             stretch: 0.0,
             eliminated: vec![None; LEVELS + 1],
-            step: Step::new(&plain),
+            step: RadauStep::new(&plain),
             loads: StageLoads::default(),
             level: FIRST_LEVEL,
             tried: 0,
@@ -165,8 +166,8 @@ impl SwitchedFlow {
     }
 
     /// Returns the path of the last stored run, which repeats after `period`.
-    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
-        SteppedPath::new((system, &self.plain), &self.drive, &self.steps, (symmetry, period))
+    pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
+        Trajectory::new((system, &self.plain), &self.drive, &self.steps, (symmetry, period))
     }
 
     /// Returns the relative velocity along an axis.
@@ -180,8 +181,8 @@ impl SwitchedFlow {
         self.assembly.axes[axis].component(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
     }
 
-    fn held(&self) -> impl Iterator<Item = &Friction> {
-        self.frictions.iter().filter(|friction| friction.mode == Mode::Held)
+    fn held(&self) -> impl Iterator<Item = &FrictionJoint> {
+        self.frictions.iter().filter(|friction| friction.mode == FrictionMode::Held)
     }
 
     /// Sets the law of every joint to that of its mode.
@@ -189,7 +190,7 @@ impl SwitchedFlow {
         self.step.held.fill(false);
         for friction in &self.frictions {
             self.assembly.joints[friction.joint].law = friction.now().clone();
-            self.step.held[friction.axis] = friction.mode == Mode::Held;
+            self.step.held[friction.axis] = friction.mode == FrictionMode::Held;
         }
     }
 
@@ -225,7 +226,7 @@ impl SwitchedFlow {
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
-            let holds = |friction: &Friction| friction.joint == q && friction.mode == Mode::Held;
+            let holds = |friction: &FrictionJoint| friction.joint == q && friction.mode == FrictionMode::Held;
             if self.frictions.iter().any(holds) {
                 motion = RelativeMotion::along(0.0, 0.0);
             }
@@ -250,10 +251,10 @@ impl SwitchedFlow {
         for k in 0..self.frictions.len() {
             let friction = &self.frictions[k];
             let (velocity, unit) = (self.velocity(friction.axis, state, 0.0), friction.limit / scale);
-            let laws = Friction::in_modes(&friction.law, unit);
+            let laws = FrictionJoint::in_modes(&friction.law, unit);
             let friction = &mut self.frictions[k];
             (friction.laws, friction.unit) = (laws, unit);
-            friction.mode = Mode::Slip(velocity.signum());
+            friction.mode = FrictionMode::Slip(velocity.signum());
             if velocity.abs() <= ROUNDING * scale {
                 resting.push(k);
             }
@@ -266,7 +267,7 @@ impl SwitchedFlow {
         if !resting.is_empty() {
             let axes: Vec<usize> = resting.iter().map(|&k| self.frictions[k].axis).collect();
             let limits: Vec<f64> = resting.iter().map(|&k| self.frictions[k].limit).collect();
-            resting.iter().for_each(|&k| self.frictions[k].mode = Mode::Held);
+            resting.iter().for_each(|&k| self.frictions[k].mode = FrictionMode::Held);
             self.enter_modes();
             self.answer(state, time);
             let free: Vec<f64> = axes.iter().map(|&axis| self.acceleration(axis, time)).collect();
@@ -329,7 +330,7 @@ impl SwitchedFlow {
         let start: Vec<f64> = (0..j).map(|axis| self.velocity(axis, state, time)).collect();
         for i in 0..STAGES {
             self.step.unknown[i * j..(i + 1) * j].copy_from_slice(&start);
-            for friction in self.frictions.iter().filter(|friction| friction.mode == Mode::Held) {
+            for friction in self.frictions.iter().filter(|friction| friction.mode == FrictionMode::Held) {
                 self.step.unknown[i * j + friction.axis] = self.laws[friction.joint].force[0] / friction.unit;
             }
             let first = STAGES * j + i * internal;
@@ -340,9 +341,9 @@ impl SwitchedFlow {
     /// Solves a step. Returns false if the iteration does not converge.
     fn attempt(
         &mut self,
-        eliminated: &Eliminated,
+        eliminated: &RadauElimination,
         state: &[f64],
-        (begin, last): (Begin, Option<f64>),
+        (begin, last): (StepBegin, Option<f64>),
         (scale, derivatives): (f64, bool),
     ) -> bool {
         self.tried += 1;
@@ -357,7 +358,7 @@ impl SwitchedFlow {
 
     /// Returns the error of the step relative to the tolerance: the embedded estimate, filtered
     /// at both ends.
-    fn error(&mut self, eliminated: &Eliminated, state: &[f64], scale: (f64, f64)) -> f64 {
+    fn error(&mut self, eliminated: &RadauElimination, state: &[f64], scale: (f64, f64)) -> f64 {
         let assembly = &self.assembly;
         self.step.raw_error(assembly, eliminated, &self.loads, (state, &self.slope), &mut self.error);
         self.second.copy_from_slice(&self.error);
@@ -386,7 +387,7 @@ impl SwitchedFlow {
 
     /// Returns the margin of a joint's mode at `s` in [0, 1] of the last solved step, relative
     /// to its scale. It is positive while the mode lasts.
-    fn margin(&self, friction: &Friction, start: f64, s: f64, scale: f64) -> f64 {
+    fn margin(&self, friction: &FrictionJoint, start: f64, s: f64, scale: f64) -> f64 {
         let j = self.assembly.axes.len();
         // the polynomial through the start and the stages
         let node = |i: usize| if i == 0 { 0.0 } else { NODES[i - 1] };
@@ -397,9 +398,9 @@ impl SwitchedFlow {
         };
         let now: f64 = (0..=STAGES).map(|i| weight(i) * value(i)).sum();
         match friction.mode {
-            Mode::Slip(sign) => sign * now / scale,
+            FrictionMode::Slip(sign) => sign * now / scale,
             // the unit of the unknown is the limit divided by the velocity scale
-            Mode::Held => 1.0 - (now * friction.unit / friction.limit).abs(),
+            FrictionMode::Held => 1.0 - (now * friction.unit / friction.limit).abs(),
         }
     }
 
@@ -408,8 +409,8 @@ impl SwitchedFlow {
         let mut first: Option<Switch> = None;
         for (k, friction) in self.frictions.iter().enumerate() {
             let start = match friction.mode {
-                Mode::Slip(_) => self.velocity(friction.axis, state, time),
-                Mode::Held => self.laws[friction.joint].force[0] / friction.unit,
+                FrictionMode::Slip(_) => self.velocity(friction.axis, state, time),
+                FrictionMode::Held => self.laws[friction.joint].force[0] / friction.unit,
             };
             let margin = |s: f64| self.margin(friction, start, s, scale);
             let mut before = 0.0;
@@ -445,12 +446,12 @@ impl SwitchedFlow {
         }
         let friction = &self.frictions[switch.friction];
         match friction.mode {
-            Mode::Slip(sign) => {
+            FrictionMode::Slip(sign) => {
                 let (velocity, rate) =
                     (self.velocity(friction.axis, &next, time), self.acceleration(friction.axis, time));
                 Some((sign * velocity / scale, sign * rate / scale))
             }
-            Mode::Held => {
+            FrictionMode::Held => {
                 let force = self.laws[friction.joint].force[0];
                 let j = self.assembly.axes.len();
                 // the rate of the polynomial through the stages, at its end
@@ -470,12 +471,12 @@ impl SwitchedFlow {
         &mut self,
         switch: Switch,
         state: &[f64],
-        (begin, longest): (Begin, f64),
+        (begin, longest): (StepBegin, f64),
         (scale, derivatives): (f64, bool),
-    ) -> Option<Eliminated> {
+    ) -> Option<RadauElimination> {
         let mut h = switch.at * longest;
         for _ in 0..LOCATED {
-            let eliminated = Eliminated::new(&self.assembly, h);
+            let eliminated = RadauElimination::new(&self.assembly, h);
             // the initial guess needs the time derivative at the start of the step
             if !self.set_slope(state, begin.time)
                 || !self.attempt(&eliminated, state, (begin, None), (scale, derivatives))
@@ -506,9 +507,9 @@ impl SwitchedFlow {
         columns: usize,
     ) -> Result<(), IntegrationError> {
         let friction = &mut self.frictions[switch.friction];
-        if friction.mode == Mode::Held {
+        if friction.mode == FrictionMode::Held {
             // the force and all other quantities are continuous
-            friction.mode = Mode::Slip(self.laws[friction.joint].force[0].signum());
+            friction.mode = FrictionMode::Slip(self.laws[friction.joint].force[0].signum());
             self.enter_modes();
             return if self.set_slope(state, time) { Ok(()) } else { Err(self.redundant(time)) };
         }
@@ -519,7 +520,7 @@ impl SwitchedFlow {
             let (axis, before) = (self.frictions[k].axis, self.slope.clone());
             let rate = self.acceleration(axis, time);
             let resting: Vec<usize> =
-                (0..self.frictions.len()).filter(|&i| i == k || self.frictions[i].mode == Mode::Held).collect();
+                (0..self.frictions.len()).filter(|&i| i == k || self.frictions[i].mode == FrictionMode::Held).collect();
             self.rest(&resting, state, time)?;
             if columns > 0 {
                 saltate(&self.assembly, (axis, rate), (&before, &self.slope), (&mut self.derivative, columns));
@@ -527,7 +528,7 @@ impl SwitchedFlow {
             // other joints that stop at the same instant, because their bodies move alike
             next = (0..self.frictions.len()).filter(|i| !stopped.contains(i)).find(|&i| {
                 let own = &self.frictions[i];
-                let Mode::Slip(sign) = own.mode else { return false };
+                let FrictionMode::Slip(sign) = own.mode else { return false };
                 let stops = sign * self.velocity(own.axis, state, time) <= ROUNDING * scale;
                 stops && sign * self.acceleration(own.axis, time) < 0.0
             });
@@ -546,7 +547,7 @@ impl SwitchedFlow {
         self.steps.keep_instant(state, &self.force).copy_from_slice(&self.slope[n..2 * n]);
     }
 
-    fn keep_step(&mut self, eliminated: &Eliminated, time: f64) {
+    fn keep_step(&mut self, eliminated: &RadauElimination, time: f64) {
         let (n, j) = (self.assembly.n, self.assembly.axes.len());
         self.step.set_stages(eliminated, &self.loads);
         let (x, v) = self.step.stages.as_slice().split_at(STAGES * n);
@@ -569,7 +570,7 @@ impl SwitchedFlow {
     }
 
     /// Returns the size of the next step, and the tick at its end.
-    fn length(&self, begin: Begin) -> (f64, u64) {
+    fn length(&self, begin: StepBegin) -> (f64, u64) {
         let (tick, ticks) = (self.stretch / (1u64 << LEVELS) as f64, 1u64 << (LEVELS - self.level));
         if let Some(at) = begin.tick {
             return (ticks as f64 * tick, at + ticks);
@@ -589,12 +590,12 @@ impl SwitchedFlow {
 
     /// Returns the eliminated structure for a step. Steps to or from a switch have a separate
     /// elimination.
-    fn elimination(&mut self, begin: Begin, h: f64) -> Eliminated {
+    fn elimination(&mut self, begin: StepBegin, h: f64) -> RadauElimination {
         let kept = begin.tick.and_then(|_| self.eliminated[self.level].take());
-        kept.unwrap_or_else(|| Eliminated::new(&self.assembly, h))
+        kept.unwrap_or_else(|| RadauElimination::new(&self.assembly, h))
     }
 
-    fn give_back(&mut self, begin: Begin, eliminated: Eliminated, level: usize) {
+    fn give_back(&mut self, begin: StepBegin, eliminated: RadauElimination, level: usize) {
         if begin.tick.is_some() {
             self.eliminated[level] = Some(eliminated);
         }
@@ -607,10 +608,10 @@ impl SwitchedFlow {
     fn advance(
         &mut self,
         state: &mut [f64],
-        (begin, last): (Begin, Option<f64>),
+        (begin, last): (StepBegin, Option<f64>),
         scale: (f64, f64),
         columns: usize,
-    ) -> Result<(Begin, Option<f64>, bool), IntegrationError> {
+    ) -> Result<(StepBegin, Option<f64>, bool), IntegrationError> {
         loop {
             let (h, end) = self.length(begin);
             if self.tried >= STEP_LIMIT || self.level > LEVELS {
@@ -634,7 +635,7 @@ impl SwitchedFlow {
                     self.level -= 1;
                 }
                 let tick = self.stretch / (1u64 << LEVELS) as f64;
-                return Ok((Begin { time: end as f64 * tick, tick: Some(end) }, Some(h), end == 1 << LEVELS));
+                return Ok((StepBegin { time: end as f64 * tick, tick: Some(end) }, Some(h), end == 1 << LEVELS));
             };
             self.give_back(begin, eliminated, level);
             let located = self.locate(switch, state, (begin, h), (scale.1, columns > 0));
@@ -650,14 +651,14 @@ impl SwitchedFlow {
             self.accept(&eliminated, state, (begin.time, time), columns)?;
             self.switched(switch, state, (time, scale.1), columns)?;
             let ends = time >= self.stretch * (1.0 - LEFT);
-            return Ok((Begin { time, tick: None }, None, ends));
+            return Ok((StepBegin { time, tick: None }, None, ends));
         }
     }
 
     /// Accepts the last solved step.
     fn accept(
         &mut self,
-        eliminated: &Eliminated,
+        eliminated: &RadauElimination,
         state: &mut [f64],
         (before, time): (f64, f64),
         columns: usize,
@@ -687,7 +688,7 @@ impl SwitchedFlow {
     }
 }
 
-impl Flow for SwitchedFlow {
+impl Flow for SetValuedFlow {
     fn states(&self) -> usize {
         self.assembly.states()
     }
@@ -730,7 +731,7 @@ impl Flow for SwitchedFlow {
         if columns > 0 {
             self.project(columns);
         }
-        let (mut begin, mut last, mut switches) = (Begin { time: 0.0, tick: Some(0) }, None, 0);
+        let (mut begin, mut last, mut switches) = (StepBegin { time: 0.0, tick: Some(0) }, None, 0);
         loop {
             let (next, length, ends) = self.advance(state, (begin, last), scale, columns)?;
             if ends {

@@ -1,8 +1,8 @@
 //! Compares orbits and sensitivities between located switches with closed forms, independent
 //! integrations, and differences.
 
-use super::super::integrator_choice::Kind;
-use super::located_switches::SwitchedFlow;
+use super::super::integrator_choice::IntegratorKind;
+use super::located_switches::SetValuedFlow;
 use crate::law::{Coulomb, Cubic, SharedLaw, Stribeck};
 use crate::method::event_driven::EventDriven;
 use crate::method::flow::Flow;
@@ -55,7 +55,7 @@ const STRIBECK: [(f64, f64, f64); 7] = [
 fn falling_friction_has_its_orbits() {
     let law: SharedLaw = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.02 });
     let system = oscillator(&[law], (1e4, 3.0), 6.0);
-    assert_eq!(Kind::of(&system, None), Kind::Switched);
+    assert_eq!(IntegratorKind::of(&system, None), IntegratorKind::Switched);
     assert_eq!(Auto.choice(&system).method, "shooting");
     for (frequency, amplitude, multiplier) in STRIBECK {
         let found = orbit(&Auto, &system, TAU * frequency);
@@ -134,13 +134,13 @@ fn constant_friction_moves_as_from_event_to_event() {
 fn derivatives_go_through_switches() {
     let stribeck = |limit: f64| -> SharedLaw { Arc::new(Stribeck { limit, static_limit: 1.4 * limit, velocity: 0.2 }) };
     let system = pair([stribeck(0.7), stribeck(0.3)], Some(Arc::new(Cubic { stiffness: 0.8 })));
-    let mut flow = SwitchedFlow::new(&system, 1e-11, "test").unwrap();
+    let mut flow = SetValuedFlow::new(&system, 1e-11, "test").unwrap();
     flow.set_drive(&system, 1.3);
     let start = [0.3, -0.2, 0.5, 0.1];
     let mut derivative = DMatrix::identity(4, 4);
     flow.run(&mut start.to_vec(), 6.0, Some(&mut derivative)).unwrap();
     for column in 0..4 {
-        let moved = |by: f64, flow: &mut SwitchedFlow| {
+        let moved = |by: f64, flow: &mut SetValuedFlow| {
             let mut state = start.to_vec();
             state[column] += by;
             flow.run(&mut state, 6.0, None).unwrap();

@@ -10,7 +10,7 @@
 //! Source: Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems"
 //! (2004), Ch. 7.
 
-use super::friction_mode::Mode;
+use super::friction_mode::FrictionMode;
 use crate::method::flow::assembly::Assembly;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
@@ -30,12 +30,12 @@ pub(super) fn mobility(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
 /// Returns the modes of joints at rest. `free` are the relative accelerations without their
 /// forces, and `limits` the limits of these forces. Returns `None` if the problem has no
 /// solution.
-pub(super) fn decide(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> Option<Vec<Mode>> {
+pub(super) fn decide(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> Option<Vec<FrictionMode>> {
     let high = DVector::from_column_slice(limits);
     let free = DVector::from_column_slice(free);
     let force = complementarity::solve(mobility, &free, &-&high, &high)?;
     let mode = |(force, limit): (&f64, &f64)| {
-        if force.abs() < *limit { Mode::Held } else { Mode::Slip(force.signum()) }
+        if force.abs() < *limit { FrictionMode::Held } else { FrictionMode::Slip(force.signum()) }
     };
     Some(force.iter().zip(limits).map(mode).collect())
 }
@@ -108,9 +108,9 @@ mod tests {
         let mobility = DMatrix::from_row_slice(2, 2, &[1.0, -1.0, -1.0, 2.0]);
         let modes =
             |push: [f64; 2], limits: [f64; 2]| decide(&mobility, &[push[0], push[1] - push[0]], &limits).unwrap();
-        assert_eq!(modes([0.5, 0.3], [1.0, 1.0]), [Mode::Held, Mode::Held]);
-        assert_eq!(modes([0.0, 1.5], [1.0, 2.0]), [Mode::Slip(1.0), Mode::Held]);
-        assert_eq!(modes([0.0, 1.5], [2.0, 1.0]), [Mode::Held, Mode::Slip(1.0)]);
-        assert_eq!(modes([0.0, -5.0], [0.5, 1.0]), [Mode::Slip(-1.0), Mode::Slip(-1.0)]);
+        assert_eq!(modes([0.5, 0.3], [1.0, 1.0]), [FrictionMode::Held, FrictionMode::Held]);
+        assert_eq!(modes([0.0, 1.5], [1.0, 2.0]), [FrictionMode::Slip(1.0), FrictionMode::Held]);
+        assert_eq!(modes([0.0, 1.5], [2.0, 1.0]), [FrictionMode::Held, FrictionMode::Slip(1.0)]);
+        assert_eq!(modes([0.0, -5.0], [0.5, 1.0]), [FrictionMode::Slip(-1.0), FrictionMode::Slip(-1.0)]);
     }
 }

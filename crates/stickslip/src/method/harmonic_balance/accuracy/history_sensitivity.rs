@@ -4,8 +4,8 @@
 //! effect of other histories, the equations are solved again with the friction forces of static
 //! equilibrium removed, and with them reversed.
 
-use crate::method::harmonic_balance::equations::Solution;
-use crate::method::harmonic_balance::solver::Balance;
+use crate::method::harmonic_balance::equations::HarmonicSolution;
+use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::orbit::Orbit;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -15,7 +15,7 @@ const HISTORIES: [f64; 2] = [0.0, -1.0];
 /// Newton iterations from the orbit.
 const ITERATIONS: usize = 20;
 
-impl Balance {
+impl HarmonicBalanceSolver {
     /// Returns the largest change of a place's vibration under another history, relative to the
     /// largest vibration.
     ///
@@ -45,8 +45,8 @@ impl Balance {
 
     /// Returns the harmonics of all places in the orbit near a motion, with the static states
     /// that are set.
-    fn with_history(&mut self, top: usize, omega: f64, motion: &Solution) -> Option<Vec<DVector<Complex64>>> {
-        let mut other = Solution { iterations: 0, ..motion.clone() };
+    fn with_history(&mut self, top: usize, omega: f64, motion: &HarmonicSolution) -> Option<Vec<DVector<Complex64>>> {
+        let mut other = HarmonicSolution { iterations: 0, ..motion.clone() };
         let level = self.levels.get_mut(&top)?;
         level.polish(&self.ports, omega, &mut other, ITERATIONS).ok()?;
         self.places(top, omega, &other).ok()

@@ -1,14 +1,14 @@
 //! Number of harmonics of an orbit: the user's, or doubled until the estimated error meets the
 //! tolerance.
 
-use super::truncation_error::{Compared, estimate};
+use super::truncation_error::{ComparedSolution, estimate};
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::aft::Port;
-use crate::method::harmonic_balance::budget::{self, Work};
-use crate::method::harmonic_balance::equations::{self, Level, Solution};
-use crate::method::harmonic_balance::newton::{Goal, Lost};
+use crate::method::harmonic_balance::budget::{self, WorkShare};
+use crate::method::harmonic_balance::equations::{self, Discretization, HarmonicSolution};
+use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 use crate::method::harmonic_balance::options::{NAME, TOLERANCE};
-use crate::method::harmonic_balance::solver::Balance;
+use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::orbit::Orbit;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -30,19 +30,19 @@ const CHANCE: f64 = 0.1;
 /// reaches it.
 const KNOWN: f64 = 1e-3;
 
-impl Balance {
+impl HarmonicBalanceSolver {
     /// Finds the orbit with the user's number of harmonics and estimates its error.
     pub(crate) fn fixed(
         &mut self,
         top: usize,
         omega: f64,
-        warm: Option<(usize, Solution)>,
+        warm: Option<(usize, HarmonicSolution)>,
     ) -> Result<Orbit, OrbitError> {
         let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.lost(l))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
-        let truncation = if self.can_compare(top, Work::default()) {
+        let truncation = if self.can_compare(top, WorkShare::default()) {
             // the orbit is found; its error estimate gets a budget as large as that of a point
-            self.levels.values_mut().for_each(Level::begin_point);
+            self.levels.values_mut().for_each(Discretization::begin_point);
             self.compare(top, omega, &motion, &x).ok().map(|(error, _)| error)
         } else {
             None
@@ -59,9 +59,9 @@ impl Balance {
         &mut self,
         top: usize,
         omega: f64,
-        motion: &Solution,
+        motion: &HarmonicSolution,
         x: &[DVector<Complex64>],
-    ) -> Result<(f64, Solution), Lost> {
+    ) -> Result<(f64, HarmonicSolution), SolveError> {
         let double = self.kept.double(top);
         let start = self.refined(top, motion);
         let (few, many) = (self.kept.up_to(top), self.kept.up_to(double));
@@ -70,7 +70,8 @@ impl Balance {
         self.level(double, omega)?;
         let finer = self.levels.get_mut(&double).expect("made above");
         finer.prolongs = true;
-        let goal = if self.ports.iter().any(Port::marches) { Goal::Solved } else { Goal::Share(KNOWN) };
+        let goal =
+            if self.ports.iter().any(Port::marches) { StopCriterion::Solved } else { StopCriterion::Share(KNOWN) };
         let better = match finer.approach_by_twice_the_samples(&self.ports, omega, &start, &coarse, states.as_deref()) {
             Some(better) => better,
             None => {
@@ -83,7 +84,7 @@ impl Balance {
         }
         let y = self.places(double, omega, &better)?;
         let finer = self.levels.get_mut(&double).expect("solved");
-        let coarse = Compared { harmonics: &few, places: x, along: &motion.c };
+        let coarse = ComparedSolution { harmonics: &few, places: x, along: &motion.c };
         let at = (self.kept, omega, self.steep);
         let error = estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &better, &y));
         Ok((error, better))
@@ -93,7 +94,7 @@ impl Balance {
     ///
     /// It is the solution plus the correction that the finer series made at the last
     /// comparison.
-    pub(crate) fn refined(&self, top: usize, motion: &Solution) -> Solution {
+    pub(crate) fn refined(&self, top: usize, motion: &HarmonicSolution) -> HarmonicSolution {
         let harmonics = |top: usize| self.kept.up_to(top);
         let (few, many) = (harmonics(top), harmonics(self.kept.double(top)));
         let mut start = equations::transfer(motion, &few, &many);
@@ -129,7 +130,7 @@ impl Balance {
         &mut self,
         top: usize,
         omega: f64,
-        warm: Option<(usize, Solution)>,
+        warm: Option<(usize, HarmonicSolution)>,
     ) -> Result<Orbit, OrbitError> {
         let mut returned = None;
         // if the return defect exceeds the tolerance, the orbit is still returned, and its
@@ -143,7 +144,7 @@ impl Balance {
         &mut self,
         mut top: usize,
         omega: f64,
-        warm: Option<(usize, Solution)>,
+        warm: Option<(usize, HarmonicSolution)>,
         returned: &mut Option<Orbit>,
     ) -> Result<Orbit, OrbitError> {
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);

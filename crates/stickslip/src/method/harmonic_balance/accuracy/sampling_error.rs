@@ -3,10 +3,10 @@
 //! Laws that are integrated from sample to sample have an error proportional to the square of
 //! the sample spacing.
 
-use crate::method::harmonic_balance::aft::{Alternation, Beginning, Port, Ports};
-use crate::method::harmonic_balance::equations::{Level, Slopes, Solution};
+use crate::method::harmonic_balance::aft::{FrequencyTime, InitialState, Port, Ports};
+use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::globalization::homotopy::{GIVEN, SOLVED};
-use crate::method::harmonic_balance::linear_solve::newton_krylov::Near;
+use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 
 /// Ratio of the last step to the distance from the coarse solution at which the distance counts
 /// as known. A step leaves an error of a few hundredths of its length.
@@ -20,7 +20,7 @@ const MOST_STEPS: usize = 8;
 /// Largest ratio of a step to the previous one.
 const CLOSER: f64 = 0.3;
 
-impl Level {
+impl Discretization {
     /// Returns the solution near `start` with twice the samples, accurate enough for its
     /// distance from `coarse`.
     ///
@@ -31,10 +31,10 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        start: &Solution,
-        coarse: &Solution,
-        states: Option<&[Beginning]>,
-    ) -> Option<Solution> {
+        start: &HarmonicSolution,
+        coarse: &HarmonicSolution,
+        states: Option<&[InitialState]>,
+    ) -> Option<HarmonicSolution> {
         if !ports.iter().any(Port::marches) {
             return None;
         }
@@ -68,9 +68,9 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        near: &Solution,
-        coarse: &Solution,
-    ) -> Option<(Solution, bool)> {
+        near: &HarmonicSolution,
+        coarse: &HarmonicSolution,
+    ) -> Option<(HarmonicSolution, bool)> {
         if !ports.iter().any(Port::marches) {
             return None;
         }
@@ -79,13 +79,13 @@ impl Level {
         if !self.linearised {
             self.linearise_at(ports, omega, &mut motion, length);
         }
-        let near = |residual, kept| Near { length, residual, sketched: true, kept };
+        let near = |residual, kept| StepStart { length, residual, sketched: true, kept };
         let (mut last, mut found, mut left) = (f64::INFINITY, false, MOST_STEPS);
         let share = if self.is_coupled() { SHARE_OF_COUPLED } else { SHARE };
         loop {
             self.exchange_for_twice();
             self.nearby = true;
-            let residual = self.evaluate(ports, omega, &mut motion, GIVEN, length, Slopes::None);
+            let residual = self.evaluate(ports, omega, &mut motion, GIVEN, length, DerivativeScope::None);
             self.nearby = false;
             self.exchange_for_twice();
             if residual <= SOLVED {
@@ -109,14 +109,14 @@ impl Level {
     }
 
     /// Computes the Jacobians of all laws at a motion, from its periodic states.
-    fn linearise_at(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, length: f64) {
-        self.evaluate(ports, omega, motion, GIVEN, length, Slopes::Cheap);
+    fn linearise_at(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution, length: f64) {
+        self.evaluate(ports, omega, motion, GIVEN, length, DerivativeScope::Cheap);
         self.follow_slopes(ports, omega, motion, (GIVEN, self.keeps_sketch()));
     }
 
     /// Returns the distance between the unknowns of two solutions in their units, without
     /// means.
-    fn apart(&self, ports: &Ports, one: &Solution, other: &Solution, length: f64) -> f64 {
+    fn apart(&self, ports: &Ports, one: &HarmonicSolution, other: &HarmonicSolution, length: f64) -> f64 {
         let nh = self.harmonics().len();
         let moving = |at: &usize| self.harmonics()[at % nh] > 0;
         let squares = ports.iter().map(|port| {
@@ -130,7 +130,7 @@ impl Level {
     /// Exchanges the samples for twice as many, and back.
     fn exchange_for_twice(&mut self) {
         let (harmonics, samples) = (&self.alternation.harmonics, 2 * self.alternation.samples());
-        let twice = self.twice.get_or_insert_with(|| Alternation::new(harmonics.clone(), samples));
+        let twice = self.twice.get_or_insert_with(|| FrequencyTime::new(harmonics.clone(), samples));
         std::mem::swap(&mut self.alternation, twice);
     }
 }
@@ -140,8 +140,8 @@ mod tests {
     use crate::law::{Dahl, FrictionContact, Jenkins2d, SharedLaw, Valanis};
     use crate::method::Method;
     use crate::method::harmonic_balance::aft::Ports;
-    use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
-    use crate::method::harmonic_balance::equations::{Level, Solution, transfer};
+    use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+    use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution, transfer};
     use crate::method::harmonic_balance::options::{HarmonicBalance, LEFT, TOLERANCE, samples_for, samples_of_steps};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
     use crate::orbit::Orbit;
@@ -199,14 +199,14 @@ mod tests {
         for (bodies, share) in [(3, 0.01), (22, 0.03)] {
             let system = row(bodies);
             let ports = Ports::new(&system).unwrap();
-            let rest = Rest::new(&system, &ports);
+            let rest = LinearDynamics::new(&system, &ports);
             let (few, many, omega) = (vec![1, 3, 5], vec![1, 3, 5, 7, 9, 11], 110.0);
             let level = |harmonics: &[usize], samples: usize| {
-                let mut level = Level::new(harmonics.to_vec(), samples, &ports, None);
+                let mut level = Discretization::new(harmonics.to_vec(), samples, &ports, None);
                 level.drive(&system, &ports, &rest, omega).unwrap();
                 level
             };
-            let solve = |mut level: Level| {
+            let solve = |mut level: Discretization| {
                 let start = level.begin(&system, &ports, None, omega);
                 level.solve(&ports, omega, start).unwrap()
             };
@@ -215,11 +215,14 @@ mod tests {
             let mut near = level(&many, 1024);
             assert_eq!(near.keeps_sketch(), bodies > 20);
             let found = near.approach_by_twice_the_samples(&ports, omega, &coarse, &coarse, None).unwrap();
-            let apart = |a: &Solution, b: &Solution| near.apart(&ports, a, b, 1.0);
+            let apart = |a: &HarmonicSolution, b: &HarmonicSolution| near.apart(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
-            assert!(distance > 1e-5 * apart(&whole, &Solution::rest(whole.c.len())), "{distance:.1e} shows nothing");
+            assert!(
+                distance > 1e-5 * apart(&whole, &HarmonicSolution::rest(whole.c.len())),
+                "{distance:.1e} shows nothing"
+            );
             assert!(error < share * distance, "{bodies} bodies: {error:.1e} of {distance:.1e}");
-            let forces = |a: &Solution, b: &Solution| -> f64 {
+            let forces = |a: &HarmonicSolution, b: &HarmonicSolution| -> f64 {
                 a.force.iter().zip(&b.force).map(|(a, b)| (a - b).norm_sqr()).sum::<f64>().sqrt()
             };
             assert!(forces(&whole, &found) < share * forces(&whole, &coarse), "{bodies} bodies");
@@ -232,17 +235,17 @@ mod tests {
     fn a_neighbour_leaves_what_the_longer_series_adds() {
         let system = row(22);
         let ports = Ports::new(&system).unwrap();
-        let rest = Rest::new(&system, &ports);
+        let rest = LinearDynamics::new(&system, &ports);
         let harmonics = |top: usize| -> Vec<usize> { (1..=top).step_by(2).collect() };
         let (few, many) = (harmonics(9), harmonics(19));
         let [mut short, mut long, mut whole] =
-            [(&few, 1024), (&many, 1024), (&many, 2048)].map(|(h, n)| Level::new(h.clone(), n, &ports, None));
+            [(&few, 1024), (&many, 1024), (&many, 2048)].map(|(h, n)| Discretization::new(h.clone(), n, &ports, None));
         let mut added = vec![Complex64::new(0.0, 0.0); ports.count() * many.len()];
         for omega in [110.0, 110.2] {
             for level in [&mut short, &mut long, &mut whole] {
                 level.drive(&system, &ports, &rest, omega).unwrap();
             }
-            let solve = |level: &mut Level| {
+            let solve = |level: &mut Discretization| {
                 let start = level.begin(&system, &ports, None, omega);
                 level.solve(&ports, omega, start).unwrap()
             };
@@ -253,7 +256,7 @@ mod tests {
             start.c.iter_mut().zip(&added).for_each(|(c, added)| *c += added);
             let found =
                 long.approach_by_twice_the_samples(&ports, omega, &start, &coarse, Some(&short.states)).unwrap();
-            let apart = |a: &Solution, b: &Solution| long.apart(&ports, a, b, 1.0);
+            let apart = |a: &HarmonicSolution, b: &HarmonicSolution| long.apart(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
             assert!(error < 0.1 * distance, "{omega}: {error:.1e} of {distance:.1e}");
             added = found.c.iter().zip(&coarse.c).map(|(found, coarse)| found - coarse).collect();

@@ -1,9 +1,9 @@
 //! Truncation error of a solution, from a second solution with twice the harmonics.
 
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
-use crate::method::harmonic_balance::equations::harmonic_set::Kept;
-use crate::method::harmonic_balance::equations::{Level, Solution};
+use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+use crate::method::harmonic_balance::equations::harmonic_set::HarmonicSet;
+use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::globalization::homotopy::SOLVED;
 use crate::model::Axis;
 use nalgebra::DVector;
@@ -23,7 +23,7 @@ const CANCELS: f64 = 10.0 * SOLVED;
 
 /// A solution for the comparison: its harmonics, and per harmonic the motions of the places and
 /// along the axes of the ports.
-pub(crate) struct Compared<'a> {
+pub(crate) struct ComparedSolution<'a> {
     pub harmonics: &'a [usize],
     pub places: &'a [DVector<Complex64>],
     pub along: &'a [Complex64],
@@ -39,13 +39,13 @@ pub(crate) struct Compared<'a> {
 pub(crate) fn estimate(
     seen: &[Axis],
     ports: &Ports,
-    rest: &Rest,
-    (kept, omega, steep): (Kept, f64, bool),
-    coarse: &Compared,
-    (finer, better, places): (&mut Level, &Solution, &[DVector<Complex64>]),
+    rest: &LinearDynamics,
+    (kept, omega, steep): (HarmonicSet, f64, bool),
+    coarse: &ComparedSolution,
+    (finer, better, places): (&mut Discretization, &HarmonicSolution, &[DVector<Complex64>]),
 ) -> f64 {
     let above = above(finer, rest, ports, kept, omega, better);
-    let fine = Compared { harmonics: finer.harmonics(), places, along: &better.c };
+    let fine = ComparedSolution { harmonics: finer.harmonics(), places, along: &better.c };
     let unhindered = |place: &Axis| {
         let moving = fine.harmonics.iter().zip(&finer.free).filter(|(h, _)| **h > 0);
         moving.map(|(_, free)| length(place, free).norm_sqr()).sum::<f64>()
@@ -88,12 +88,12 @@ fn length(place: &Axis, motion: &DVector<Complex64>) -> Complex64 {
 /// Returns the motions of the places at the resonances above the harmonics of a solution, under
 /// its forces.
 fn above(
-    level: &mut Level,
-    rest: &Rest,
+    level: &mut Discretization,
+    rest: &LinearDynamics,
     ports: &Ports,
-    kept: Kept,
+    kept: HarmonicSet,
     omega: f64,
-    motion: &Solution,
+    motion: &HarmonicSolution,
 ) -> Vec<DVector<Complex64>> {
     let top = *level.harmonics().last().expect("a series has harmonics");
     let mut wanted = rest.resonances_above(top, omega);

@@ -1,14 +1,14 @@
 //! Tests of every kind of port: derivatives against differences, orbits against
 //! closed forms and other methods.
 
-use super::super::equations::Level;
+use super::super::equations::Discretization;
 use super::*;
 use crate::law::{
     BoucWen, Cubic, Dahl, Gap, Jenkins, Law, LawInfo, RateLaw, RateView, RelativeMotion, StepLaw, StepView, Stribeck,
 };
 use crate::method::harmonic_balance::HarmonicBalance;
-use crate::method::harmonic_balance::dynamics::banded::Sparse;
-use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
+use crate::method::harmonic_balance::dynamics::banded::BandedForm;
+use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
 use crate::method::shooting::Shooting;
 use crate::method::{Method, advised};
 use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
@@ -177,7 +177,7 @@ fn derivatives_agree_with_differences() {
         let ports = ports_of(&law);
         for (harmonics, size) in [(vec![1, 3, 5], 0.6), (vec![0, 1, 2, 3], 0.6), (vec![0, 1, 2], 0.01)] {
             let nh = harmonics.len();
-            let mut alternation = Alternation::new(harmonics.clone(), 512);
+            let mut alternation = FrequencyTime::new(harmonics.clone(), 512);
             let port = &ports[0];
             let count = nh * port.axes;
             let is_real = |i: usize| harmonics[i % nh] == 0;
@@ -346,7 +346,7 @@ fn round_a_circle_the_loss_is_the_closed_form() {
     let ports = ports_of(&(Arc::new(Plane::Masing) as SharedLaw));
     let radius = 0.5;
     let work = |samples: usize| {
-        let mut alternation = Alternation::new(vec![1], samples);
+        let mut alternation = FrequencyTime::new(vec![1], samples);
         let c = [Complex64::new(radius, 0.0), Complex64::new(0.0, -radius)];
         let mut force = [ZERO; 2];
         alternation.respond(&ports[0], (1.0, 1.0), &c, &mut force, None);
@@ -409,11 +409,11 @@ fn banded_and_dense_agree_in_a_plane() {
     }
     let system = builder.build().unwrap();
     let ports = Ports::new(&system).unwrap();
-    let rest = Rest::new(&system, &ports);
+    let rest = LinearDynamics::new(&system, &ports);
     let (harmonics, omega) = (vec![1, 3, 5], 1.2);
     let solve = |banded: bool| {
-        let sparse = banded.then(|| Sparse::new(&system, &ports, &harmonics).unwrap());
-        let mut level = Level::new(harmonics.clone(), 256, &ports, sparse);
+        let sparse = banded.then(|| BandedForm::new(&system, &ports, &harmonics).unwrap());
+        let mut level = Discretization::new(harmonics.clone(), 256, &ports, sparse);
         level.drive(&system, &ports, &rest, omega).unwrap();
         let start = level.begin(&system, &ports, None, omega);
         level.solve(&ports, omega, start).unwrap()

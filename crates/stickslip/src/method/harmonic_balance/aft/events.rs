@@ -12,13 +12,13 @@ pub(in super::super) struct Interval {
     pub(super) end: f64,
     pub(super) stiffness: f64,
     pub(super) offset: f64,
-    pub(super) anchor: Anchor,
+    pub(super) anchor: OffsetSource,
     pub(super) slips: bool,
 }
 
 /// The quantity on which the offset depends.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) enum Anchor {
+pub(in super::super) enum OffsetSource {
     /// None: the offset is constant, as for a slider that has not slipped since static equilibrium.
     Nothing,
     /// The motion at a phase, rad.
@@ -27,14 +27,14 @@ pub(in super::super) enum Anchor {
 
 /// A turning point of the motion: phase (rad) and displacement (m).
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Extreme {
+pub(in super::super) struct TurningPoint {
     pub(super) at: f64,
     pub(super) value: f64,
 }
 
 /// Samples of a motion that separate its turning points.
 #[derive(Debug, Clone)]
-pub(in super::super) struct Grid {
+pub(in super::super) struct BracketingGrid {
     pub(super) fourier: FourierPlan,
     pub(super) pairs: Vec<(usize, Complex64)>,
     pub(super) value: Vec<f64>,
@@ -45,11 +45,11 @@ pub(in super::super) struct Grid {
 /// a cubic up to a thousandth of the highest harmonic.
 const POINTS: usize = 8;
 
-impl Grid {
+impl BracketingGrid {
     /// Creates a grid for harmonics up to `top`.
     pub fn new(top: usize) -> Self {
         let points = (POINTS * (top + 1)).next_power_of_two();
-        Grid {
+        BracketingGrid {
             fourier: FourierPlan::new(points),
             pairs: Vec::new(),
             value: vec![0.0; points],

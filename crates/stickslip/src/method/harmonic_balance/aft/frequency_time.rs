@@ -12,7 +12,7 @@ pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Signals, transforms and scratch memory for one list of harmonics and one number of samples.
 #[derive(Debug, Clone)]
-pub(in super::super) struct Alternation {
+pub(in super::super) struct FrequencyTime {
     /// Factor of the joints' [`StaticState`](super::StaticState): the share of the constant
     /// loads, divided by the factor of the slip limits.
     pub static_share: f64,
@@ -26,7 +26,7 @@ pub(in super::super) struct Alternation {
     /// A scratch signal.
     pub signal: Vec<f64>,
     /// Forces of the port evaluated last along its axes, per sample, N. Kernels that do not
-    /// sample, such as sliders, set them only in [`Alternation::sample`].
+    /// sample, such as sliders, set them only in [`FrequencyTime::sample`].
     pub force: [Vec<f64>; MAX_DIRECTIONS],
     /// Displacements and velocities of the port along its axes, for kernels that use them.
     pub(super) displacement: [Vec<f64>; MAX_DIRECTIONS],
@@ -42,8 +42,8 @@ pub(in super::super) struct Alternation {
     /// States at the samples, for step laws.
     pub(super) trail: Vec<f64>,
     /// Known states with which the next port with memory begins. The evaluation consumes them.
-    pub begin: Beginning,
-    /// `(1 - Π)⁻¹` of the port with memory whose derivative was evaluated last, see [`Beginning`].
+    pub begin: InitialState,
+    /// `(1 - Π)⁻¹` of the port with memory whose derivative was evaluated last, see [`InitialState`].
     pub forgets: Vec<f64>,
     /// `e^{2πji/N}` for every sample i.
     pub(super) turns: Vec<Complex64>,
@@ -55,15 +55,15 @@ pub(in super::super) struct Alternation {
     pub(super) row: Vec<Complex64>,
     pub(super) moment: Vec<f64>,
     pub(super) intervals: Vec<super::events::Interval>,
-    pub(super) extremes: Vec<super::events::Extreme>,
-    pub(super) branches: super::masing::Branches,
-    pub(super) grid: super::events::Grid,
-    pub(super) march: super::workspace::Memory,
+    pub(super) extremes: Vec<super::events::TurningPoint>,
+    pub(super) branches: super::masing::MasingBranches,
+    pub(super) grid: super::events::BracketingGrid,
+    pub(super) march: super::workspace::StepWorkspace,
 }
 
 /// Known states of a port with memory in a nearby motion.
 #[derive(Debug, Clone, Default)]
-pub(in super::super) struct Beginning {
+pub(in super::super) struct InitialState {
     /// States at t = 0; empty if they follow from the initial step out of static equilibrium.
     pub state: Vec<f64>,
     /// `(1 - Π)⁻¹`, row-major. `Π` is the derivative of the states after a period by the states
@@ -71,15 +71,15 @@ pub(in super::super) struct Beginning {
     pub forgets: Vec<f64>,
 }
 
-impl Beginning {
+impl InitialState {
     /// Returns itself if the law forgets its initial states, else the default. A state that is
     /// never forgotten must begin in static equilibrium.
     pub fn forgotten(&self) -> Self {
-        if self.forgets.is_empty() { Beginning::default() } else { self.clone() }
+        if self.forgets.is_empty() { InitialState::default() } else { self.clone() }
     }
 }
 
-impl Alternation {
+impl FrequencyTime {
     /// Returns the number of harmonics times the number of samples.
     pub fn resolution(&self) -> usize {
         self.pairs.len() * self.turns.len()
@@ -89,7 +89,7 @@ impl Alternation {
         let zeros = vec![0.0; samples];
         let three = || std::array::from_fn(|_| vec![0.0; samples]);
         let top = harmonics.last().copied().unwrap_or(0);
-        Alternation {
+        FrequencyTime {
             static_share: 1.0,
             marched: 0,
             repeats: REPEATS,
@@ -103,7 +103,7 @@ impl Alternation {
             by_frequency: None,
             state: Vec::new(),
             trail: Vec::new(),
-            begin: Beginning::default(),
+            begin: InitialState::default(),
             forgets: Vec::new(),
             turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
             argument: Vec::new(),
@@ -115,9 +115,9 @@ impl Alternation {
             row: vec![ZERO; harmonics.len()],
             intervals: Vec::new(),
             extremes: Vec::new(),
-            branches: super::masing::Branches::default(),
-            grid: super::events::Grid::new(top),
-            march: super::workspace::Memory::default(),
+            branches: super::masing::MasingBranches::default(),
+            grid: super::events::BracketingGrid::new(top),
+            march: super::workspace::StepWorkspace::default(),
             harmonics,
         }
     }

@@ -5,8 +5,8 @@
 //! one port, rounding cannot make one joint slip before the others. Each joint
 //! has a share of the sum; parallel rigid contacts share it by their limits.
 
-use super::sliders::Part;
-use super::{Kernel, Member, Port, Ports, Rigid, StaticState, Times};
+use super::sliders::ElasticPart;
+use super::{Kernel, Port, PortMember, Ports, RigidFriction, ScaledLaw, StaticState};
 use crate::law::{IdealElement, Slider};
 use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
@@ -14,13 +14,13 @@ use crate::model::{CollinearAxis, PARALLEL, SystemJoint};
 
 /// The ports of the joints added so far.
 #[derive(Default)]
-pub(super) struct Gathered {
+pub(super) struct PortBuilder {
     ports: Ports,
     /// Number of every force port, and the lines of its axes.
     lines: Vec<(usize, Vec<CollinearAxis>)>,
 }
 
-impl Gathered {
+impl PortBuilder {
     /// Adds the ports of joint number `j`.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl Gathered {
                 return Err(unsupported("its force scale is not finite and positive, which its resolvent needs"));
             }
             let measures = (prox.compliance(), scale, prox.minimum_penalty());
-            self.add_force(j, joint, Kernel::Prox(Times { law: law.clone(), times: 1.0 }), measures);
+            self.add_force(j, joint, Kernel::Prox(ScaledLaw { law: law.clone(), times: 1.0 }), measures);
         } else if law.step().is_some() {
             self.add(j, joint, Kernel::Step(law.clone()), (0.0, scale, 0.0));
         } else if law.rate().is_some() {
@@ -66,7 +66,7 @@ impl Gathered {
     fn add(&mut self, j: usize, joint: &SystemJoint, kernel: Kernel, (series, scale, least_penalty): (f64, f64, f64)) {
         let (first, axes) = (self.ports.axes.len(), joint.axes().len());
         self.ports.axes.extend((0..axes).map(|a| (j, a)));
-        let members = vec![Member { joint: j, factor: 1.0, share: 1.0 }];
+        let members = vec![PortMember { joint: j, factor: 1.0, share: 1.0 }];
         let mut port =
             Port { members, first, axes, series, scale, least_penalty, static_state: StaticState::default(), kernel };
         port.static_state.states = vec![0.0; port.states()];
@@ -85,12 +85,12 @@ impl Gathered {
                 IdealElement::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
                 IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {
                     scale += limit;
-                    parts.push(Part::Slider { stiffness, limit });
+                    parts.push(ElasticPart::Slider { stiffness, limit });
                 }
                 IdealElement::Stop { stiffness: 0.0, .. } => {}
                 IdealElement::Stop { gap, stiffness } => {
                     scale = f64::INFINITY;
-                    parts.push(Part::Stop { gap, stiffness });
+                    parts.push(ElasticPart::Stop { gap, stiffness });
                 }
             }
         }
@@ -98,7 +98,7 @@ impl Gathered {
             self.add(j, joint, Kernel::Sliders(parts), (0.0, scale, 0.0));
         }
         if rigid > 0.0 {
-            self.add_force(j, joint, Kernel::Rigid(Rigid { limit: rigid }), (0.0, rigid, 0.0));
+            self.add_force(j, joint, Kernel::Rigid(RigidFriction { limit: rigid }), (0.0, rigid, 0.0));
         }
     }
 
@@ -111,7 +111,7 @@ impl Gathered {
         });
         if let Some((port, factor, times)) = found {
             let share = factor.signum() * times;
-            self.ports.list[port].members.push(Member { joint, factor, share });
+            self.ports.list[port].members.push(PortMember { joint, factor, share });
         } else {
             self.lines.push((self.ports.list.len(), lines));
             self.add(joint, of, kernel, measures);

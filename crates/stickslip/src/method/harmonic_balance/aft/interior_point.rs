@@ -7,7 +7,7 @@
 //! equal μ > 0, the same at all samples, so that all four factors stay positive. A force at its
 //! limit in one step can therefore leave it in the next.
 
-use super::Alternation;
+use super::FrequencyTime;
 use num_complex::Complex64;
 
 /// Approximate initial force, relative to the limit, where `y` is largest.
@@ -17,18 +17,18 @@ const INSIDE: f64 = 0.99;
 
 /// The samples of one port.
 #[derive(Debug, Clone)]
-pub(in super::super) struct Barrier {
+pub(in super::super) struct InteriorPort {
     /// Slip limit, N.
     limit: f64,
     /// Unit of the products, N²: the limit times the largest `y`, or the limit
     /// squared if that is larger.
     unit: f64,
     /// Variables and step of every sample.
-    samples: Vec<Sample>,
+    samples: Vec<BarrierSample>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Sample {
+struct BarrierSample {
     force: f64,
     upper: f64,
     lower: f64,
@@ -41,7 +41,7 @@ struct Sample {
     step: [f64; 3],
 }
 
-impl Sample {
+impl BarrierSample {
     /// Returns the distances of the force from its upper and its lower limit.
     fn room(&self, limit: f64) -> [f64; 2] {
         [limit - self.force, limit + self.force]
@@ -55,9 +55,9 @@ impl Sample {
     }
 }
 
-impl Barrier {
+impl InteriorPort {
     /// Creates the initial iterate from the harmonics of `y` without the force.
-    pub fn new(limit: f64, alternation: &mut Alternation, y: &[Complex64]) -> Self {
+    pub fn new(limit: f64, alternation: &mut FrequencyTime, y: &[Complex64]) -> Self {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let largest = alternation.signal.iter().fold(limit, |most, y| most.max(y.abs()));
         let begin = |y: &f64| {
@@ -67,15 +67,15 @@ impl Barrier {
             let more = 0.5 * (held.abs() + held.hypot(2.0 * largest));
             let less = largest * (largest / more);
             let (upper, lower) = if held > 0.0 { (more, less) } else { (less, more) };
-            Sample { force, upper, lower, ..Sample::default() }
+            BarrierSample { force, upper, lower, ..BarrierSample::default() }
         };
         let samples = alternation.signal.iter().map(begin).collect();
-        Barrier { limit, unit: limit * largest, samples }
+        InteriorPort { limit, unit: limit * largest, samples }
     }
 
-    /// Returns the mean of the products after a share of the step, in units of [`Barrier::unit`].
+    /// Returns the mean of the products after a share of the step, in units of [`InteriorPort::unit`].
     pub fn gap(&self, share: f64) -> f64 {
-        let products = |s: &Sample| {
+        let products = |s: &BarrierSample| {
             let [force, upper, lower] = s.step.map(|step| share * step);
             (s.upper + upper) * (self.limit - s.force - force) + (s.lower + lower) * (self.limit + s.force + force)
         };
@@ -89,7 +89,7 @@ impl Barrier {
 
     /// Linearises the conditions at the argument with the harmonics `y`. Writes the derivative
     /// of the harmonics of `f` by those of the argument into `tangent`.
-    pub fn linearise(&mut self, alternation: &mut Alternation, y: &[Complex64], tangent: &mut [f64]) {
+    pub fn linearise(&mut self, alternation: &mut FrequencyTime, y: &[Complex64], tangent: &mut [f64]) {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         alternation.reserve_slopes(1);
         for (i, s) in self.samples.iter_mut().enumerate() {
@@ -107,7 +107,7 @@ impl Barrier {
     /// Sets the targets of the products to `gap`. With `corrected`, the targets include the
     /// second-order terms of the last step (Mehrotra's corrector). Writes the harmonics of the
     /// force after a step with an unchanged argument into `image`.
-    pub fn aim(&mut self, (gap, corrected): (f64, bool), alternation: &mut Alternation, image: &mut [Complex64]) {
+    pub fn aim(&mut self, (gap, corrected): (f64, bool), alternation: &mut FrequencyTime, image: &mut [Complex64]) {
         let product = gap * self.unit;
         for (s, force) in self.samples.iter_mut().zip(&mut alternation.force[0]) {
             let [step, upper, lower] = if corrected { s.step } else { [0.0; 3] };
@@ -120,7 +120,7 @@ impl Barrier {
 
     /// Computes the step to the argument with the harmonics `y`. Returns the
     /// share of it, at most 1, that stays inside all bounds.
-    pub fn step(&mut self, alternation: &mut Alternation, y: &[Complex64]) -> f64 {
+    pub fn step(&mut self, alternation: &mut FrequencyTime, y: &[Complex64]) -> f64 {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let mut most = 1.0 / INSIDE;
         for (s, y) in self.samples.iter_mut().zip(&alternation.signal) {
@@ -158,9 +158,9 @@ mod tests {
     fn the_path_ends_at_the_projection() {
         let limit = 0.7;
         for y in [-30.0, -0.71, -0.2, 0.0, 0.69, 5.0f64] {
-            let mut alternation = Alternation::new(vec![0], 16);
+            let mut alternation = FrequencyTime::new(vec![0], 16);
             let (argument, mut image, mut tangent) = ([Complex64::new(y, 0.0)], [Complex64::default()], [0.0; 4]);
-            let mut barrier = Barrier::new(limit, &mut alternation, &argument);
+            let mut barrier = InteriorPort::new(limit, &mut alternation, &argument);
             while barrier.left() > 1e-10 {
                 let gap = barrier.gap(0.0);
                 barrier.linearise(&mut alternation, &argument, &mut tangent);

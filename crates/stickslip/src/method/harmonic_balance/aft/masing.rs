@@ -15,9 +15,9 @@
 //! depends on the return points that are still remembered.
 
 use super::StaticState;
-use super::events::{Anchor, Extreme};
-use super::frequency_time::{Alternation, ZERO, add_block, as_block, pair};
-use super::series::{Series, turns};
+use super::events::{OffsetSource, TurningPoint};
+use super::frequency_time::{FrequencyTime, ZERO, add_block, as_block, pair};
+use super::series::{HarmonicSeries, turns};
 use super::sliders::{add_multiple, integrate_over};
 use crate::law::{Law, MasingView};
 use num_complex::Complex64;
@@ -28,14 +28,14 @@ use stickslip_numerics::quadrature;
 /// A return point, or the rest position of the law: displacement (m), and the
 /// quantity it depends on.
 #[derive(Debug, Clone, Copy)]
-struct Point {
+struct ReturnPoint {
     value: f64,
-    anchor: Anchor,
+    anchor: OffsetSource,
 }
 
 /// A part of the period on one branch, which begins at the last of its return points.
 #[derive(Debug, Clone)]
-struct Branch {
+struct MasingBranch {
     /// Phases, rad; the end may exceed one period.
     begin: f64,
     end: f64,
@@ -49,16 +49,16 @@ struct Branch {
 
 /// The branches of a period.
 #[derive(Debug, Clone, Default)]
-pub(in super::super) struct Branches {
-    list: Vec<Branch>,
-    points: Vec<Point>,
+pub(in super::super) struct MasingBranches {
+    list: Vec<MasingBranch>,
+    points: Vec<ReturnPoint>,
     /// The points that are remembered at the present phase.
-    memory: Vec<Point>,
+    memory: Vec<ReturnPoint>,
 }
 
 /// The force on a branch, from the displacement `from` with the force `begin`,
 /// with a scale of 1 or 2.
-struct Curve<'a> {
+struct BranchCurve<'a> {
     law: &'a dyn MasingView,
     from: f64,
     begin: f64,
@@ -66,7 +66,7 @@ struct Curve<'a> {
     sign: f64,
 }
 
-impl Curve<'_> {
+impl BranchCurve<'_> {
     /// Returns force (N) and slope (N/m).
     fn at(&self, u: f64) -> (f64, f64) {
         // only rounding places the motion before the return point
@@ -81,7 +81,7 @@ fn scale(legs: usize) -> f64 {
     if legs == 0 { 1.0 } else { 2.0 }
 }
 
-impl Branches {
+impl MasingBranches {
     fn clear(&mut self) {
         self.list.clear();
         self.points.clear();
@@ -91,12 +91,12 @@ impl Branches {
     fn push(&mut self, (begin, end): (f64, f64), sign: f64, turns: bool) {
         let first = self.points.len();
         self.points.extend_from_slice(&self.memory);
-        self.list.push(Branch { begin, end, sign, turns, points: first..self.points.len() });
+        self.list.push(MasingBranch { begin, end, sign, turns, points: first..self.points.len() });
     }
 
     /// Returns the force at the end of the last leg between these points.
     /// Writes its derivative by every point into `slopes`.
-    fn force(&self, law: &dyn MasingView, points: &[Point], slopes: &mut Vec<f64>) -> f64 {
+    fn force(&self, law: &dyn MasingView, points: &[ReturnPoint], slopes: &mut Vec<f64>) -> f64 {
         slopes.clear();
         slopes.resize(points.len(), 0.0);
         let mut sum = 0.0;
@@ -112,15 +112,15 @@ impl Branches {
 
     /// Returns the curve of a branch. Writes the derivative of its initial
     /// force by every point into `slopes`.
-    fn curve<'a>(&self, law: &'a dyn MasingView, branch: &Branch, slopes: &mut Vec<f64>) -> Curve<'a> {
+    fn curve<'a>(&self, law: &'a dyn MasingView, branch: &MasingBranch, slopes: &mut Vec<f64>) -> BranchCurve<'a> {
         let points = &self.points[branch.points.clone()];
         let begin = self.force(law, points, slopes);
         let from = points.last().map_or(0.0, |point| point.value);
-        Curve { law, from, begin, scale: scale(points.len() - 1), sign: branch.sign }
+        BranchCurve { law, from, begin, scale: scale(points.len() - 1), sign: branch.sign }
     }
 }
 
-impl Alternation {
+impl FrequencyTime {
     /// Adds the harmonics of the force of a law in the motion `c` to `force`,
     /// and their derivative to `tangent`.
     pub(super) fn masing(
@@ -134,8 +134,8 @@ impl Alternation {
         self.find(c);
         let harmonics = std::mem::take(&mut self.harmonics);
         let mut branches = std::mem::take(&mut self.branches);
-        self.remember(law, rest, Series { harmonics: &harmonics, c }, &mut branches);
-        self.add_branches(law, Series { harmonics: &harmonics, c }, &branches, (force, tangent));
+        self.remember(law, rest, HarmonicSeries { harmonics: &harmonics, c }, &mut branches);
+        self.add_branches(law, HarmonicSeries { harmonics: &harmonics, c }, &branches, (force, tangent));
         (self.branches, self.harmonics) = (branches, harmonics);
     }
 
@@ -146,7 +146,7 @@ impl Alternation {
         self.synthesise(c, |_| Complex64::new(1.0, 0.0));
         let harmonics = std::mem::take(&mut self.harmonics);
         let mut branches = std::mem::take(&mut self.branches);
-        self.remember(curve, rest, Series { harmonics: &harmonics, c }, &mut branches);
+        self.remember(curve, rest, HarmonicSeries { harmonics: &harmonics, c }, &mut branches);
         let n = self.samples();
         let sample = |phase: f64| (phase * n as f64 / TAU).ceil() as usize;
         let mut slopes = Vec::new();
@@ -173,16 +173,22 @@ impl Alternation {
     /// Computes the branches of a period from the turning points found before.
     /// The motion first passes one period from static equilibrium; after it the
     /// law has forgotten all that it can forget.
-    fn remember(&self, law: &dyn MasingView, rest: &StaticState, series: Series, branches: &mut Branches) {
+    fn remember(
+        &self,
+        law: &dyn MasingView,
+        rest: &StaticState,
+        series: HarmonicSeries,
+        branches: &mut MasingBranches,
+    ) {
         branches.clear();
-        branches.memory.push(Point { value: 0.0, anchor: Anchor::Nothing });
+        branches.memory.push(ReturnPoint { value: 0.0, anchor: OffsetSource::Nothing });
         let count = self.extremes.len();
         let rest = rest.displacement[0] * self.static_share;
         // static equilibrium is a return point if the motion reverses there
         let first = self.extremes.first().map_or(self.grid.value[0], |extreme| extreme.value);
         if (first - rest) * rest < 0.0 {
-            let end = Extreme { at: 0.0, value: rest };
-            self.add_leg(law, series, branches, (None, end, Anchor::Nothing));
+            let end = TurningPoint { at: 0.0, value: rest };
+            self.add_leg(law, series, branches, (None, end, OffsetSource::Nothing));
         }
         if count == 0 {
             let last = branches.memory[branches.memory.len() - 1].value;
@@ -191,9 +197,9 @@ impl Alternation {
         }
         for leg in 0..2 * count {
             let phase = |leg: usize| self.extremes[leg % count].at + TAU * (leg / count) as f64;
-            let end = Extreme { at: phase(leg), value: self.extremes[leg % count].value };
+            let end = TurningPoint { at: phase(leg), value: self.extremes[leg % count].value };
             let begin = if leg < count { None } else { Some(phase(leg - 1)) };
-            self.add_leg(law, series, branches, (begin, end, Anchor::At(end.at)));
+            self.add_leg(law, series, branches, (begin, end, OffsetSource::At(end.at)));
         }
     }
 
@@ -202,15 +208,15 @@ impl Alternation {
     fn add_leg(
         &self,
         law: &dyn MasingView,
-        series: Series,
-        branches: &mut Branches,
-        (begin, end, anchor): (Option<f64>, Extreme, Anchor),
+        series: HarmonicSeries,
+        branches: &mut MasingBranches,
+        (begin, end, anchor): (Option<f64>, TurningPoint, OffsetSource),
     ) {
         let last = branches.memory[branches.memory.len() - 1].value;
         let sign = (end.value - last).signum();
         let (mut begin, mut turns) = (begin, true);
         // records a branch that ends where the motion passes `value`
-        let mut until = |branches: &mut Branches, value: Option<f64>| {
+        let mut until = |branches: &mut MasingBranches, value: Option<f64>| {
             let Some(from) = begin else { return };
             let to = value.map_or(end.at, |value| {
                 let inside = (end.value - value) * sign > 0.0;
@@ -232,22 +238,22 @@ impl Alternation {
         if branches.memory.len() == 1 && (end.value - rest).abs() >= law.slip_displacement() {
             until(branches, Some(rest + sign * law.slip_displacement()));
             until(branches, None);
-            branches.memory[0] = Point { value: end.value - sign * law.slip_displacement(), anchor };
+            branches.memory[0] = ReturnPoint { value: end.value - sign * law.slip_displacement(), anchor };
         } else {
             until(branches, None);
         }
-        branches.memory.push(Point { value: end.value, anchor });
+        branches.memory.push(ReturnPoint { value: end.value, anchor });
     }
 
     /// Adds the harmonics of the force, and their derivative.
     fn add_branches(
         &mut self,
         law: &dyn MasingView,
-        series: Series,
-        branches: &Branches,
+        series: HarmonicSeries,
+        branches: &MasingBranches,
         (force, mut tangent): (&mut [Complex64], Option<&mut [f64]>),
     ) {
-        let Series { harmonics, .. } = series;
+        let HarmonicSeries { harmonics, .. } = series;
         let (nh, top) = (harmonics.len(), harmonics.last().copied().unwrap_or(0));
         let share = |h: usize| if h == 0 { 1.0 / TAU } else { 1.0 / PI };
         let panel = TAU / (2 * top + PANELS) as f64;
@@ -326,12 +332,12 @@ impl Alternation {
 const PANELS: usize = 8;
 
 /// Computes the row of points and their factors: `Σ factor δu* = Re(row δU)`.
-fn row<'a>(row: &mut [Complex64], harmonics: &[usize], points: impl IntoIterator<Item = (&'a Point, f64)>) {
+fn row<'a>(row: &mut [Complex64], harmonics: &[usize], points: impl IntoIterator<Item = (&'a ReturnPoint, f64)>) {
     row.fill(ZERO);
     for (point, factor) in points {
         match point.anchor {
-            Anchor::Nothing => {}
-            Anchor::At(phase) => {
+            OffsetSource::Nothing => {}
+            OffsetSource::At(phase) => {
                 let (mut turn, step) = turns(harmonics, phase);
                 for value in row.iter_mut() {
                     *value += turn * factor;
@@ -375,7 +381,7 @@ mod tests {
     }
 
     fn respond(law: &Iwan, harmonics: &[usize], c: &[Complex64], slopes: Option<&mut [f64]>) -> Vec<Complex64> {
-        let mut alternation = Alternation::new(harmonics.to_vec(), 256);
+        let mut alternation = FrequencyTime::new(harmonics.to_vec(), 256);
         let mut force = vec![ZERO; c.len()];
         alternation.masing(law, &StaticState::default(), c, &mut force, slopes);
         force
@@ -475,7 +481,7 @@ mod tests {
         let far = law.slip_displacement();
         let c = [0.1 * far, 0.5 * far, 0.3 * far, 0.4 * far].map(|x| Complex64::new(x, 0.3 * x));
         let c = [c[0].re.into(), c[1], c[2], c[3]];
-        let mut alternation = Alternation::new(harmonics, 256);
+        let mut alternation = FrequencyTime::new(harmonics, 256);
         alternation.sample_masing(&law, &StaticState::default(), &c);
         let mut z = alternation.state.clone();
         let at = [alternation.signal[0], 0.0, 0.0];

@@ -26,11 +26,11 @@ mod sliders;
 mod step;
 mod workspace;
 
-pub(super) use frequency_time::{Alternation, Beginning};
-use grouping::Gathered;
-pub(super) use interior_point::Barrier;
-use prox::{Rigid, Times};
-use sliders::Part;
+pub(super) use frequency_time::{FrequencyTime, InitialState};
+use grouping::PortBuilder;
+pub(super) use interior_point::InteriorPort;
+use prox::{RigidFriction, ScaledLaw};
+use sliders::ElasticPart;
 pub(super) use workspace::{REPEATS, at_once};
 
 use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
@@ -48,11 +48,11 @@ pub(super) const MANY_DIRECTIONS: usize = 24;
 enum Kernel {
     /// Sliders behind springs, and stops, in parallel along one axis. The force
     /// is exact for the series.
-    Sliders(Vec<Part>),
+    Sliders(Vec<ElasticPart>),
     /// Rigid sliders in parallel along one axis, combined into one.
-    Rigid(Rigid),
+    Rigid(RigidFriction),
     /// A law by its resolvent.
-    Prox(Times),
+    Prox(ScaledLaw),
     /// A law by its curve of first loading. The force is exact for the series.
     Masing(SharedLaw),
     /// A law by its return map.
@@ -64,7 +64,7 @@ enum Kernel {
 /// A joint that acts at a port. Each axis of the port corresponds to the
 /// joint's axis of the same number.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Member {
+pub(super) struct PortMember {
     pub joint: usize,
     /// Motion of the joint divided by the motion of the port.
     pub factor: f64,
@@ -88,7 +88,7 @@ pub(super) struct StaticState {
 #[derive(Debug, Clone)]
 pub(super) struct Port {
     /// The joints of the port. The port has the axes of the first one.
-    pub members: Vec<Member>,
+    pub members: Vec<PortMember>,
     /// Number of its first axis among the axes of all ports.
     pub first: usize,
     /// Number of axes.
@@ -145,10 +145,10 @@ impl Port {
     }
 
     /// Tells whether the kernel distinguishes slip from stick at every sample
-    /// ([`Alternation::slips`]).
+    /// ([`FrequencyTime::slips`]).
     pub fn tells_slip(&self) -> bool {
         match &self.kernel {
-            Kernel::Sliders(parts) => parts.iter().all(|part| matches!(part, Part::Slider { .. })),
+            Kernel::Sliders(parts) => parts.iter().all(|part| matches!(part, ElasticPart::Slider { .. })),
             Kernel::Rigid(_) => true,
             _ => false,
         }
@@ -160,14 +160,14 @@ impl Port {
     }
 
     /// Returns the entry of a joint, if the joint belongs to this port.
-    pub fn member(&self, joint: usize) -> Option<&Member> {
+    pub fn member(&self, joint: usize) -> Option<&PortMember> {
         self.members.iter().find(|member| member.joint == joint)
     }
 
     /// Tells whether two ports have the same kind, axes and joints, whatever their parameters.
     pub fn is_like(&self, other: &Port) -> bool {
         let kind = |port: &Port| (port.first, port.axes, std::mem::discriminant(&port.kernel));
-        let alike = |(own, its): (&Member, &Member)| own.joint == its.joint;
+        let alike = |(own, its): (&PortMember, &PortMember)| own.joint == its.joint;
         kind(self) == kind(other)
             && self.members.len() == other.members.len()
             && self.members.iter().zip(&other.members).all(alike)
@@ -187,7 +187,7 @@ impl Port {
     /// Estimates the stiffness at rest along its axes, N/m; zero if the port is rigid.
     pub fn stiffness(&self) -> f64 {
         match &self.kernel {
-            Kernel::Sliders(parts) => parts.iter().map(Part::stiffness).sum(),
+            Kernel::Sliders(parts) => parts.iter().map(ElasticPart::stiffness).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => {
                 if self.series > 0.0 {
                     1.0 / self.series
@@ -207,7 +207,7 @@ impl Port {
     /// zero for a force port, whose force is an unknown.
     pub fn closed(&self, axis: usize) -> f64 {
         match &self.kernel {
-            Kernel::Sliders(parts) => parts.iter().map(Part::closed).sum(),
+            Kernel::Sliders(parts) => parts.iter().map(ElasticPart::closed).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
             Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed_stiffness() {
                 Some(closed) => closed[axis],
@@ -220,7 +220,7 @@ impl Port {
     /// zero without springs.
     pub fn reach(&self) -> f64 {
         match &self.kernel {
-            Kernel::Sliders(parts) => parts.iter().map(Part::reach).fold(0.0, f64::max),
+            Kernel::Sliders(parts) => parts.iter().map(ElasticPart::reach).fold(0.0, f64::max),
             Kernel::Masing(law) => law.masing().map_or(0.0, MasingView::slip_displacement),
             _ => 0.0,
         }
@@ -235,7 +235,7 @@ impl Port {
     /// Returns the number of internal states of a motion port.
     fn states(&self) -> usize {
         match &self.kernel {
-            Kernel::Sliders(parts) => parts.iter().filter(|part| matches!(part, Part::Slider { .. })).count(),
+            Kernel::Sliders(parts) => parts.iter().filter(|part| matches!(part, ElasticPart::Slider { .. })).count(),
             Kernel::Step(law) | Kernel::Masing(law) => law.step().map_or(0, |step| step.states()),
             Kernel::Rate(law) => law.rate().map_or(0, |rate| rate.states()),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0,
@@ -299,7 +299,7 @@ impl Ports {
     }
 
     fn of(joints: &[SystemJoint]) -> Result<Self, MethodError> {
-        let mut gathered = Gathered::default();
+        let mut gathered = PortBuilder::default();
         for (j, joint) in joints.iter().enumerate() {
             gathered.push(j, joint)?;
         }
@@ -320,7 +320,7 @@ impl Ports {
             let (before, axes) = (sector * joints, all.axes.len());
             all.axes.extend(first.axes.iter().map(|(joint, a)| (before + joint, *a)));
             all.list.extend(first.iter().map(|port| {
-                let members = port.members.iter().map(|member| Member { joint: before + member.joint, ..*member });
+                let members = port.members.iter().map(|member| PortMember { joint: before + member.joint, ..*member });
                 Port { members: members.collect(), first: axes + port.first, ..port.clone() }
             }));
         }
@@ -402,7 +402,7 @@ impl Ports {
 /// where the motion along a contact is imposed, so that the structure cannot move.
 const IMPOSED: f64 = 1e-9;
 
-impl Alternation {
+impl FrequencyTime {
     /// Computes the harmonics of the force of a motion port that moves with the harmonics `c`,
     /// [axis][harmonic], into `force`. Writes the derivative by (Re, Im) of the harmonics into
     /// `tangent` (row-major, 2 × axes × harmonics squared).
@@ -455,7 +455,7 @@ impl Alternation {
     /// Computes the image of the forces λ of a force port along a motion c: `P J(λ + ε c')`. If
     /// the motion is imposed (`penalty` infinite), the image is the law's force at that
     /// velocity, and λ does not change it. Writes the derivative of the image by `λ + ε c'`
-    /// into `tangent`. For `share`, see [`Alternation::respond`].
+    /// into `tangent`. For `share`, see [`FrequencyTime::respond`].
     pub fn image(
         &mut self,
         port: &Port,
@@ -487,7 +487,7 @@ impl Alternation {
         self.argument = signal;
     }
 
-    /// Samples the forces of a port in a converged motion, see [`Alternation::force`].
+    /// Samples the forces of a port in a converged motion, see [`FrequencyTime::force`].
     pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
         if let Kernel::Sliders(parts) = &port.kernel {
             return self.sample_slides(parts, &port.static_state, c);

@@ -11,8 +11,8 @@
 //! directions, states and derivatives are those of a joint that moves straight from static
 //! equilibrium to the beginning of the period.
 
-use super::frequency_time::{Alternation, share};
-use super::workspace::{Memory, REPEATS, at_once};
+use super::frequency_time::{FrequencyTime, share};
+use super::workspace::{REPEATS, StepWorkspace, at_once};
 use crate::law::MAX_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -38,7 +38,7 @@ const NEUTRAL: f64 = 1e-9;
 const FEW: usize = 16;
 
 /// A law with memory as a sequence of steps.
-pub(super) trait March {
+pub(super) trait StepSequence {
     fn states(&self) -> usize;
     /// Returns the size of the states.
     fn state_scale(&self) -> f64;
@@ -69,10 +69,10 @@ pub(super) trait March {
     fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
 }
 
-impl Alternation {
+impl FrequencyTime {
     /// Computes the forces along the axes and their derivative. The forces are
     /// NaN if no periodic states are found.
-    pub(super) fn march(&mut self, march: &mut dyn March, force: &mut [Complex64], tangent: Option<&mut [f64]>) {
+    pub(super) fn march(&mut self, march: &mut dyn StepSequence, force: &mut [Complex64], tangent: Option<&mut [f64]>) {
         let nh = self.harmonics.len();
         let mut memory = std::mem::take(&mut self.march);
         if let Some(product) = self.repeat(march, &mut memory, tangent.is_some()) {
@@ -94,7 +94,12 @@ impl Alternation {
     /// Finds periodic states, into `self.state`, and the forces. With `linear`,
     /// computes the derivatives of all steps and returns Π; otherwise returns
     /// an arbitrary matrix. `None` if no periodic states are found.
-    fn repeat(&mut self, march: &mut dyn March, memory: &mut Memory, linear: bool) -> Option<DMatrix<f64>> {
+    fn repeat(
+        &mut self,
+        march: &mut dyn StepSequence,
+        memory: &mut StepWorkspace,
+        linear: bool,
+    ) -> Option<DMatrix<f64>> {
         let m = march.states();
         let scale = march.state_scale();
         let known = std::mem::take(&mut self.begin);
@@ -166,7 +171,7 @@ impl Alternation {
     /// equations" (1965), his good method.
     fn repeat_nearby(
         &mut self,
-        march: &mut dyn March,
+        march: &mut dyn StepSequence,
         z: &mut DVector<f64>,
         mut inverse: DMatrix<f64>,
     ) -> Option<bool> {
@@ -199,7 +204,7 @@ impl Alternation {
     /// Integrates one period and returns the states after it. `None` if a step has no solution.
     fn period(
         &mut self,
-        march: &mut dyn March,
+        march: &mut dyn StepSequence,
         z: &DVector<f64>,
         mut rows: Option<&mut Vec<f64>>,
     ) -> Option<DVector<f64>> {
@@ -219,21 +224,21 @@ impl Alternation {
     /// the derivatives of the forces by the initial states.
     fn linear_period(
         &mut self,
-        march: &mut dyn March,
+        march: &mut dyn StepSequence,
         z: &DVector<f64>,
-        memory: &mut Memory,
+        memory: &mut StepWorkspace,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let after = self.period(march, z, Some(&mut memory.rows))?;
         let n = self.samples();
         memory.by_state.resize(n * march.axes() * march.states(), 0.0);
-        Some((after, Chain::of(march, &memory.rows, n).product(&mut memory.by_state)))
+        Some((after, PeriodDerivatives::of(march, &memory.rows, n).product(&mut memory.by_state)))
     }
 
     /// Adds the derivative of the forces. Returns false if the first period has no solution.
     fn march_tangent(
         &mut self,
-        march: &mut dyn March,
-        memory: &mut Memory,
+        march: &mut dyn StepSequence,
+        memory: &mut StepWorkspace,
         product: &DMatrix<f64>,
         tangent: &mut [f64],
     ) -> bool {
@@ -271,7 +276,7 @@ impl Alternation {
         let one = Complex64::new(1.0, 0.0);
         let ends = |h: &usize| march.inputs() == 2 && march.waves(*h, TAU / n as f64, one)[1] == one;
         let by_ends = few && self.harmonics.iter().all(ends);
-        let own = if by_ends { d - Chain::of(march, &memory.rows, n).momentary() } else { d };
+        let own = if by_ends { d - PeriodDerivatives::of(march, &memory.rows, n).momentary() } else { d };
         for a in own..d {
             self.momentary_tangent(march, &memory.rows, a, tangent);
         }
@@ -284,7 +289,7 @@ impl Alternation {
             for first in (0..moved).step_by(together.max(1)) {
                 let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
                 let tall = together * wide_here;
-                self.follow(march, memory, steps, (Input::Solution { first }, together, wide_here, own));
+                self.follow(march, memory, steps, (DerivativeVariable::Solution { first }, together, wide_here, own));
                 if few {
                     // [sample][axis][column] times the projection on the harmonics
                     memory.spectrum.resize(own * tall * wide, 0.0);
@@ -319,7 +324,7 @@ impl Alternation {
             }
         }
         if march.knows_frequency() {
-            self.follow(march, memory, (beginning.as_deref(), &inverse), (Input::Frequency, 1, 1, d));
+            self.follow(march, memory, (beginning.as_deref(), &inverse), (DerivativeVariable::Frequency, 1, 1, d));
             memory.shift_columns(m, 1);
             memory.signal.resize(n, 0.0);
             for a in 0..d {
@@ -334,7 +339,7 @@ impl Alternation {
 
     /// Adds the derivative of the force along axis `a` by the displacement at
     /// the end of the step, at every sample.
-    fn momentary_tangent(&mut self, march: &dyn March, rows: &[f64], a: usize, tangent: &mut [f64]) {
+    fn momentary_tangent(&mut self, march: &dyn StepSequence, rows: &[f64], a: usize, tangent: &mut [f64]) {
         let (m, d, width) = (march.states(), march.axes(), width(march));
         self.reserve_slopes(1);
         for b in 0..d {
@@ -364,7 +369,12 @@ impl Alternation {
 
     /// Fills the derivatives of the inputs by the parts of some harmonics of a motion:
     /// [sample][kind][part], followed by those of the initial step.
-    fn fill_waves(&self, march: &dyn March, Memory { waves, steps, .. }: &mut Memory, range: Range<usize>) {
+    fn fill_waves(
+        &self,
+        march: &dyn StepSequence,
+        StepWorkspace { waves, steps, .. }: &mut StepWorkspace,
+        range: Range<usize>,
+    ) {
         let (n, kinds, harmonics) = (self.samples(), march.inputs(), &self.harmonics[range]);
         // all steps have these factors, rotated on the unit circle
         let one = Complex64::new(1.0, 0.0);
@@ -401,22 +411,22 @@ impl Alternation {
     /// forgotten; the states at t = 0 then change with the inputs.
     fn follow(
         &self,
-        march: &dyn March,
-        memory: &mut Memory,
+        march: &dyn StepSequence,
+        memory: &mut StepWorkspace,
         (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
-        (input, count, wide, own): (Input, usize, usize, usize),
+        (input, count, wide, own): (DerivativeVariable, usize, usize, usize),
     ) {
         let n = self.samples();
         let (m, d) = (march.states(), march.axes());
         let width = width(march);
         let size = (m + d) * width;
-        let by = By { input, kinds: march.inputs(), axes: d, width, wide, tall: count * wide };
+        let by = InputLayout { input, kinds: march.inputs(), axes: d, width, wide, tall: count * wide };
         let tall = by.tall;
         let (mut start, mut next) = (vec![0.0; m * tall], vec![0.0; m * tall]);
         let table = &memory.waves;
         let at = |i: usize| &table[i * by.kinds * wide..][..by.kinds * wide];
         let none = Vec::new();
-        let waves = |i: usize| if matches!(input, Input::Frequency) { &none[..] } else { at(i) };
+        let waves = |i: usize| if matches!(input, DerivativeVariable::Frequency) { &none[..] } else { at(i) };
         if let Some(beginning) = beginning {
             // the factors of the initial step follow those of the samples
             by.advance(&memory.first[..m * width], waves(n), &next, &mut start);
@@ -456,7 +466,7 @@ impl Alternation {
 
     /// Computes the derivatives of the steps of the first period, and of the
     /// initial step into `first`. Restores `self.force`.
-    fn first_period(&mut self, march: &mut dyn March, first: &mut Vec<f64>) -> Option<Vec<f64>> {
+    fn first_period(&mut self, march: &mut dyn StepSequence, first: &mut Vec<f64>) -> Option<Vec<f64>> {
         let (m, d) = (march.states(), march.axes());
         first.resize((m + d) * width(march), 0.0);
         let mut z = DVector::zeros(m);
@@ -472,7 +482,7 @@ impl Alternation {
     }
 }
 
-impl Memory {
+impl StepWorkspace {
     /// Adds to the columns the effect of the changes of the states at t = 0 on the forces.
     fn shift_columns(&mut self, states: usize, wide: usize) {
         if states == 0 {
@@ -486,7 +496,7 @@ impl Memory {
 
 /// The derivatives of all steps of a period: [sample][state, then force]. The columns are the
 /// inputs, then from `before` on the states before the step.
-struct Chain<'a> {
+struct PeriodDerivatives<'a> {
     rows: &'a [f64],
     width: usize,
     before: usize,
@@ -495,10 +505,10 @@ struct Chain<'a> {
     samples: usize,
 }
 
-impl<'a> Chain<'a> {
-    fn of(march: &dyn March, rows: &'a [f64], samples: usize) -> Self {
+impl<'a> PeriodDerivatives<'a> {
+    fn of(march: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
         let (states, axes) = (march.states(), march.axes());
-        Chain { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
+        PeriodDerivatives { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
     }
 
     /// Returns the number of trailing forces that depend only on the end of the step at every
@@ -561,13 +571,13 @@ impl<'a> Chain<'a> {
 
 /// Returns the number of derivatives of a step: by its inputs, by the states
 /// before it, and by ω if that is known.
-fn width(march: &dyn March) -> usize {
+fn width(march: &dyn StepSequence) -> usize {
     march.inputs() * march.axes() + march.states() + usize::from(march.knows_frequency())
 }
 
 /// The variables of a derivative.
 #[derive(Clone, Copy)]
-enum Input {
+enum DerivativeVariable {
     /// The harmonics of the motion along this axis and the next ones.
     Solution { first: usize },
     /// The frequency ω.
@@ -580,8 +590,8 @@ fn parts(wave: Complex64, h: usize) -> (f64, f64) {
 }
 
 /// Layout of the derivatives of a step by its inputs.
-struct By {
-    input: Input,
+struct InputLayout {
+    input: DerivativeVariable,
     kinds: usize,
     axes: usize,
     width: usize,
@@ -590,7 +600,7 @@ struct By {
     tall: usize,
 }
 
-impl By {
+impl InputLayout {
     /// Multiplies `rows` by the inputs, [kind][column of any axis], and by the states,
     /// [state][column]. Writes the result into `out`, [row][column].
     #[inline]
@@ -601,7 +611,7 @@ impl By {
                 let states = states.chunks_exact(self.tall).map(|state| &state[number * self.wide..][..self.wide]);
                 match self.input {
                     // most laws: two inputs and two states, all at once
-                    Input::Solution { first } if self.kinds == 2 && states.len() == 2 => {
+                    DerivativeVariable::Solution { first } if self.kinds == 2 && states.len() == 2 => {
                         let weights = [row[first + number], row[self.axes + first + number], before[0], before[1]];
                         let mut states = states;
                         let (Some(one), Some(two)) = (states.next(), states.next()) else { continue };
@@ -609,13 +619,13 @@ impl By {
                         mix(weights, [from, to, one, two], out);
                         continue;
                     }
-                    Input::Solution { first } => {
+                    DerivativeVariable::Solution { first } => {
                         out.fill(0.0);
                         for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
                             add(out, row[kind * self.axes + first + number], wave);
                         }
                     }
-                    Input::Frequency => out.fill(row[self.width - 1]),
+                    DerivativeVariable::Frequency => out.fill(row[self.width - 1]),
                 }
                 before.iter().zip(states).for_each(|(weight, state)| add(out, *weight, state));
             }

@@ -14,7 +14,7 @@
 //! passes through zero, and the value in the middle of the sample is taken.
 
 use super::Port;
-use super::frequency_time::{Alternation, add_block, as_block, pair, share};
+use super::frequency_time::{FrequencyTime, add_block, as_block, pair, share};
 use crate::law::{MAX_DIRECTIONS, ProxView, SampleMeans, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -26,12 +26,12 @@ const SMOOTH: f64 = 0.1;
 
 /// Rigid friction along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rigid {
+pub(super) struct RigidFriction {
     /// Slip limit, N.
     pub limit: f64,
 }
 
-impl ProxView for Rigid {
+impl ProxView for RigidFriction {
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         force[0] = y[0].clamp(-self.limit, self.limit);
         slope[0] = if y[0].abs() < self.limit { 1.0 } else { 0.0 };
@@ -45,18 +45,18 @@ impl ProxView for Rigid {
 /// A law with a resolvent `J`, and its forces multiplied by τ: `τ φ` has the
 /// resolvent `τ J(y/τ)` with the penalty `ε/τ`.
 #[derive(Debug, Clone)]
-pub(super) struct Times {
+pub(super) struct ScaledLaw {
     pub law: SharedLaw,
     pub times: f64,
 }
 
-impl Times {
+impl ScaledLaw {
     fn one(&self) -> &dyn ProxView {
         self.law.prox().expect("a law without a resolvent has another kernel")
     }
 }
 
-impl ProxView for Times {
+impl ProxView for ScaledLaw {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let mut share = [0.0; MAX_DIRECTIONS];
         share.iter_mut().zip(y).for_each(|(share, y)| *share = y / self.times);
@@ -90,7 +90,7 @@ impl ProxView for Times {
     }
 }
 
-impl Alternation {
+impl FrequencyTime {
     /// Adds the harmonics of the resolvent of the signal `y`, [axis][harmonic],
     /// to `image`, and their derivative to `tangent`.
     pub(super) fn resolve(

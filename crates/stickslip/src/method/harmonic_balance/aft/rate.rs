@@ -10,8 +10,8 @@
 //! Source: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), Sec. IV.5.
 
 use super::Port;
-use super::frequency_time::Alternation;
-use super::periodic_state::March;
+use super::frequency_time::FrequencyTime;
+use super::periodic_state::StepSequence;
 use crate::law::{MAX_DIRECTIONS, RatePoint, RateView, RelativeMotion};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use num_complex::Complex64;
@@ -33,7 +33,7 @@ const LEFT: f64 = 2.0 / 3.0;
 /// period, as a share of the period.
 const LEAD: f64 = 0.25;
 
-impl Alternation {
+impl FrequencyTime {
     /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to
     /// `force`, and their derivative to `tangent`.
     pub(super) fn rate(
@@ -143,7 +143,7 @@ impl Alternation {
         let displacement = std::mem::take(&mut self.displacement);
         let velocity = std::mem::take(&mut self.velocity);
         let states = rate.states();
-        let mut march = RateMarch {
+        let mut march = RateStepper {
             rate,
             axes,
             omega,
@@ -167,7 +167,7 @@ type Signals = [Vec<f64>; MAX_DIRECTIONS];
 
 /// Steps of a rate law along a sampled motion. The inputs of a step are displacements and
 /// velocities at the first stage, then at the end.
-struct RateMarch<'a> {
+struct RateStepper<'a> {
     rate: &'a dyn RateView,
     axes: usize,
     omega: f64,
@@ -188,7 +188,7 @@ struct RateMarch<'a> {
     frequency: bool,
 }
 
-impl RateMarch<'_> {
+impl RateStepper<'_> {
     fn advance(
         &mut self,
         (length, motions): (f64, [RelativeMotion<f64>; 2]),
@@ -370,7 +370,7 @@ fn newton_step(
     Some((change, size, lu))
 }
 
-impl March for RateMarch<'_> {
+impl StepSequence for RateStepper<'_> {
     fn states(&self) -> usize {
         self.rate.states()
     }

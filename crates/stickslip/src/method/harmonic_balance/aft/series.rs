@@ -1,8 +1,8 @@
 //! A motion along an axis at any phase: value, slope and curvature of its
 //! series, its zeros, and its range.
 
-use super::events::Grid;
-use super::frequency_time::Alternation;
+use super::events::BracketingGrid;
+use super::frequency_time::FrequencyTime;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -14,12 +14,12 @@ const REFINED: usize = 8;
 
 /// A Fourier series with equally spaced harmonics.
 #[derive(Clone, Copy)]
-pub(super) struct Series<'a> {
+pub(super) struct HarmonicSeries<'a> {
     pub(super) harmonics: &'a [usize],
     pub(super) c: &'a [Complex64],
 }
 
-impl Series<'_> {
+impl HarmonicSeries<'_> {
     /// Returns value, slope and curvature at a phase.
     pub(super) fn at(&self, theta: f64) -> (f64, f64, f64) {
         let (mut turn, step) = turns(self.harmonics, theta);
@@ -88,16 +88,16 @@ impl Series<'_> {
     }
 }
 
-impl Alternation {
+impl FrequencyTime {
     /// Returns the least and the largest value of the motion with harmonics `c`. Between two
     /// grid points the motion exceeds both by no more than its curvature allows. Newton's
     /// method refines the grid points that are this close to the extreme ones.
     pub fn range(&mut self, c: &[Complex64]) -> (f64, f64) {
-        let Grid { fourier, pairs, value, .. } = &mut self.grid;
+        let BracketingGrid { fourier, pairs, value, .. } = &mut self.grid;
         pairs.clear();
         pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
         fourier.synthesize(pairs, value);
-        let series = Series { harmonics: &self.harmonics, c };
+        let series = HarmonicSeries { harmonics: &self.harmonics, c };
         let angle = TAU / value.len() as f64;
         let bend: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum();
         let above = 0.125 * bend * angle * angle;

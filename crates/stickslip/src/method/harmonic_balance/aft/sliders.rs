@@ -12,27 +12,27 @@
 //! Every stick interval adds one rank-one term to the derivative.
 
 use super::StaticState;
-use super::events::{Anchor, Extreme, Grid, Interval};
-use super::frequency_time::{Alternation, ZERO, add_block, as_block, pair};
-use super::series::{Series, turns};
+use super::events::{BracketingGrid, Interval, OffsetSource, TurningPoint};
+use super::frequency_time::{FrequencyTime, ZERO, add_block, as_block, pair};
+use super::series::{HarmonicSeries, turns};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
 /// One of the parallel parts of a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Part {
+pub(super) enum ElasticPart {
     /// A slider behind a spring (N/m, N).
     Slider { stiffness: f64, limit: f64 },
     /// A spring beyond a gap (m, N/m).
     Stop { gap: f64, stiffness: f64 },
 }
 
-impl Part {
+impl ElasticPart {
     /// Returns the stiffness at rest, N/m.
     pub fn stiffness(&self) -> f64 {
         match *self {
-            Part::Slider { stiffness, .. } => stiffness,
-            Part::Stop { gap, stiffness } => {
+            ElasticPart::Slider { stiffness, .. } => stiffness,
+            ElasticPart::Stop { gap, stiffness } => {
                 if gap < 0.0 {
                     stiffness
                 } else {
@@ -45,37 +45,37 @@ impl Part {
     /// Returns the stiffness in contact, N/m.
     pub fn closed(&self) -> f64 {
         match *self {
-            Part::Slider { stiffness, .. } | Part::Stop { stiffness, .. } => stiffness,
+            ElasticPart::Slider { stiffness, .. } | ElasticPart::Stop { stiffness, .. } => stiffness,
         }
     }
 
     /// Returns the elongation at which the spring of a slider begins to slip, m; zero for a stop.
     pub fn reach(&self) -> f64 {
         match *self {
-            Part::Slider { stiffness, limit } => limit / stiffness,
-            Part::Stop { .. } => 0.0,
+            ElasticPart::Slider { stiffness, limit } => limit / stiffness,
+            ElasticPart::Stop { .. } => 0.0,
         }
     }
 }
 
 /// Returns the force of each part's slider in static equilibrium, N; zero for a stop.
-fn held<'a>(parts: &'a [Part], rest: &'a StaticState) -> impl Iterator<Item = f64> + 'a {
+fn held<'a>(parts: &'a [ElasticPart], rest: &'a StaticState) -> impl Iterator<Item = f64> + 'a {
     let mut states = rest.states.iter();
     parts.iter().map(move |part| match part {
-        Part::Slider { .. } => states.next().copied().unwrap_or(0.0),
-        Part::Stop { .. } => 0.0,
+        ElasticPart::Slider { .. } => states.next().copied().unwrap_or(0.0),
+        ElasticPart::Stop { .. } => 0.0,
     })
 }
 
 /// Newton step of an event, in grid steps, that counts as rounding.
 const PLACED: f64 = 1e-11;
 
-impl Alternation {
+impl FrequencyTime {
     /// Adds the harmonics of the force of the parts in the motion `c` to
     /// `force`, and their derivative to `tangent`.
     pub(super) fn slide(
         &mut self,
-        parts: &[Part],
+        parts: &[ElasticPart],
         rest: &StaticState,
         c: &[Complex64],
         force: &mut [Complex64],
@@ -85,7 +85,7 @@ impl Alternation {
         self.state.clear();
         let harmonics = std::mem::take(&mut self.harmonics);
         for (part, hold) in parts.iter().zip(held(parts, rest)) {
-            self.history(part, [rest.displacement[0], hold], Series { harmonics: &harmonics, c });
+            self.history(part, [rest.displacement[0], hold], HarmonicSeries { harmonics: &harmonics, c });
             self.add_intervals(&harmonics, c, force, tangent.as_deref_mut());
         }
         self.harmonics = harmonics;
@@ -93,7 +93,7 @@ impl Alternation {
 
     /// Samples the force and the slip of the parts. Writes the forces of the
     /// sliders at t = 0 into `self.state`.
-    pub(super) fn sample_slides(&mut self, parts: &[Part], rest: &StaticState, c: &[Complex64]) {
+    pub(super) fn sample_slides(&mut self, parts: &[ElasticPart], rest: &StaticState, c: &[Complex64]) {
         self.find(c);
         self.synthesise(c, |_| Complex64::new(1.0, 0.0));
         self.state.clear();
@@ -102,7 +102,7 @@ impl Alternation {
         let n = self.samples();
         let harmonics = std::mem::take(&mut self.harmonics);
         for (part, hold) in parts.iter().zip(held(parts, rest)) {
-            self.history(part, [rest.displacement[0], hold], Series { harmonics: &harmonics, c });
+            self.history(part, [rest.displacement[0], hold], HarmonicSeries { harmonics: &harmonics, c });
             let before = self.force[0][0];
             for interval in &self.intervals {
                 let sample = |phase: f64| (phase * n as f64 / TAU).ceil() as isize;
@@ -117,7 +117,7 @@ impl Alternation {
                     }
                 }
             }
-            if matches!(part, Part::Slider { .. }) {
+            if matches!(part, ElasticPart::Slider { .. }) {
                 self.state.push(self.force[0][0] - before);
             }
         }
@@ -126,7 +126,7 @@ impl Alternation {
 
     /// Samples the motion on the grid, and finds its turning points.
     pub(super) fn find(&mut self, c: &[Complex64]) {
-        let Grid { fourier, pairs, value, slope } = &mut self.grid;
+        let BracketingGrid { fourier, pairs, value, slope } = &mut self.grid;
         pairs.clear();
         pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
         fourier.synthesize(pairs, value);
@@ -134,7 +134,7 @@ impl Alternation {
             pair.1 *= Complex64::new(0.0, pair.0 as f64);
         }
         fourier.synthesize(pairs, slope);
-        let series = Series { harmonics: &self.harmonics, c };
+        let series = HarmonicSeries { harmonics: &self.harmonics, c };
         let n = value.len();
         let angle = TAU / n as f64;
         self.extremes.clear();
@@ -144,7 +144,7 @@ impl Alternation {
                 let (_, slope, bend) = series.at(theta);
                 (slope, bend)
             });
-            extremes.push(Extreme { at, value: series.at(at).0 });
+            extremes.push(TurningPoint { at, value: series.at(at).0 });
         };
         // upper bound of the change of the slope between two grid points
         let change: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum::<f64>() * angle;
@@ -181,19 +181,19 @@ impl Alternation {
 
     /// Computes the intervals of one part, from the motion and its turning points. `rest` is
     /// its displacement and its force in static equilibrium.
-    fn history(&mut self, part: &Part, rest: [f64; 2], series: Series) {
+    fn history(&mut self, part: &ElasticPart, rest: [f64; 2], series: HarmonicSeries) {
         self.intervals.clear();
         match *part {
-            Part::Slider { stiffness, limit } => {
+            ElasticPart::Slider { stiffness, limit } => {
                 self.slider(stiffness, limit, rest.map(|x| x * self.static_share), series);
             }
-            Part::Stop { gap, stiffness } => self.stop(gap, stiffness, series),
+            ElasticPart::Stop { gap, stiffness } => self.stop(gap, stiffness, series),
         }
     }
 
-    fn slider(&mut self, kt: f64, limit: f64, [rest, held]: [f64; 2], series: Series) {
+    fn slider(&mut self, kt: f64, limit: f64, [rest, held]: [f64; 2], series: HarmonicSeries) {
         let count = self.extremes.len();
-        let hold_at = |hold: f64, from: f64, anchor: Anchor, begin: f64, end: f64| Interval {
+        let hold_at = |hold: f64, from: f64, anchor: OffsetSource, begin: f64, end: f64| Interval {
             begin,
             end,
             stiffness: kt,
@@ -202,11 +202,11 @@ impl Alternation {
             slips: false,
         };
         let drag = |begin: f64, end: f64, offset: f64| {
-            let anchor = Anchor::Nothing;
+            let anchor = OffsetSource::Nothing;
             Interval { begin, end, stiffness: 0.0, offset, anchor, slips: true }
         };
         // force and displacement at the anchor
-        let (mut hold, mut from, mut anchor) = (held, rest, Anchor::Nothing);
+        let (mut hold, mut from, mut anchor) = (held, rest, OffsetSource::Nothing);
         let still = held + kt * (self.grid.value[0] - rest);
         if count == 0 && still.abs() > limit {
             // the slider was dragged to a position at which nothing moves any more
@@ -215,10 +215,10 @@ impl Alternation {
         }
         let mut slipped = None;
         for leg in 0..2 * count {
-            let Extreme { at, value } = self.extremes[leg % count];
+            let TurningPoint { at, value } = self.extremes[leg % count];
             let trial = hold + kt * (value - from);
             if trial.abs() > limit {
-                (hold, from, anchor) = (limit.copysign(trial), value, Anchor::At(at));
+                (hold, from, anchor) = (limit.copysign(trial), value, OffsetSource::At(at));
                 if leg >= count {
                     slipped = Some(leg);
                     break;
@@ -230,7 +230,7 @@ impl Alternation {
             return;
         };
         // one period from the end of that slip
-        let phase = |leg: usize, extremes: &[Extreme]| extremes[leg % count].at + TAU * (leg / count) as f64;
+        let phase = |leg: usize, extremes: &[TurningPoint]| extremes[leg % count].at + TAU * (leg / count) as f64;
         let mut begin = phase(first, &self.extremes);
         for leg in first + 1..=first + count {
             let (before, end) = (phase(leg - 1, &self.extremes), phase(leg, &self.extremes));
@@ -241,7 +241,7 @@ impl Alternation {
                 let onset = self.passage(series, (before, end), from + (slip - hold) / kt, slip.signum());
                 self.intervals.push(hold_at(hold, from, anchor, begin, onset));
                 self.intervals.push(drag(onset, end, slip));
-                (hold, from, anchor, begin) = (slip, value, Anchor::At(end), end);
+                (hold, from, anchor, begin) = (slip, value, OffsetSource::At(end), end);
             } else if leg == first + count {
                 // only reached through rounding
                 self.intervals.push(hold_at(hold, from, anchor, begin, end));
@@ -249,13 +249,13 @@ impl Alternation {
         }
     }
 
-    fn stop(&mut self, gap: f64, stiffness: f64, series: Series) {
+    fn stop(&mut self, gap: f64, stiffness: f64, series: HarmonicSeries) {
         let closed = |begin: f64, end: f64| Interval {
             begin,
             end,
             stiffness,
             offset: -stiffness * gap,
-            anchor: Anchor::Nothing,
+            anchor: OffsetSource::Nothing,
             slips: false,
         };
         let count = self.extremes.len();
@@ -293,7 +293,7 @@ impl Alternation {
 
     /// Returns the phase between two adjacent turning points at which the
     /// motion passes `value`. `upwards` is 1 or -1.
-    pub(super) fn passage(&self, series: Series, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
+    pub(super) fn passage(&self, series: HarmonicSeries, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
         let n = self.grid.value.len() as isize;
         let angle = TAU / n as f64;
         let u = |i: isize| self.grid.value[i.rem_euclid(n) as usize];
@@ -338,8 +338,8 @@ impl Alternation {
             let Some(tangent) = tangent.as_deref_mut() else { continue };
             let by = Complex64::new(-interval.stiffness, 0.0);
             match interval.anchor {
-                Anchor::Nothing => continue,
-                Anchor::At(phase) => {
+                OffsetSource::Nothing => continue,
+                OffsetSource::At(phase) => {
                     let (mut turn, step) = turns(harmonics, phase);
                     for value in &mut self.row {
                         *value = turn * by;

@@ -5,12 +5,12 @@
 //! the motion at harmonic h, about 5e-6 at h = 1 and 1024 samples.
 
 use super::Port;
-use super::frequency_time::{Alternation, Beginning, add_entries};
-use super::periodic_state::March;
+use super::frequency_time::{FrequencyTime, InitialState, add_entries};
+use super::periodic_state::StepSequence;
 use crate::law::{DisplacementBox, MAX_DIRECTIONS, StepPoint, StepView};
 use num_complex::Complex64;
 
-impl Alternation {
+impl FrequencyTime {
     /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to `force`, and
     /// their derivative to `tangent`. A motion that provably sticks throughout is not sampled.
     pub(super) fn step(
@@ -38,7 +38,7 @@ impl Alternation {
         }
         self.state.clear();
         self.forgets.clear();
-        self.begin = Beginning::default();
+        self.begin = InitialState::default();
         let mut point = StepPoint::new(axes, step.states());
         step.advance_with_derivatives(axes, &rest, &mean, &states, &mut point);
         let mut tangent = tangent;
@@ -83,7 +83,7 @@ impl Alternation {
         let mut trail = std::mem::take(&mut self.trail);
         trail.clear();
         trail.resize(self.samples() * step.states(), f64::NAN);
-        let mut march = StepMarch { step, axes, at: &displacement, rest, states, point, trail };
+        let mut march = ReturnMapStepper { step, axes, at: &displacement, rest, states, point, trail };
         self.march(&mut march, force, tangent);
         self.trail = march.trail;
         self.displacement = displacement;
@@ -92,7 +92,7 @@ impl Alternation {
 
 /// Steps of a law from sample to sample. The inputs of a step are the
 /// displacements before it, then after it.
-struct StepMarch<'a> {
+struct ReturnMapStepper<'a> {
     step: &'a dyn StepView,
     axes: usize,
     at: &'a [Vec<f64>; MAX_DIRECTIONS],
@@ -104,7 +104,7 @@ struct StepMarch<'a> {
     trail: Vec<f64>,
 }
 
-impl StepMarch<'_> {
+impl ReturnMapStepper<'_> {
     fn read(&self, i: usize) -> [f64; MAX_DIRECTIONS] {
         std::array::from_fn(|a| if a < self.axes { self.at[a][i] } else { 0.0 })
     }
@@ -136,7 +136,7 @@ impl StepMarch<'_> {
     }
 }
 
-impl March for StepMarch<'_> {
+impl StepSequence for ReturnMapStepper<'_> {
     fn states(&self) -> usize {
         self.step.states()
     }
@@ -207,7 +207,7 @@ mod tests {
                 let c: Vec<Complex64> = (0..axes * nh)
                     .map(|i| Complex64::new(0.12 / (1.0 + i as f64), -imaginary(i % nh) / (2.0 + i as f64)))
                     .collect();
-                let mut alternation = Alternation::new(harmonics, 256);
+                let mut alternation = FrequencyTime::new(harmonics, 256);
                 let size = 2 * nh * axes;
                 let mut found = [(); 2].map(|()| (vec![Complex64::new(0.0, 0.0); axes * nh], vec![0.0; size * size]));
                 let [(force, slopes), (sampled, sampled_slopes)] = &mut found;
@@ -238,20 +238,20 @@ mod tests {
             (0..3 * nh).map(|i| own(i) * (1.0 + change * (i as f64).sin())).collect()
         };
         let none = vec![Complex64::new(0.0, 0.0); 3 * nh];
-        let mut alternation = Alternation::new(harmonics, 512);
+        let mut alternation = FrequencyTime::new(harmonics, 512);
         let mut slopes = vec![0.0; (6 * nh).pow(2)];
         let port = port(contact, 3);
         alternation.step(&contact, &port, &at(0.0), &mut none.clone(), Some(&mut slopes));
-        let known = Beginning { state: alternation.state.clone(), forgets: alternation.forgets.clone() };
+        let known = InitialState { state: alternation.state.clone(), forgets: alternation.forgets.clone() };
         assert!(known.forgets.len() == 4, "a contact that slips forgets");
         for change in [1e-6, 1e-2, 0.3] {
-            let mut run = |begin: Beginning| {
+            let mut run = |begin: InitialState| {
                 let mut force = none.clone();
                 (alternation.begin, alternation.marched) = (begin, 0);
                 alternation.step(&contact, &port, &at(change), &mut force, None);
                 (force, alternation.marched)
             };
-            let (from_rest, many) = run(Beginning::default());
+            let (from_rest, many) = run(InitialState::default());
             let (nearby, few) = run(known.clone());
             assert!(
                 from_rest.iter().zip(&nearby).all(|(a, b)| (a - b).norm() < 1e-11),

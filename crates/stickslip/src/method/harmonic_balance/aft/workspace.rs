@@ -21,7 +21,7 @@ pub(in super::super) fn at_once(axes: usize, samples: usize, harmonics: usize) -
 
 /// Scratch memory of one evaluation.
 #[derive(Debug, Clone, Default)]
-pub(in super::super) struct Memory {
+pub(in super::super) struct StepWorkspace {
     /// Derivatives of every step.
     pub(super) rows: Vec<f64>,
     /// Derivatives of the initial step.

@@ -9,7 +9,7 @@
 
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::regularization::HOLD;
-use crate::method::harmonic_balance::globalization::homotopy::Ease;
+use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
@@ -21,16 +21,16 @@ const LARGE: usize = 16;
 pub(crate) const GUESSED: usize = 40;
 
 /// Parameters of the linearised equations, in addition to the tangents.
-pub(crate) struct Along<'a> {
+pub(crate) struct StepParameters<'a> {
     /// Penalty ε per port, N s/m.
     pub penalty: &'a [f64],
     /// Parameters of the homotopy.
-    pub ease: Ease,
+    pub ease: Homotopy,
 }
 
 /// The banded form of a system at one excitation frequency.
 #[derive(Debug, Clone)]
-pub(crate) struct Sparse {
+pub(crate) struct BandedForm {
     n: usize,
     /// Bandwidth, and the order of elimination of places and unknown forces.
     band: usize,
@@ -54,7 +54,7 @@ pub(crate) struct Sparse {
     whole: Vec<f64>,
 }
 
-impl Sparse {
+impl BandedForm {
     /// Creates the banded form. `None` for a small system, springs in series, modal damping, or
     /// a solution on one sector. `None` also if elimination of a full matrix over the joints is
     /// faster: they are few, or they couple many places.
@@ -98,8 +98,8 @@ impl Sparse {
             return None;
         }
         let nh = harmonics.len();
-        let (factor, tangent) = Sparse::sizes(whole, band, nh);
-        Some(Sparse {
+        let (factor, tangent) = BandedForm::sizes(whole, band, nh);
+        Some(BandedForm {
             n,
             band,
             position,
@@ -119,13 +119,13 @@ impl Sparse {
 
     /// Returns the memory of the banded form with a number of harmonics, bytes.
     pub fn memory(&self, harmonics: usize) -> f64 {
-        let (factor, tangent) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
+        let (factor, tangent) = BandedForm::sizes(self.right.len() / 2, self.band, harmonics);
         harmonics as f64 * BandedMatrix::bytes(factor.0, factor.1) + BandedMatrix::bytes(tangent.0, tangent.1)
     }
 
     /// Returns the multiplications in the elimination of a step with a number of harmonics.
     pub fn work(&self, harmonics: usize) -> f64 {
-        let (_, (rows, band)) = Sparse::sizes(self.right.len() / 2, self.band, harmonics);
+        let (_, (rows, band)) = BandedForm::sizes(self.right.len() / 2, self.band, harmonics);
         rows as f64 * (band as f64).powi(2)
     }
 
@@ -250,7 +250,7 @@ impl Sparse {
 
     /// Factors the equations of the Newton step. `tangents` contains K or T, one block per
     /// port. Returns false if they are singular.
-    pub fn linearise(&mut self, ports: &Ports, along: &Along, tangents: &[f64]) -> bool {
+    pub fn linearise(&mut self, ports: &Ports, along: &StepParameters, tangents: &[f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
         let (blocks, _) = crate::method::harmonic_balance::aft::blocks(ports, nh);

@@ -13,7 +13,7 @@
 //! sticking joint `f - k u` is constant, so one Newton step finds the static equilibrium with
 //! all joints stuck.
 
-use super::uncoupled_modes::{Resonant, Uncoupled};
+use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::regularization::HOLD;
 use nalgebra::{DMatrix, DVector};
@@ -39,7 +39,7 @@ pub(crate) fn springs(ports: &Ports) -> Vec<f64> {
 /// supports.
 ///
 /// `own` returns the static receptance of each axis alone, with [`HOLD`] of a frequency.
-pub(crate) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, Resonant>, omega: f64) -> bool {
+pub(crate) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, UndampedResonance>, omega: f64) -> bool {
     if springs.iter().all(|k| *k == 0.0) {
         return false;
     }
@@ -54,16 +54,16 @@ pub(crate) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, Resona
 
 /// Structure in uncoupled modes, which the closed contacts couple.
 #[derive(Debug, Clone)]
-pub(crate) struct Modes {
-    structure: Arc<Uncoupled>,
+pub(crate) struct ClosedModes {
+    structure: Arc<UncoupledDynamics>,
     /// Modal stiffness of the closed contacts, `Φᵀ k Φ`.
     coupling: Vec<f64>,
     factor: RefCell<Option<(f64, Arc<DenseLu<f64>>)>>,
 }
 
-impl Modes {
+impl ClosedModes {
     /// Makes the modal stiffness of a structure with these springs along the axes, N/m.
-    pub fn new(springs: &[f64], structure: &Arc<Uncoupled>) -> Self {
+    pub fn new(springs: &[f64], structure: &Arc<UncoupledDynamics>) -> Self {
         let (p, n) = (structure.axes, structure.own().len());
         let weighted: Vec<f64> =
             structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(springs).map(|(a, k)| a * k)).collect();
@@ -78,11 +78,11 @@ impl Modes {
             ProductShape { rows: n, inner: p, columns: n },
             Transpose::No,
         );
-        Modes { structure: structure.clone(), coupling, factor: RefCell::default() }
+        ClosedModes { structure: structure.clone(), coupling, factor: RefCell::default() }
     }
 
     /// Returns the factored modal stiffness. It is kept until the excitation frequency changes.
-    pub fn factor(&self, omega: f64) -> Result<Arc<DenseLu<f64>>, Resonant> {
+    pub fn factor(&self, omega: f64) -> Result<Arc<DenseLu<f64>>, UndampedResonance> {
         let mut kept = self.factor.borrow_mut();
         if let Some((of, factor)) = &*kept
             && *of == omega
@@ -94,13 +94,13 @@ impl Modes {
         for (m, [mass, _, stiffness]) in self.structure.own().iter().enumerate() {
             matrix[m * n + m] += stiffness + (HOLD * omega).powi(2) * mass;
         }
-        let factor = Arc::new(DenseLu::new(matrix, n).map_err(|_| Resonant)?);
+        let factor = Arc::new(DenseLu::new(matrix, n).map_err(|_| UndampedResonance)?);
         *kept = Some((omega, factor.clone()));
         Ok(factor)
     }
 
     /// Returns the displacements of all places (m) under constant forces on them, N.
-    pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
+    pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, UndampedResonance> {
         let factor = self.factor(omega)?;
         // a mean has no imaginary part
         let mut modal = self.structure.onto_modes(&force.map(|f| f.re));
@@ -109,7 +109,7 @@ impl Modes {
     }
 
     /// Returns the displacements along the axes under unit forces along them, m/N.
-    pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         let factor = self.factor(omega)?;
         let (p, n) = (self.structure.axes, self.structure.own().len());
         let at = &self.structure.at;
@@ -123,8 +123,8 @@ impl Modes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::banded::Sparse;
-    use super::super::linear_dynamics::Rest;
+    use super::super::banded::BandedForm;
+    use super::super::linear_dynamics::LinearDynamics;
     use super::*;
     use crate::law::{FrictionContact, SharedLaw};
     use crate::method::harmonic_balance::HarmonicBalance;
@@ -392,7 +392,7 @@ mod tests {
                 builder = builder.joint(format!("contact{i}"), contact(10.0), axes).force(2 * i + 1, 0, pressed(i));
             }
             let system = builder.force(0, 1, Complex64::new(0.2, 0.0)).build().unwrap();
-            assert_eq!(Sparse::new(&system, &Ports::new(&system).unwrap(), &[0, 1]).is_some(), banded);
+            assert_eq!(BandedForm::new(&system, &Ports::new(&system).unwrap(), &[0, 1]).is_some(), banded);
             stands(&format!("{masses} masses"), &system, 300.0);
         }
     }
@@ -420,7 +420,7 @@ mod tests {
             }
             let system = builder.force(4, 1, Complex64::new(0.2, 0.0)).build().unwrap();
             let ports = Ports::new(&system).unwrap();
-            assert_eq!(Rest::new(&system, &ports).modes_for(&ports).is_some(), contacts == 80);
+            assert_eq!(LinearDynamics::new(&system, &ports).modes_for(&ports).is_some(), contacts == 80);
             stands(&format!("{contacts} contacts"), &system, 300.0);
         }
     }

@@ -11,9 +11,9 @@
 //! Displacements and forces are still those of the whole ring.
 
 use super::closed_contacts;
-use super::modal_sum::{Modal, fractions, free_fraction};
-use super::travelling_wave::{Factored, Waves};
-use super::uncoupled_modes::{Resonant, Uncoupled};
+use super::modal_sum::{ComplexModes, fractions, free_fraction};
+use super::travelling_wave::{FactoredStiffness, TravellingWaves};
+use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use crate::method::harmonic_balance::aft::{MANY_DIRECTIONS, Ports};
 use crate::method::harmonic_balance::equations::regularization::soft_spring;
 use crate::model::System;
@@ -48,30 +48,30 @@ const HIGHEST: f64 = 1e6;
 
 /// Receptance of the structure without its joints.
 #[derive(Debug, Clone)]
-pub(crate) struct Rest {
+pub(crate) struct LinearDynamics {
     n: usize,
-    modal: Option<Modal>,
+    modal: Option<ComplexModes>,
     /// Modes of a large structure whose damping does not couple them.
-    uncoupled: Option<Arc<Uncoupled>>,
+    uncoupled: Option<Arc<UncoupledDynamics>>,
     /// True if the dynamic stiffness is factored at every frequency.
     factored: bool,
     /// Factors of the dynamic stiffness of a large structure at the last
     /// excitation frequency, by rate.
-    factors: RefCell<Vec<Factored>>,
+    factors: RefCell<Vec<FactoredStiffness>>,
     /// Receptances at the last frequency. A longer series requests those of a shorter one again.
-    known: RefCell<Known>,
+    known: RefCell<ReceptanceCache>,
     /// Displacements of all places under unit forces along the axes at that frequency, by rate. For
     /// a large structure they take less memory than its factors, and save a second factorization.
-    moved: RefCell<Vec<Moved>>,
+    moved: RefCell<Vec<UnitResponses>>,
     structure: Structure,
     /// Directions of the axes: rows in ascending order, with their weights.
     directions: Vec<Vec<(usize, f64)>>,
     /// Travelling waves of a ring.
-    waves: Option<Waves>,
+    waves: Option<TravellingWaves>,
     /// Stiffness of closed contacts along the axes, N/m.
     springs: Vec<f64>,
     /// The structure with these springs, if they alone hold some motion of it.
-    closed: OnceCell<Option<Closed>>,
+    closed: OnceCell<Option<ClosedContacts>>,
 }
 
 /// Memory limit of kept factors, bytes. Measured: 1.7 GB for each harmonic of a block of 60,000
@@ -86,7 +86,7 @@ const KEPT_MOVED: usize = 1_000_000_000;
 /// Motions of all places at a rate (1/s) and an excitation frequency (rad/s): n
 /// × q, one column for a unit force along each axis.
 #[derive(Debug, Clone)]
-struct Moved {
+struct UnitResponses {
     rate: Complex64,
     omega: f64,
     columns: Arc<DMatrix<Complex64>>,
@@ -94,50 +94,50 @@ struct Moved {
 
 /// Receptances at the harmonics of an excitation frequency, rad/s.
 #[derive(Debug, Clone, Default)]
-struct Known {
+struct ReceptanceCache {
     omega: f64,
     receptances: BTreeMap<usize, DMatrix<Complex64>>,
 }
 
 /// The structure at rest with its contacts closed, see [`closed_contacts`].
 #[derive(Debug, Clone)]
-pub(crate) struct Closed {
+pub(crate) struct ClosedContacts {
     /// Stiffness of the contacts along the axes, N/m.
     pub springs: Vec<f64>,
-    form: Form,
+    form: ClosedForm,
 }
 
 #[derive(Debug, Clone)]
-enum Form {
-    Rows(Box<Rest>),
-    Modes(closed_contacts::Modes),
+enum ClosedForm {
+    Rows(Box<LinearDynamics>),
+    Modes(closed_contacts::ClosedModes),
 }
 
-impl Closed {
+impl ClosedContacts {
     /// Returns the factored stiffness between modes, if the structure is in modes.
-    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<DenseLu<f64>>, Resonant>> {
+    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<DenseLu<f64>>, UndampedResonance>> {
         match &self.form {
-            Form::Rows(_) => None,
-            Form::Modes(modes) => Some(modes.factor(omega)),
+            ClosedForm::Rows(_) => None,
+            ClosedForm::Modes(modes) => Some(modes.factor(omega)),
         }
     }
 
-    fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, Resonant> {
+    fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, UndampedResonance> {
         match &self.form {
-            Form::Rows(rest) => rest.respond(0, omega, force),
-            Form::Modes(modes) => modes.respond(omega, force),
+            ClosedForm::Rows(rest) => rest.respond(0, omega, force),
+            ClosedForm::Modes(modes) => modes.respond(omega, force),
         }
     }
 
-    fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         match &self.form {
-            Form::Rows(rest) => rest.receptance(0, omega),
-            Form::Modes(modes) => modes.receptance(omega),
+            ClosedForm::Rows(rest) => rest.receptance(0, omega),
+            ClosedForm::Modes(modes) => modes.receptance(omega),
         }
     }
 }
 
-impl Rest {
+impl LinearDynamics {
     pub fn new(system: &System, ports: &Ports) -> Self {
         let n = system.dofs();
         let directions = (0..ports.count())
@@ -147,14 +147,14 @@ impl Rest {
                 rows.into_iter().collect()
             })
             .collect::<Vec<Vec<(usize, f64)>>>();
-        let waves = ports.wave().and_then(|wave| Waves::new(system.structure(), wave));
+        let waves = ports.wave().and_then(|wave| TravellingWaves::new(system.structure(), wave));
         let factored = is_factored(system.structure());
         let alone = waves.is_none();
-        Rest {
+        LinearDynamics {
             n,
-            modal: if factored || !alone { None } else { Modal::new(system, &columns(n, &directions)) },
+            modal: if factored || !alone { None } else { ComplexModes::new(system, &columns(n, &directions)) },
             uncoupled: if alone && (factored || (directions.len() >= MANY_DIRECTIONS && is_modal(system.structure()))) {
-                Uncoupled::new(system.structure(), &directions).map(Arc::new)
+                UncoupledDynamics::new(system.structure(), &directions).map(Arc::new)
             } else {
                 None
             },
@@ -172,17 +172,17 @@ impl Rest {
 
     /// Returns the structure at rest with its contacts closed, if these alone hold some motion
     /// of it. Decided once, at the first frequency.
-    pub fn closed(&self, omega: f64) -> Option<&Closed> {
+    pub fn closed(&self, omega: f64) -> Option<&ClosedContacts> {
         let own = |omega: f64| self.own_at_rest(omega);
         let find = || if closed_contacts::hold(&self.springs, own, omega) { self.with_closed_contacts() } else { None };
         self.closed.get_or_init(find).as_ref()
     }
 
-    fn with_closed_contacts(&self) -> Option<Closed> {
+    fn with_closed_contacts(&self) -> Option<ClosedContacts> {
         let springs = self.springs.clone();
         if let Some(uncoupled) = &self.uncoupled {
-            let modes = closed_contacts::Modes::new(&springs, uncoupled);
-            return Some(Closed { springs, form: Form::Modes(modes) });
+            let modes = closed_contacts::ClosedModes::new(&springs, uncoupled);
+            return Some(ClosedContacts { springs, form: ClosedForm::Modes(modes) });
         }
         let (sectors, size) = self.sectors();
         // in a ring, each direction in every sector
@@ -192,10 +192,10 @@ impl Rest {
             .collect();
         let structure = self.structure.with_springs(&around)?;
         let waves = match &self.waves {
-            Some(waves) => Some(Waves::new(&structure, waves.cyclic)?),
+            Some(waves) => Some(TravellingWaves::new(&structure, waves.cyclic)?),
             None => None,
         };
-        let rest = Rest {
+        let rest = LinearDynamics {
             n: self.n,
             modal: None,
             uncoupled: None,
@@ -209,12 +209,12 @@ impl Rest {
             springs: Vec::new(),
             closed: OnceCell::from(None),
         };
-        Some(Closed { springs, form: Form::Rows(Box::new(rest)) })
+        Some(ClosedContacts { springs, form: ClosedForm::Rows(Box::new(rest)) })
     }
 
     /// Returns the displacement along each axis at rest under a constant unit
     /// force along it alone, m/N.
-    fn own_at_rest(&self, omega: f64) -> Result<Vec<f64>, Resonant> {
+    fn own_at_rest(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
         if let Some(uncoupled) = &self.uncoupled {
             let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
             return Ok(own.iter().map(|r| r.norm()).collect());
@@ -240,28 +240,28 @@ impl Rest {
 
     /// Returns the modes that replace receptances, if these would be large
     /// matrices and all ports need only their products.
-    pub fn modes_for(&self, ports: &Ports) -> Option<&Arc<Uncoupled>> {
+    pub fn modes_for(&self, ports: &Ports) -> Option<&Arc<UncoupledDynamics>> {
         self.uncoupled.as_ref().filter(|_| ports.count() >= MANY && !ports.has_forces())
     }
 
     /// Returns the structure with closed contacts if the harmonic is the mean,
     /// which alone is at rest.
-    fn closed_at(&self, harmonic: usize, omega: f64) -> Option<&Closed> {
+    fn closed_at(&self, harmonic: usize, omega: f64) -> Option<&ClosedContacts> {
         if harmonic == 0 { self.closed(omega) } else { None }
     }
 
     /// Returns the displacements along the axes under unit forces along them, at `s = jhΩ`, q × q,
-    /// m/N. The mean has closed contacts if these alone hold the structure, see [`Rest::closed`].
+    /// m/N. The mean has closed contacts if these alone hold the structure, see [`LinearDynamics::closed`].
     ///
     /// # Errors
     /// An undamped resonance.
-    pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         if self.directions.len() > CACHED {
             return self.receptance_anew(harmonic, omega);
         }
         let mut known = self.known.borrow_mut();
         if known.omega != omega {
-            *known = Known { omega, receptances: BTreeMap::new() };
+            *known = ReceptanceCache { omega, receptances: BTreeMap::new() };
         }
         if let Some(receptance) = known.receptances.get(&harmonic) {
             return Ok(receptance.clone());
@@ -277,7 +277,7 @@ impl Rest {
         self.known.borrow().receptances.values().map(|matrix| size_of_val(matrix.as_slice())).sum()
     }
 
-    fn receptance_anew(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    fn receptance_anew(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         if let Some(closed) = self.closed_at(harmonic, omega) {
             return closed.receptance(omega);
         }
@@ -293,7 +293,7 @@ impl Rest {
     ///
     /// # Errors
     /// A structure that is singular at that rate.
-    pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, Resonant> {
+    pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
         match &self.waves {
             Some(waves) => waves.own((rate, omega), &self.directions),
             None => {
@@ -303,7 +303,7 @@ impl Rest {
         }
     }
 
-    fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         let q = self.directions.len();
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.receptance(s, omega);
@@ -318,7 +318,7 @@ impl Rest {
             return Ok(receptance);
         }
         let Some(modal) = &self.modal else {
-            let inverse = self.dynamic(s).try_inverse().ok_or(Resonant)?;
+            let inverse = self.dynamic(s).try_inverse().ok_or(UndampedResonance)?;
             let direction = columns(self.n, &self.directions).map(|w| Complex64::new(w, 0.0));
             return Ok(direction.transpose() * inverse * direction);
         };
@@ -344,7 +344,7 @@ impl Rest {
     }
 
     /// Returns the displacements of all places under the complex forces `force` (length n, N),
-    /// m. For the mean, see [`Rest::receptance`].
+    /// m. For the mean, see [`LinearDynamics::receptance`].
     ///
     /// # Errors
     /// An undamped resonance.
@@ -353,7 +353,7 @@ impl Rest {
         harmonic: usize,
         omega: f64,
         force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Resonant> {
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
         if let Some(closed) = self.closed_at(harmonic, omega) {
             return closed.respond(omega, force);
         }
@@ -370,7 +370,7 @@ impl Rest {
             return Ok(x);
         }
         let Some(modal) = &self.modal else {
-            return self.dynamic(s).lu().solve(force).ok_or(Resonant);
+            return self.dynamic(s).lu().solve(force).ok_or(UndampedResonance);
         };
         let mut x = DVector::from_element(self.n, ZERO);
         for (m, &lambda) in modal.lambda.iter().enumerate() {
@@ -404,7 +404,7 @@ impl Rest {
         harmonic: usize,
         omega: f64,
         along: impl Fn(usize) -> Complex64,
-    ) -> Result<DVector<Complex64>, Resonant> {
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         // at rest, sum the forces first: the large motions of a free body must
         // not cancel each other
@@ -423,7 +423,12 @@ impl Rest {
 
     /// Passes the motion of a large structure under a unit force along each
     /// axis to `take`. Keeps the motions if memory allows.
-    fn each_moved(&self, s: Complex64, omega: f64, mut take: impl FnMut(usize, &[Complex64])) -> Result<(), Resonant> {
+    fn each_moved(
+        &self,
+        s: Complex64,
+        omega: f64,
+        mut take: impl FnMut(usize, &[Complex64]),
+    ) -> Result<(), UndampedResonance> {
         let mut hand = |from: usize, columns: &DMatrix<Complex64>| {
             (0..columns.ncols()).for_each(|b| take(from + b, &columns.as_slice()[b * self.n..(b + 1) * self.n]));
         };
@@ -443,7 +448,7 @@ impl Rest {
         if (kept.len() + 1) * bytes <= KEPT_MOVED {
             let columns = Arc::new(solved(&self.directions));
             hand(0, &columns);
-            kept.push(Moved { rate: s, omega, columns });
+            kept.push(UnitResponses { rate: s, omega, columns });
         } else {
             // in groups: all at once would fill the memory
             let some = self.directions.chunks(AT_ONCE).enumerate();
@@ -458,7 +463,12 @@ impl Rest {
     ///
     /// # Errors
     /// A structure that is singular at rest.
-    pub fn settle(&self, omega: f64, x: &mut DVector<Complex64>, along: impl Fn(usize) -> f64) -> Result<(), Resonant> {
+    pub fn settle(
+        &self,
+        omega: f64,
+        x: &mut DVector<Complex64>,
+        along: impl Fn(usize) -> f64,
+    ) -> Result<(), UndampedResonance> {
         let q = self.directions.len();
         let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
         if let Some(uncoupled) = &self.uncoupled {
@@ -518,21 +528,25 @@ impl Rest {
 
     /// Factors the dynamic stiffness of a large structure. Factors of one
     /// excitation frequency are kept, up to the memory limit.
-    fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, Resonant> {
+    fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, UndampedResonance> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|kept| kept.omega == omega);
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
             return kept.factor.clone();
         }
-        let factor =
-            self.structure.shifted_dynamic_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
-        let bytes = |factor: &Result<Arc<DynamicStiffness>, Resonant>| factor.as_ref().map_or(0, |f| f.bytes());
+        let factor = self
+            .structure
+            .shifted_dynamic_stiffness(s, soft_spring(s, omega))
+            .map(Arc::new)
+            .map_err(|_| UndampedResonance);
+        let bytes =
+            |factor: &Result<Arc<DynamicStiffness>, UndampedResonance>| factor.as_ref().map_or(0, |f| f.bytes());
         while !factors.is_empty()
             && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > KEPT
         {
             factors.remove(0);
         }
-        factors.push(Factored { rate: s, omega, factor: factor.clone() });
+        factors.push(FactoredStiffness { rate: s, omega, factor: factor.clone() });
         factor
     }
 }
@@ -592,7 +606,7 @@ mod tests {
         let system = chain(n, stiffness, damping);
         assert!(system.structure().is_sparse());
         let ports = Ports::new(&system).unwrap();
-        let rest = Rest::new(&system, &ports);
+        let rest = LinearDynamics::new(&system, &ports);
         let walls = (n + 1) as f64;
         for (h, omega) in [(1, 0.7), (3, 0.7), (1, 2.9), (0, 0.7)] {
             let s = Complex64::new(0.0, h as f64 * omega);
@@ -665,7 +679,7 @@ mod tests {
     fn few_joints_on_a_large_structure() {
         let system = chain(60, 400.0, 0.5);
         let omega = 1.03;
-        assert!(super::super::banded::Sparse::new(&system, &Ports::new(&system).unwrap(), &[1]).is_none());
+        assert!(super::super::banded::BandedForm::new(&system, &Ports::new(&system).unwrap(), &[1]).is_none());
         let method = HarmonicBalance { harmonics: Some(21), ..HarmonicBalance::default() };
         let series = method.solver(&system).unwrap().orbit(omega, None).unwrap();
         let exact = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();

@@ -10,7 +10,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Modes, and their components along the axes.
 #[derive(Debug, Clone)]
-pub(crate) struct Modal {
+pub(crate) struct ComplexModes {
     pub lambda: Vec<Complex64>,
     /// Right modes, n × modes, and left modes, modes × n.
     pub shape: DMatrix<Complex64>,
@@ -23,7 +23,7 @@ pub(crate) struct Modal {
     pub free_at: DMatrix<f64>,
 }
 
-impl Modal {
+impl ComplexModes {
     /// Computes the modes in the structure's coordinates. `None` if the mass matrix is not
     /// positive definite or modes coincide. The equations are then solved at every frequency.
     pub fn new(system: &System, direction: &DMatrix<f64>) -> Option<Self> {
@@ -42,7 +42,7 @@ impl Modal {
         let left = modes.from_velocity * complex(&to);
         let free = back * modes.free;
         let along = complex(direction);
-        Some(Modal {
+        Some(ComplexModes {
             shape_at: along.transpose() * &shape,
             left_at: &left * along,
             free_at: free.transpose() * direction,

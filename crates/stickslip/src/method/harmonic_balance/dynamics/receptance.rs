@@ -1,8 +1,8 @@
 //! Receptances: the motions along the axes under forces along them. Large ones
 //! are applied by modes and not formed.
 
-use super::linear_dynamics::{CACHED, Closed};
-use super::uncoupled_modes::{Resonant, Uncoupled};
+use super::linear_dynamics::{CACHED, ClosedContacts};
+use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -18,14 +18,14 @@ const BLOCKED: usize = 12;
 #[derive(Debug, Clone)]
 pub(crate) enum Receptance {
     /// One matrix per harmonic, axes × axes.
-    Formed(Formed),
+    Formed(ReceptanceMatrices),
     /// By the modes of the structure.
-    Modal(Modal),
+    Modal(ModalReceptance),
 }
 
 /// Receptance matrices. Matrices of many axes that fit in the cache have a copy for fast products.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Formed {
+pub(crate) struct ReceptanceMatrices {
     pub matrices: Vec<DMatrix<Complex64>>,
     pairs: Vec<ComplexGemv>,
     /// Forces and motions of one harmonic, and scratch memory of its product.
@@ -33,12 +33,12 @@ pub(crate) struct Formed {
     memory: Vec<f64>,
 }
 
-impl Formed {
+impl ReceptanceMatrices {
     pub fn new(matrices: Vec<DMatrix<Complex64>>) -> Self {
         let few = |matrix: &&DMatrix<Complex64>| (BLOCKED..=CACHED).contains(&matrix.nrows());
         let pairs =
             matrices.iter().filter(few).map(|matrix| ComplexGemv::new(matrix.as_slice(), matrix.nrows())).collect();
-        Formed { matrices, pairs, ..Formed::default() }
+        ReceptanceMatrices { matrices, pairs, ..ReceptanceMatrices::default() }
     }
 
     /// Returns the memory of the matrices and of their copies, bytes.
@@ -82,8 +82,8 @@ impl Formed {
 
 /// Receptances by modes, at the harmonics of an excitation frequency.
 #[derive(Debug, Clone)]
-pub(crate) struct Modal {
-    pub structure: Arc<Uncoupled>,
+pub(crate) struct ModalReceptance {
+    pub structure: Arc<UncoupledDynamics>,
     /// Excitation frequency, rad/s, and rates of the harmonics, 1/s.
     pub omega: f64,
     pub rates: Vec<Complex64>,
@@ -99,12 +99,12 @@ pub(crate) struct Modal {
     moved: Vec<f64>,
 }
 
-impl Modal {
+impl ModalReceptance {
     pub fn new(
-        (structure, closed): (&Arc<Uncoupled>, Option<&Closed>),
+        (structure, closed): (&Arc<UncoupledDynamics>, Option<&ClosedContacts>),
         (harmonics, omega): (&[usize], f64),
         series: &[f64],
-    ) -> Result<Self, Resonant> {
+    ) -> Result<Self, UndampedResonance> {
         let rates: Vec<Complex64> = harmonics.iter().map(|h| Complex64::new(0.0, *h as f64 * omega)).collect();
         let gains = rates.iter().map(|s| structure.gains(*s, omega)).collect::<Result<Vec<_>, _>>()?;
         let mean = match (harmonics[0], closed) {
@@ -113,7 +113,7 @@ impl Modal {
             (0, None) => structure.own_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect(),
             _ => vec![0.0; structure.axes],
         };
-        Ok(Modal {
+        Ok(ModalReceptance {
             structure: structure.clone(),
             omega,
             rates,

@@ -1,6 +1,6 @@
 //! Dynamic stiffness of a tuned ring in travelling waves, from one sector.
 
-use super::uncoupled_modes::Resonant;
+use super::uncoupled_modes::UndampedResonance;
 use crate::method::harmonic_balance::equations::regularization::soft_spring;
 use crate::model::CyclicSymmetry;
 use crate::structure::{DynamicStiffness, RingSector, Structure, Wave, WaveStiffness, unit_root};
@@ -15,37 +15,42 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Factored dynamic stiffness at a complex rate (1/s), for an excitation frequency (rad/s). It
 /// is singular at a resonance without damping.
 #[derive(Debug, Clone)]
-pub(crate) struct Factored<F = DynamicStiffness> {
+pub(crate) struct FactoredStiffness<F = DynamicStiffness> {
     pub rate: Complex64,
     pub omega: f64,
-    pub factor: Result<Arc<F>, Resonant>,
+    pub factor: Result<Arc<F>, UndampedResonance>,
 }
 
 /// Waves on a ring: one for each nodal diameter that a harmonic has used.
 #[derive(Debug, Clone)]
-pub(crate) struct Waves {
+pub(crate) struct TravellingWaves {
     pub cyclic: CyclicSymmetry,
     pub sector: RingSector,
-    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, Resonant>>>,
-    factors: RefCell<Vec<(usize, Factored<WaveStiffness>)>>,
+    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, UndampedResonance>>>,
+    factors: RefCell<Vec<(usize, FactoredStiffness<WaveStiffness>)>>,
 }
 
-impl Waves {
+impl TravellingWaves {
     pub fn new(structure: &Structure, cyclic: CyclicSymmetry) -> Option<Self> {
         let sector = RingSector::from_ring(structure, cyclic.sectors)?;
-        Some(Waves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
+        Some(TravellingWaves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
     }
 
     /// Replaces complex forces on the first sector by its displacements in a wave, column by
     /// column.
-    fn solve(&self, diameter: usize, (s, omega): (Complex64, f64), loads: &mut [Complex64]) -> Result<(), Resonant> {
+    fn solve(
+        &self,
+        diameter: usize,
+        (s, omega): (Complex64, f64),
+        loads: &mut [Complex64],
+    ) -> Result<(), UndampedResonance> {
         self.factor(diameter, s, omega)?.solve(loads);
         Ok(())
     }
 
     /// Returns the factored dynamic stiffness. It is kept until the excitation frequency
     /// changes.
-    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, Resonant> {
+    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, UndampedResonance> {
         let mut factors = self.factors.borrow_mut();
         factors.retain(|(_, kept)| kept.omega == omega);
         if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
@@ -54,10 +59,10 @@ impl Waves {
         let mut met = self.met.borrow_mut();
         let wave = met
             .entry(diameter)
-            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| Resonant))
+            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| UndampedResonance))
             .clone()?;
-        let factor = wave.dynamic_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| Resonant);
-        factors.push((diameter, Factored { rate: s, omega, factor: factor.clone() }));
+        let factor = wave.dynamic_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| UndampedResonance);
+        factors.push((diameter, FactoredStiffness { rate: s, omega, factor: factor.clone() }));
         factor
     }
 
@@ -83,7 +88,7 @@ impl Waves {
         diameter: usize,
         at: (Complex64, f64),
         directions: &[Vec<(usize, f64)>],
-    ) -> Result<DMatrix<Complex64>, Resonant> {
+    ) -> Result<DMatrix<Complex64>, UndampedResonance> {
         let columns = self.columns(diameter, directions);
         let mut moved = columns.clone();
         self.solve(diameter, at, moved.as_mut_slice())?;
@@ -92,7 +97,11 @@ impl Waves {
 
     /// Returns the displacement along each axis under a unit force along that axis alone,
     /// without forces on the other sectors, at a real rate. It is the mean over all waves.
-    pub fn own(&self, (rate, omega): (f64, f64), directions: &[Vec<(usize, f64)>]) -> Result<Vec<f64>, Resonant> {
+    pub fn own(
+        &self,
+        (rate, omega): (f64, f64),
+        directions: &[Vec<(usize, f64)>],
+    ) -> Result<Vec<f64>, UndampedResonance> {
         let sectors = self.cyclic.sectors;
         let mut own = vec![0.0; directions.len()];
         for diameter in 0..=sectors / 2 {
@@ -110,7 +119,7 @@ impl Waves {
         diameter: usize,
         at: (Complex64, f64),
         force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Resonant> {
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
         let n = self.sector.dofs();
         let mut one = force.as_slice()[..n].to_vec();
         self.solve(diameter, at, &mut one)?;

@@ -20,18 +20,18 @@ const RESONANT: f64 = 1e-14;
 
 /// Singular dynamic stiffness: a resonance without damping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Resonant;
+pub(crate) struct UndampedResonance;
 
 /// Structure in modal coordinates.
 #[derive(Debug, Clone)]
-pub(crate) struct Uncoupled {
+pub(crate) struct UncoupledDynamics {
     modes: Arc<UncoupledModes>,
     /// Axes by modes, p × n, column by column.
     pub at: Vec<f64>,
     pub axes: usize,
 }
 
-impl Uncoupled {
+impl UncoupledDynamics {
     /// Returns `None` if damping couples the modes, or if there are too many.
     pub fn new(structure: &Structure, directions: &[Vec<(usize, f64)>]) -> Option<Self> {
         let modes = structure.uncoupled()?.clone();
@@ -50,7 +50,7 @@ impl Uncoupled {
                 Transpose::No,
             );
         }
-        Some(Uncoupled { modes, at, axes })
+        Some(UncoupledDynamics { modes, at, axes })
     }
 
     /// Returns modal mass, damping and stiffness.
@@ -62,22 +62,22 @@ impl Uncoupled {
     ///
     /// # Errors
     /// A resonance without damping.
-    pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, Resonant> {
+    pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, UndampedResonance> {
         let [mass, damping, stiffness] = self.own()[m];
         let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
         let of_mass = (s * s + hold) * mass;
         let sum = of_mass + s * damping + stiffness;
         let size = of_mass.norm() + (s * damping).norm() + stiffness.abs();
-        if sum.norm() > RESONANT * size { Ok(sum) } else { Err(Resonant) }
+        if sum.norm() > RESONANT * size { Ok(sum) } else { Err(UndampedResonance) }
     }
 
     /// Returns the inverse modal dynamic stiffness of all modes.
-    pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, Resonant> {
+    pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, UndampedResonance> {
         (0..self.own().len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
     }
 
     /// Returns the receptance of the axes, p × p.
-    pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, Resonant> {
+    pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         let (p, n) = (self.axes, self.own().len());
         let gains = self.gains(s, omega)?;
         let part = |read: fn(&Complex64) -> f64| {
@@ -124,7 +124,7 @@ impl Uncoupled {
         s: Complex64,
         omega: f64,
         force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, Resonant> {
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
         let gains = self.gains(s, omega)?;
         let Some(shapes) = &self.modes.shapes else {
             return Ok(DVector::from_iterator(force.len(), force.iter().zip(&gains).map(|(f, g)| f * g)));
@@ -164,7 +164,7 @@ mod tests {
         let names = || (0..n).map(|i| i.to_string()).collect::<Vec<_>>();
         let structure = Structure::new(names(), light.clone(), damping.clone(), stiffness.clone()).unwrap();
         let directions = [vec![(0, 1.0), (4, -0.5)], vec![(3, 1.0)], vec![(7, 2.0), (1, 1.0)]];
-        let modes = Uncoupled::new(&structure, &directions).unwrap();
+        let modes = UncoupledDynamics::new(&structure, &directions).unwrap();
         // later callers get the same modes
         assert!(Arc::ptr_eq(&modes.modes, structure.clone().uncoupled().unwrap()));
         for (s, omega) in
@@ -190,6 +190,6 @@ mod tests {
         let mut coupled = damping;
         coupled[(0, 0)] += 0.01;
         let structure = Structure::new(names(), light, coupled, stiffness).unwrap();
-        assert!(Uncoupled::new(&structure, &directions).is_none());
+        assert!(UncoupledDynamics::new(&structure, &directions).is_none());
     }
 }

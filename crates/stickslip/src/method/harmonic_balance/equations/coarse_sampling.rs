@@ -1,8 +1,8 @@
 //! Coarse sampling of the period, for derivatives of many contacts.
 
-use super::{Level, OPEN, Solution};
-use crate::method::harmonic_balance::aft::{Alternation, Ports, REPEATS, block};
-use crate::method::harmonic_balance::globalization::homotopy::Ease;
+use super::{Discretization, HarmonicSolution, OPEN};
+use crate::method::harmonic_balance::aft::{FrequencyTime, Ports, REPEATS, block};
+use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
 
 /// The coarse sampling has at least `1/FEWER` of all samples, at least `SKETCHED` samples per
 /// wave of the highest harmonic, and at most half of all samples.
@@ -16,7 +16,7 @@ const SKETCHED: usize = 8;
 /// taken. Fewer samples cause an error of this size.
 const ALMOST: f64 = 1e-3;
 
-impl Level {
+impl Discretization {
     /// Creates the coarse sampling, if it has at most half of all samples.
     pub(in super::super) fn keep_sketch(&mut self) {
         let top = self.harmonics().last().copied().unwrap_or(0);
@@ -24,10 +24,10 @@ impl Level {
         let least = (SKETCHED * (top + 1)).max(all / FEWER);
         let few = [2, 3].map(|base: usize| base * least.div_ceil(base).next_power_of_two());
         let few = few.into_iter().min().filter(|few| 2 * few <= all);
-        self.sketch = few.map(|few| Alternation::new(self.harmonics().to_vec(), few));
+        self.sketch = few.map(|few| FrequencyTime::new(self.harmonics().to_vec(), few));
     }
 
-    /// Computes the derivatives that [`Slopes::Cheap`] omits, at the motion evaluated last.
+    /// Computes the derivatives that [`DerivativeScope::Cheap`] omits, at the motion evaluated last.
     /// With `sketched`, derivatives of return maps use the coarse sampling, if there is one.
     ///
     /// A Newton step with coarse derivatives leaves some thousandths of the residual, which has
@@ -36,8 +36,8 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Solution,
-        (ease, sketched): (Ease, bool),
+        motion: &mut HarmonicSolution,
+        (ease, sketched): (Homotopy, bool),
     ) -> bool {
         let nh = self.harmonics().len();
         self.alternation.static_share = self.load(ease) / ease.limits;

@@ -3,11 +3,11 @@
 
 use super::contact_parameter::penalty as penalty_of;
 use super::regularization::CLEAR;
-use super::{Level, Solution, ZERO};
-use crate::method::harmonic_balance::aft::{Member, Ports};
-use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
-use crate::method::harmonic_balance::dynamics::receptance::{Formed, Modal, Receptance};
-use crate::method::orbit_search::describing_guess::Guess;
+use super::{Discretization, HarmonicSolution, ZERO};
+use crate::method::harmonic_balance::aft::{PortMember, Ports};
+use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+use crate::method::harmonic_balance::dynamics::receptance::{ModalReceptance, Receptance, ReceptanceMatrices};
+use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -16,12 +16,12 @@ use num_complex::Complex64;
 /// `1/max(K, Ω² M)/top²` with the largest entries K and M of the structure.
 const RIGID: f64 = 1e-14;
 
-impl Level {
+impl Discretization {
     /// Prepares the equations for an excitation frequency.
     ///
     /// # Errors
     /// Returns the frequency (rad/s) of an undamped resonance of the structure without its joints.
-    pub fn drive(&mut self, system: &System, ports: &Ports, rest: &Rest, omega: f64) -> Result<(), f64> {
+    pub fn drive(&mut self, system: &System, ports: &Ports, rest: &LinearDynamics, omega: f64) -> Result<(), f64> {
         let n = system.dofs();
         let excitation = system.excitation(omega);
         let nh = self.harmonics().len();
@@ -100,11 +100,11 @@ impl Level {
 
     /// Computes the receptances of the axes with the springs in series: by modes if there are
     /// many axes and the modes are known, otherwise as matrices.
-    fn receptance(&self, ports: &Ports, rest: &Rest, omega: f64) -> Result<Receptance, f64> {
+    fn receptance(&self, ports: &Ports, rest: &LinearDynamics, omega: f64) -> Result<Receptance, f64> {
         let harmonics = self.harmonics();
         if let Some(structure) = rest.modes_for(ports).filter(|_| !self.with_matrix) {
             let closed = if harmonics[0] == 0 { rest.closed(omega) } else { None };
-            let modal = Modal::new((structure, closed), (harmonics, omega), &self.series);
+            let modal = ModalReceptance::new((structure, closed), (harmonics, omega), &self.series);
             return modal.map(Receptance::Modal).map_err(|_| omega);
         }
         let formed = harmonics.iter().map(|&h| {
@@ -112,13 +112,19 @@ impl Level {
             self.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
             Ok(receptance)
         });
-        Ok(Receptance::Formed(Formed::new(formed.collect::<Result<_, f64>>()?)))
+        Ok(Receptance::Formed(ReceptanceMatrices::new(formed.collect::<Result<_, f64>>()?)))
     }
 
     /// Returns the initial guess: the solution by describing functions, or the
     /// motion without friction. If contacts alone hold a body, returns static
     /// equilibrium, from which one Newton step finds the motion in stick.
-    pub fn begin(&self, system: &System, ports: &Ports, guess: Option<&Guess>, omega: f64) -> Solution {
+    pub fn begin(
+        &self,
+        system: &System,
+        ports: &Ports,
+        guess: Option<&DescribingGuess>,
+        omega: f64,
+    ) -> HarmonicSolution {
         let nh = self.harmonics().len();
         let mut motion = self.unhindered();
         if self.stands() {
@@ -132,7 +138,8 @@ impl Level {
                 for q in port.range() {
                     let (_, a) = ports.place(q);
                     // the force with the virtual work of all members
-                    let work = |member: &Member| member.factor * guess.force(system, (member.joint, a), (h as u32, x));
+                    let work =
+                        |member: &PortMember| member.factor * guess.force(system, (member.joint, a), (h as u32, x));
                     let force: Complex64 = port.members.iter().map(work).sum();
                     if !force.is_finite() {
                         continue; // rigid friction without motion

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 /// If the excitation has only odd multiples and all laws are odd, the set has only odd
 /// multiples. All other harmonics are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Kept {
+pub(crate) struct HarmonicSet {
     pub unit: usize,
     /// Factor on harmonic counts: `unit`, or the number of excitation periods in one period of
     /// the orbit.
@@ -20,19 +20,19 @@ pub(crate) struct Kept {
     pub highest: usize,
 }
 
-impl Kept {
+impl HarmonicSet {
     /// Returns the set for the harmonics of the excitation whose amplitude `counts` accepts.
     pub fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
-        let present = Kept::present(system, counts);
+        let present = HarmonicSet::present(system, counts);
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
-        Kept::by(system, &present, (unit, unit))
+        HarmonicSet::by(system, &present, (unit, unit))
     }
 
     /// Returns the set for an orbit of `periods` excitation periods: all harmonics of the
     /// orbit's frequency, except those that vanish by the symmetry of the laws.
     pub fn slowed(system: &System, periods: usize) -> Self {
-        let present = Kept::present(system, |z| z != Complex64::new(0.0, 0.0));
-        Kept::by(system, &present, (1, periods))
+        let present = HarmonicSet::present(system, |z| z != Complex64::new(0.0, 0.0));
+        HarmonicSet::by(system, &present, (1, periods))
     }
 
     /// Returns the harmonics of the excitation whose amplitude `counts` accepts.
@@ -43,7 +43,7 @@ impl Kept {
     fn by(system: &System, present: &[usize], (unit, scale): (usize, usize)) -> Self {
         let highest = present.iter().copied().max().unwrap_or(0);
         let laws = system.joints().iter().all(|joint| joint.law().is_odd());
-        Kept { unit, scale, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
+        HarmonicSet { unit, scale, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }
     }
 
     /// Returns the harmonics up to `top`.

@@ -29,16 +29,16 @@ pub(super) mod regularization;
 mod scaled_unknowns;
 mod scaling;
 
-use super::aft::{Alternation, Beginning, Port, Ports, block, blocks};
-use super::budget::{POINT, Work};
-use super::dynamics::banded::Sparse;
-use super::dynamics::receptance::{Formed, Receptance};
+use super::aft::{FrequencyTime, InitialState, Port, Ports, block, blocks};
+use super::budget::{POINT, WorkShare};
+use super::dynamics::banded::BandedForm;
+use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
 use super::equations::harmonic_set::weight;
 use super::globalization::found_by::FoundBy;
-use super::globalization::homotopy::Ease;
-use super::globalization::subdomain::Settling;
-use super::linear_solve::linearization::Linear;
-use super::linear_solve::newton_krylov::{Coupled, Near, by_products, dot};
+use super::globalization::homotopy::Homotopy;
+use super::globalization::subdomain::NonlinearElimination;
+use super::linear_solve::linearization::LinearizedEquations;
+use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, by_products, dot};
 use crate::model::CyclicSymmetry;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -50,7 +50,7 @@ pub(super) const OPEN: f64 = -1.0;
 
 /// The discretization by one list of harmonics: equations, scratch memory, and work counters.
 #[derive(Debug, Clone)]
-pub(super) struct Level {
+pub(super) struct Discretization {
     /// Number of evaluations of laws with derivatives, and of eliminations of
     /// the Jacobian, in the present search.
     pub assembled: usize,
@@ -60,12 +60,12 @@ pub(super) struct Level {
     /// then holds without a guaranteed number of steps.
     pub prolongs: bool,
     /// Work of earlier searches of the present point, here and at other levels,
-    /// see [`Level::taken`].
-    pub spent: Work,
-    pub elsewhere: Work,
+    /// see [`Discretization::taken`].
+    pub spent: WorkShare,
+    pub elsewhere: WorkShare,
     /// Work limit of all these searches together.
-    pub allowed: Work,
-    pub alternation: Alternation,
+    pub allowed: WorkShare,
+    pub alternation: FrequencyTime,
     /// Receptance of the axes; empty in the banded form.
     pub(super) receptance: Receptance,
     /// Penalty ε per port, N s/m; infinite if the motion is imposed.
@@ -80,7 +80,7 @@ pub(super) struct Level {
     /// Displacements along the axes in static equilibrium, m; empty if unknown.
     pub equilibrium: Vec<f64>,
     /// Springs of the proximal-point method for static equilibrium.
-    pub tether: Option<Tether>,
+    pub tether: Option<ProximalSprings>,
     /// Compliances in series with the axes, m/N.
     series: Vec<f64>,
     /// Stiffness of closed contacts along the axes (N/m) that the structure contains for the
@@ -92,12 +92,12 @@ pub(super) struct Level {
     /// Motion of all places without friction, per harmonic.
     pub free: Vec<DVector<Complex64>>,
     /// Banded form of a large system, in place of receptance and Jacobian.
-    pub sparse: Option<Sparse>,
+    pub sparse: Option<BandedForm>,
     /// Memory of the nonlinear elimination, if the system allows it.
-    pub(super) settling: Option<Settling>,
+    pub(super) settling: Option<NonlinearElimination>,
     /// GMRES with its preconditioner, in place of the Jacobian, for many joints
     /// that the structure couples.
-    pub(super) coupled: Option<Coupled>,
+    pub(super) coupled: Option<NewtonKrylov>,
     /// True if the Jacobian is needed as a matrix, and the receptances with it.
     with_matrix: bool,
     /// Number of products with the Jacobian in the present search.
@@ -111,25 +111,25 @@ pub(super) struct Level {
     pub(super) residual: Vec<f64>,
     /// Units of the residual.
     pub(super) units: Vec<f64>,
-    pub(super) before: Solution,
-    pub(super) best: Solution,
-    /// Forces to which [`Ease::pull`] draws the force unknowns, [axis][harmonic], N.
+    pub(super) before: HarmonicSolution,
+    pub(super) best: HarmonicSolution,
+    /// Forces to which [`Homotopy::pull`] draws the force unknowns, [axis][harmonic], N.
     pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
     pub(super) image: Vec<Complex64>,
     /// Per port with memory: the states at t = 0 in the motion evaluated last,
     /// and how they are forgotten.
-    pub(super) states: Vec<Beginning>,
+    pub(super) states: Vec<InitialState>,
     /// True if laws that forget their initial states begin the next motion with these. They
     /// reach the same states as from static equilibrium, in fewer periods.
     pub(super) nearby: bool,
     /// Coarse sampling of the period, for derivatives of many contacts: see
-    /// [`Level::follow_slopes`].
-    pub(super) sketch: Option<Alternation>,
+    /// [`Discretization::follow_slopes`].
+    pub(super) sketch: Option<FrequencyTime>,
     /// True if the present search uses the coarse sampling.
     pub(super) sketches: bool,
-    /// Sampling with twice the samples, created on first use, see [`Level::by_twice_the_samples`].
-    pub(super) twice: Option<Alternation>,
+    /// Sampling with twice the samples, created on first use, see [`Discretization::by_twice_the_samples`].
+    pub(super) twice: Option<FrequencyTime>,
     /// True if the tangents are those of the present search, without added springs.
     pub(super) linearised: bool,
     /// True if the tangents are those of the initial guess of the next search, by coarse sampling.
@@ -141,7 +141,7 @@ pub(super) struct Level {
 
 /// Springs along the axes that tie the mean to an anchor.
 #[derive(Debug, Clone)]
-pub(super) struct Tether {
+pub(super) struct ProximalSprings {
     /// Stiffness relative to the springs of closed contacts.
     pub share: f64,
     /// Displacements at which the springs are relaxed, m.
@@ -150,7 +150,7 @@ pub(super) struct Tether {
 
 /// A solution or an initial guess.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Solution {
+pub(super) struct HarmonicSolution {
     /// Harmonics of the motions along the axes, [axis][harmonic], m.
     pub c: Vec<Complex64>,
     /// Harmonics of the forces along them, N.
@@ -160,13 +160,13 @@ pub(super) struct Solution {
     pub found_by: FoundBy,
 }
 
-impl Solution {
+impl HarmonicSolution {
     pub fn rest(length: usize) -> Self {
-        Solution { c: vec![ZERO; length], force: vec![ZERO; length], ..Solution::default() }
+        HarmonicSolution { c: vec![ZERO; length], force: vec![ZERO; length], ..HarmonicSolution::default() }
     }
 
     /// Copies `other` without new memory.
-    pub fn copy(&mut self, other: &Solution) {
+    pub fn copy(&mut self, other: &HarmonicSolution) {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
         (self.residual, self.iterations) = (other.residual, other.iterations);
@@ -176,7 +176,7 @@ impl Solution {
 
 /// The ports whose derivatives an evaluation computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Slopes {
+pub(super) enum DerivativeScope {
     None,
     /// All ports except those whose laws are integrated through the period:
     /// derivatives that cost little more than forces.
@@ -184,11 +184,11 @@ pub(super) enum Slopes {
     All,
 }
 
-impl Level {
-    pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<Sparse>) -> Self {
-        let mut level = Level::unassembled(Alternation::new(harmonics, samples), ports, sparse);
+impl Discretization {
+    pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<BandedForm>) -> Self {
+        let mut level = Discretization::unassembled(FrequencyTime::new(harmonics, samples), ports, sparse);
         let size = level.residual.len();
-        level.coupled = (level.sparse.is_none() && by_products(size, ports)).then(Coupled::default);
+        level.coupled = (level.sparse.is_none() && by_products(size, ports)).then(NewtonKrylov::default);
         if level.coupled.is_some() && !ports.has_forces() {
             level.keep_sketch();
         }
@@ -197,24 +197,24 @@ impl Level {
 
     /// Returns the level with a Jacobian that is a matrix, whatever its size.
     pub fn with_matrix(self) -> Self {
-        Level { with_matrix: true, ..self }
+        Discretization { with_matrix: true, ..self }
     }
 
     /// Creates the level without the solver for Newton steps.
-    fn unassembled(alternation: Alternation, ports: &Ports, sparse: Option<Sparse>) -> Self {
+    fn unassembled(alternation: FrequencyTime, ports: &Ports, sparse: Option<BandedForm>) -> Self {
         let (nh, axes) = (alternation.harmonics.len(), ports.count());
         let size = 2 * nh * axes;
         let (blocks, tangents) = blocks(ports, nh);
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
-        Level {
+        Discretization {
             assembled: 0,
             eliminated: 0,
             prolongs: false,
-            spent: Work::default(),
-            elsewhere: Work::default(),
+            spent: WorkShare::default(),
+            elsewhere: WorkShare::default(),
             allowed: POINT,
             alternation,
-            receptance: Receptance::Formed(Formed::default()),
+            receptance: Receptance::Formed(ReceptanceMatrices::default()),
             penalty: vec![0.0; ports.len()],
             holding: 0.0,
             linear: vec![ZERO; nh * axes],
@@ -236,12 +236,12 @@ impl Level {
             sparse,
             residual: vec![0.0; size],
             units: vec![1.0; size],
-            before: Solution::rest(nh * axes),
-            best: Solution::rest(nh * axes),
+            before: HarmonicSolution::rest(nh * axes),
+            best: HarmonicSolution::rest(nh * axes),
             anchor: Vec::new(),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
-            states: vec![Beginning::default(); ports.len()],
+            states: vec![InitialState::default(); ports.len()],
             nearby: false,
             sketch: None,
             sketches: false,
@@ -265,33 +265,38 @@ impl Level {
     /// Extends a motion of one sector to the whole ring, for postprocessing:
     /// the returned level cannot be solved. `ports` are those of the ring.
     /// Every sector moves with the phase of the travelling wave.
-    pub fn around(&self, cyclic: CyclicSymmetry, ports: &Ports, motion: &Solution) -> (Level, Solution) {
+    pub fn around(
+        &self,
+        cyclic: CyclicSymmetry,
+        ports: &Ports,
+        motion: &HarmonicSolution,
+    ) -> (Discretization, HarmonicSolution) {
         let (nh, own) = (self.harmonics().len(), motion.c.len());
         let all = |values: &[Complex64]| -> Vec<Complex64> {
             let lead = |s: usize, i: usize| cyclic.phase_factor(self.harmonics()[i % nh], s);
             (0..cyclic.sectors).flat_map(|s| (0..own).map(move |i| values[i] * lead(s, i))).collect()
         };
-        let motion = Solution { c: all(&motion.c), force: all(&motion.force), ..*motion };
-        let level = Level {
+        let motion = HarmonicSolution { c: all(&motion.c), force: all(&motion.force), ..*motion };
+        let level = Discretization {
             penalty: (0..ports.len()).map(|p| self.penalty[p % self.penalty.len()]).collect(),
-            ..Level::unassembled(self.alternation.clone(), ports, None)
+            ..Discretization::unassembled(self.alternation.clone(), ports, None)
         };
         (level, motion)
     }
 
     /// Evaluates forces and residual at the unknowns in `motion`, and updates the other part of
-    /// `motion`. Writes the derivatives of the ports into `self.tangents`, see [`Slopes`].
+    /// `motion`. Writes the derivatives of the ports into `self.tangents`, see [`DerivativeScope`].
     /// Returns the relative size of the residual.
     pub fn evaluate(
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Solution,
-        ease: Ease,
+        motion: &mut HarmonicSolution,
+        ease: Homotopy,
         length: f64,
-        slopes: Slopes,
+        slopes: DerivativeScope,
     ) -> f64 {
-        self.assembled += usize::from(slopes != Slopes::None);
+        self.assembled += usize::from(slopes != DerivativeScope::None);
         self.respond(ports, omega, motion, ease, slopes);
         self.follow(motion, ease);
         self.image(ports, omega, motion, ease, slopes);
@@ -313,12 +318,19 @@ impl Level {
     }
 
     /// Computes the forces of motion ports, and their derivatives.
-    pub(super) fn respond(&mut self, ports: &Ports, omega: f64, motion: &mut Solution, ease: Ease, slopes: Slopes) {
+    pub(super) fn respond(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut HarmonicSolution,
+        ease: Homotopy,
+        slopes: DerivativeScope,
+    ) {
         let nh = self.harmonics().len();
         self.alternation.static_share = self.load(ease) / ease.limits;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             let range = port.first * nh..(port.first + port.axes) * nh;
-            let wanted = slopes == Slopes::All || (slopes == Slopes::Cheap && !port.marches());
+            let wanted = slopes == DerivativeScope::All || (slopes == DerivativeScope::Cheap && !port.marches());
             let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
             if port.marches() && self.nearby {
@@ -336,7 +348,7 @@ impl Level {
 
     /// Computes the motion of the structure under the forces. Writes the
     /// residual of motion ports, and the motion of force ports.
-    pub(super) fn follow(&mut self, motion: &mut Solution, ease: Ease) {
+    pub(super) fn follow(&mut self, motion: &mut HarmonicSolution, ease: Homotopy) {
         let nh = self.harmonics().len();
         let share = self.load(ease);
         self.act(motion, share);
@@ -370,7 +382,7 @@ impl Level {
     }
 
     /// Computes the residual of all force ports, and its derivatives.
-    fn image(&mut self, ports: &Ports, omega: f64, motion: &Solution, ease: Ease, slopes: Slopes) {
+    fn image(&mut self, ports: &Ports, omega: f64, motion: &HarmonicSolution, ease: Homotopy, slopes: DerivativeScope) {
         for p in (0..ports.len()).filter(|p| ports[*p].is_force()) {
             self.image_of(ports, p, omega, motion, (ease, slopes));
         }
@@ -382,8 +394,8 @@ impl Level {
         ports: &Ports,
         p: usize,
         omega: f64,
-        motion: &Solution,
-        (ease, slopes): (Ease, Slopes),
+        motion: &HarmonicSolution,
+        (ease, slopes): (Homotopy, DerivativeScope),
     ) {
         let (port, nh) = (&ports[p], self.harmonics().len());
         let range = port.first * nh..(port.first + port.axes) * nh;
@@ -391,7 +403,7 @@ impl Level {
         let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
         let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
         let image = &mut self.image[..range.len()];
-        let slot = (slopes != Slopes::None).then(|| {
+        let slot = (slopes != DerivativeScope::None).then(|| {
             slot.fill(0.0);
             slot
         });
@@ -407,7 +419,7 @@ impl Level {
 
     /// Updates the forces of motion ports by the last Newton step and the derivatives of that
     /// step. Removes the springs of closed contacts from these derivatives.
-    pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut Solution, length: f64) {
+    pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut HarmonicSolution, length: f64) {
         let pair = 2 * self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             self.add_springs(p, port, -OPEN);
@@ -425,7 +437,7 @@ impl Level {
     /// Begins a point. All searches of the point share one work limit.
     pub fn begin_point(&mut self) {
         (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
-        (self.spent, self.elsewhere) = (Work::default(), Work::default());
+        (self.spent, self.elsewhere) = (WorkShare::default(), WorkShare::default());
         self.prolongs = false;
         if let Some(settling) = &mut self.settling {
             settling.helps = true;
@@ -438,13 +450,13 @@ impl Level {
         (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
         (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
         self.keeps_slopes = false;
-        self.states.iter_mut().for_each(|known| *known = Beginning::default());
+        self.states.iter_mut().for_each(|known| *known = InitialState::default());
     }
 
     /// Tells whether the states of a law may cross their range between two
     /// samples of a motion. Such a law is as steep for the series as a law of
     /// velocity, and samples locate its sign change only to within one sample.
-    pub fn jumps(&self, ports: &Ports, motion: &Solution) -> bool {
+    pub fn jumps(&self, ports: &Ports, motion: &HarmonicSolution) -> bool {
         let (nh, samples) = (self.harmonics().len(), self.all_samples() as f64);
         let phase = |k: usize| self.harmonics()[k] as f64 * std::f64::consts::TAU / samples;
         let fastest = |q: usize| (0..nh).map(|k| motion.c[q * nh + k].norm() * phase(k)).sum::<f64>();
@@ -458,9 +470,9 @@ impl Level {
 
     /// Returns the static equilibrium times `share`. If it is unknown, returns
     /// the mean on closed contacts.
-    pub fn at_rest(&self, share: f64) -> Solution {
+    pub fn at_rest(&self, share: f64) -> HarmonicSolution {
         let nh = self.harmonics().len();
-        let mut motion = Solution::rest(self.linear.len());
+        let mut motion = HarmonicSolution::rest(self.linear.len());
         let known = &self.equilibrium;
         let still = |i: usize| known.get(i / nh).map_or(self.linear[i], |u| Complex64::new(*u, 0.0));
         motion.c.iter_mut().enumerate().step_by(nh).for_each(|(i, c)| *c = still(i) * share);
@@ -470,12 +482,12 @@ impl Level {
     /// Returns the factor of the constant loads. If contacts carry the loads, these grow with
     /// the slip limits, so that a contact that sticks under all of them sticks during the
     /// homotopy. The excitation is then smaller relative to the loads.
-    fn load(&self, ease: Ease) -> f64 {
+    fn load(&self, ease: Homotopy) -> f64 {
         if self.stands() { ease.limits } else { 1.0 }
     }
 
     /// Computes the forces minus those of the springs in the structure, into `self.acting`.
-    fn act(&mut self, motion: &Solution, share: f64) {
+    fn act(&mut self, motion: &HarmonicSolution, share: f64) {
         if !self.stands() {
             return;
         }
@@ -492,8 +504,8 @@ impl Level {
     }
 
     /// Returns the forces on the structure in a motion, [axis][harmonic], N,
-    /// see [`Level::springs`].
-    pub fn acting<'a>(&'a mut self, motion: &'a Solution) -> &'a [Complex64] {
+    /// see [`Discretization::springs`].
+    pub fn acting<'a>(&'a mut self, motion: &'a HarmonicSolution) -> &'a [Complex64] {
         self.act(motion, 1.0);
         if self.stands() { &self.acting } else { &motion.force }
     }
@@ -517,12 +529,12 @@ impl Level {
     }
 
     /// Returns the motion without friction.
-    pub fn unhindered(&self) -> Solution {
-        Solution { c: self.linear.clone(), ..Solution::rest(self.linear.len()) }
+    pub fn unhindered(&self) -> HarmonicSolution {
+        HarmonicSolution { c: self.linear.clone(), ..HarmonicSolution::rest(self.linear.len()) }
     }
 
     /// Samples the forces of a port, into `self.alternation`.
-    pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &Solution) {
+    pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &HarmonicSolution) {
         let nh = self.harmonics().len();
         let port = &ports[p];
         if self.linearised && port.marches() {
@@ -535,7 +547,13 @@ impl Level {
 
     /// Returns the forces along all axes at the harmonics `wanted`, per harmonic, from the
     /// samples. The harmonics may lie above those of the series.
-    pub fn forces_at(&mut self, ports: &Ports, omega: f64, motion: &Solution, wanted: &[usize]) -> Vec<Vec<Complex64>> {
+    pub fn forces_at(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &HarmonicSolution,
+        wanted: &[usize],
+    ) -> Vec<Vec<Complex64>> {
         let mut forces = vec![vec![ZERO; ports.count()]; wanted.len()];
         for (p, port) in ports.iter().enumerate() {
             self.sample(ports, p, omega, motion);
@@ -548,9 +566,9 @@ impl Level {
 
     /// Computes the Newton step by GMRES. `self.step` contains the residual in units on entry
     /// and the step on return. Returns false if GMRES does not converge.
-    pub(super) fn coupled_step(&mut self, ports: &Ports, omega: f64, ease: Ease, near: Near) -> bool {
+    pub(super) fn coupled_step(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
         let Some(coupled) = &mut self.coupled else { return false };
-        let linear = Linear {
+        let linear = LinearizedEquations {
             ports,
             harmonics: &self.alternation.harmonics,
             omega,
@@ -568,9 +586,9 @@ impl Level {
 
     /// Assembles the Jacobian from the tangents, rows and columns in units.
     /// Returns false if the receptances are not matrices.
-    pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Ease, length: f64) -> bool {
+    pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Homotopy, length: f64) -> bool {
         let Receptance::Formed(formed) = &self.receptance else { return false };
-        let linear = Linear {
+        let linear = LinearizedEquations {
             ports,
             harmonics: &self.alternation.harmonics,
             omega,
@@ -586,14 +604,14 @@ impl Level {
     }
 
     /// Returns the mean of the joint's motion along an axis without the imposed motion, m.
-    pub fn mean(&self, q: usize, motion: &Solution) -> f64 {
+    pub fn mean(&self, q: usize, motion: &HarmonicSolution) -> f64 {
         let at = q * self.harmonics().len();
         motion.c[at].re + self.series[q] * motion.force[at].re - self.imposed[q]
     }
 }
 
 /// Returns `motion` with other harmonics. New harmonics are zero.
-pub(super) fn transfer(motion: &Solution, from: &[usize], to: &[usize]) -> Solution {
+pub(super) fn transfer(motion: &HarmonicSolution, from: &[usize], to: &[usize]) -> HarmonicSolution {
     let pick = |values: &[Complex64]| {
         let mut out = Vec::with_capacity(values.len() / from.len().max(1) * to.len());
         for values in values.chunks_exact(from.len()) {
@@ -601,12 +619,12 @@ pub(super) fn transfer(motion: &Solution, from: &[usize], to: &[usize]) -> Solut
         }
         out
     };
-    Solution { c: pick(&motion.c), force: pick(&motion.force), ..*motion }
+    HarmonicSolution { c: pick(&motion.c), force: pick(&motion.force), ..*motion }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::dynamics::linear_dynamics::Rest;
+    use super::super::dynamics::linear_dynamics::LinearDynamics;
     use super::super::postprocess;
     use super::*;
     use crate::law::{Coulomb, CoulombArctan, Jenkins, JenkinsArctan, SharedLaw};
@@ -641,21 +659,21 @@ mod tests {
     struct Case {
         system: System,
         ports: Ports,
-        rest: Rest,
+        rest: LinearDynamics,
         omega: f64,
     }
 
     impl Case {
         fn new(system: System, omega: f64) -> Self {
             let ports = Ports::new(&system).unwrap();
-            let rest = Rest::new(&system, &ports);
+            let rest = LinearDynamics::new(&system, &ports);
             Case { system, ports, rest, omega }
         }
 
-        fn level(&self, harmonics: Vec<usize>, sparse: bool) -> Level {
-            let sparse = sparse.then(|| Sparse::new(&self.system, &self.ports, &harmonics).unwrap());
+        fn level(&self, harmonics: Vec<usize>, sparse: bool) -> Discretization {
+            let sparse = sparse.then(|| BandedForm::new(&self.system, &self.ports, &harmonics).unwrap());
             let samples = 256.max(16 * harmonics[harmonics.len() - 1]);
-            let mut level = Level::new(harmonics, samples, &self.ports, sparse);
+            let mut level = Discretization::new(harmonics, samples, &self.ports, sparse);
             level.drive(&self.system, &self.ports, &self.rest, self.omega).unwrap();
             level
         }
@@ -674,7 +692,7 @@ mod tests {
             let case = Case::new(mixed(6, constant), 0.9);
             let mut level = case.level(harmonics, false);
             let size = level.residual.len();
-            let mut motion = Solution::rest(level.linear.len());
+            let mut motion = HarmonicSolution::rest(level.linear.len());
             // the mean has no imaginary part
             let real = |i: usize| level.harmonics()[(i / 2) % level.harmonics().len()] == 0 && i % 2 == 1;
             let x: Vec<f64> = (0..size).map(|i| if real(i) { 0.0 } else { 0.4 * noise(i) }).collect();

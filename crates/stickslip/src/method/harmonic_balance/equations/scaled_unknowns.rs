@@ -1,11 +1,11 @@
 //! The equations as a function of unknowns of order one, for continuation.
 
-use super::{Level, Slopes, Solution};
+use super::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::globalization::homotopy::GIVEN;
 use num_complex::Complex64;
 
-impl Level {
+impl Discretization {
     /// Computes the residual at `unknowns` (per axis a motion or a force,
     /// relative to [`unit`]) into `residual`, in the same units. Writes the
     /// derivative into `jacobian`, row-major. Only in the dense form.
@@ -14,12 +14,12 @@ impl Level {
         ports: &Ports,
         omega: f64,
         (unknowns, length): (&[f64], f64),
-        motion: &mut Solution,
+        motion: &mut HarmonicSolution,
         residual: &mut [f64],
         jacobian: Option<&mut [f64]>,
     ) {
         self.unpack(ports, (unknowns, length), motion);
-        let slopes = if jacobian.is_some() { Slopes::All } else { Slopes::None };
+        let slopes = if jacobian.is_some() { DerivativeScope::All } else { DerivativeScope::None };
         self.evaluate(ports, omega, motion, GIVEN, length, slopes);
         for ((out, r), unit) in residual.iter_mut().zip(&self.residual).zip(&self.units) {
             *out = r / unit;
@@ -33,8 +33,8 @@ impl Level {
         }
     }
 
-    /// Returns the unknowns of a motion, see [`Level::residual_at`].
-    pub fn pack(&self, ports: &Ports, motion: &Solution, length: f64) -> Vec<f64> {
+    /// Returns the unknowns of a motion, see [`Discretization::residual_at`].
+    pub fn pack(&self, ports: &Ports, motion: &HarmonicSolution, length: f64) -> Vec<f64> {
         let nh = self.harmonics().len();
         let mut out = Vec::with_capacity(2 * motion.c.len());
         for port in ports.iter() {
@@ -47,8 +47,8 @@ impl Level {
         out
     }
 
-    /// Writes unknowns into a motion: the inverse of [`Level::pack`].
-    pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut Solution) {
+    /// Writes unknowns into a motion: the inverse of [`Discretization::pack`].
+    pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut HarmonicSolution) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let values = if port.is_force() { &mut motion.force } else { &mut motion.c };

@@ -1,7 +1,7 @@
 //! Scaling: the length of a motion, the units of residuals, and slip limits that no motion reaches.
 
 use super::harmonic_set::weight;
-use super::{Level, Solution};
+use super::{Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::aft::{Port, Ports};
 use num_complex::Complex64;
 
@@ -14,10 +14,10 @@ const STANDING: f64 = 1e-5;
 /// Length of a zero motion, m. Its square is still positive.
 const NOTHING: f64 = 1e-150;
 
-impl Level {
+impl Discretization {
     /// Returns the length of a motion: its size plus a hundredth of the motion without
     /// friction, both as velocities relative to the excitation frequency.
-    pub fn length(&self, motion: &Solution) -> f64 {
+    pub fn length(&self, motion: &HarmonicSolution) -> f64 {
         let nh = self.alternation.harmonics.len();
         // without friction the mean is very large if only laws hold a direction
         let norm = |c: &[Complex64], from: usize| {
@@ -37,7 +37,7 @@ impl Level {
     /// forces is the law's scale, but no more than the forces in play: a limit that no force
     /// reaches is no measure. If only laws hold a direction, the mean is the small difference
     /// of large terms, and these increase its unit.
-    pub(in super::super) fn measure(&mut self, ports: &Ports, motion: &Solution, length: f64) {
+    pub(in super::super) fn measure(&mut self, ports: &Ports, motion: &HarmonicSolution, length: f64) {
         let nh = self.harmonics().len();
         let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
         let largest =

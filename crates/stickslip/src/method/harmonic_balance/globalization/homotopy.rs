@@ -8,18 +8,18 @@ pub(crate) const SOLVED: f64 = 1e-10;
 
 /// Parameters of the homotopy between easier equations and the given ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Ease {
+pub(crate) struct Homotopy {
     /// Factor `L` on the slip limits. Every law gives the force `L f(u / L)`, so that nonlinear
     /// effects begin only at large motions.
     pub limits: f64,
-    /// Weight `s` of the proximal term `s (λ - λ₀)`, see [`crate::method::harmonic_balance::equations::Level::anchor`].
+    /// Weight `s` of the proximal term `s (λ - λ₀)`, see [`crate::method::harmonic_balance::equations::Discretization::anchor`].
     pub pull: f64,
 }
 
 /// Parameters of the given equations.
-pub(crate) const GIVEN: Ease = Ease { limits: 1.0, pull: 0.0 };
+pub(crate) const GIVEN: Homotopy = Homotopy { limits: 1.0, pull: 0.0 };
 
-impl Ease {
+impl Homotopy {
     /// Returns the term on the diagonal of the Jacobian of a force equation, at harmonic `h`.
     pub fn stay(self, h: usize) -> f64 {
         self.pull + stay(h)

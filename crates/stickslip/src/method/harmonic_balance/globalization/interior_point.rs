@@ -16,10 +16,10 @@
 //! Wright, "Primal-Dual Interior-Point Methods" (1997).
 
 use super::homotopy::GIVEN;
-use crate::method::harmonic_balance::aft::{Alternation, Barrier, Port, Ports, block};
-use crate::method::harmonic_balance::equations::{Level, OPEN, Slopes, Solution};
-use crate::method::harmonic_balance::linear_solve::newton_krylov::Near;
-use crate::method::harmonic_balance::newton::{Goal, Lost};
+use crate::method::harmonic_balance::aft::{FrequencyTime, InteriorPort, Port, Ports, block};
+use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution, OPEN};
+use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
+use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 use num_complex::Complex64;
 use stickslip_numerics::interrupt;
 
@@ -38,17 +38,17 @@ const PATIENCE: usize = 8;
 const ITERATIONS: usize = 30;
 
 /// Point on the path.
-struct Along {
+struct CentralPath {
     /// Barriers of the ports with rigid friction along one axis.
-    barriers: Vec<Option<Barrier>>,
-    alternation: Alternation,
+    barriers: Vec<Option<InteriorPort>>,
+    alternation: FrequencyTime,
     /// Harmonics of the argument `λ + ε u'` of one barrier.
     y: Vec<Complex64>,
 }
 
-impl Along {
+impl CentralPath {
     /// Returns the barriers that exist.
-    fn each(&self) -> impl Iterator<Item = &Barrier> {
+    fn each(&self) -> impl Iterator<Item = &InteriorPort> {
         self.barriers.iter().flatten()
     }
 
@@ -58,24 +58,29 @@ impl Along {
     }
 }
 
-impl Level {
+impl Discretization {
     /// Solves by the interior point method from `motion`. Its rigid friction forces are
     /// ignored.
-    pub(crate) fn by_interior_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
+    pub(crate) fn by_interior_points(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut HarmonicSolution,
+    ) -> Result<(), SolveError> {
         self.begin_anew(ports);
         if !self.follow_interior(ports, omega, motion) {
-            return Err(Lost::after(motion.iterations, f64::INFINITY));
+            return Err(SolveError::after(motion.iterations, f64::INFINITY));
         }
-        self.newton(ports, omega, motion, GIVEN, (ITERATIONS, Goal::Solved))
+        self.newton(ports, omega, motion, GIVEN, (ITERATIONS, StopCriterion::Solved))
     }
 
     /// Follows the path. Returns true if its end was reached.
-    fn follow_interior(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> bool {
+    fn follow_interior(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> bool {
         let Some(mut along) = self.begin_interior(ports, omega, motion) else { return false };
         let (mut mark, mut waited) = (f64::INFINITY, 0);
         for _ in 0..MOST {
             interrupt::check();
-            let left = along.each().map(Barrier::left).fold(0.0, f64::max);
+            let left = along.each().map(InteriorPort::left).fold(0.0, f64::max);
             if left <= DECIDED {
                 return true;
             }
@@ -84,7 +89,7 @@ impl Level {
                 return false;
             }
             self.assembled += 1;
-            self.respond(ports, omega, motion, GIVEN, Slopes::All);
+            self.respond(ports, omega, motion, GIVEN, DerivativeScope::All);
             self.follow(motion, GIVEN);
             let length = self.length(motion);
             self.measure(ports, motion, length);
@@ -95,11 +100,11 @@ impl Level {
                     Some(barrier) => {
                         barrier.linearise(&mut along.alternation, &along.y, &mut self.tangents[tangent]);
                     }
-                    None => self.image_of(ports, p, omega, motion, (GIVEN, Slopes::All)),
+                    None => self.image_of(ports, p, omega, motion, (GIVEN, DerivativeScope::All)),
                 }
             }
             self.before.copy(motion);
-            let near = Near { length, residual: 1.0, sketched: false, kept: false };
+            let near = StepStart { length, residual: 1.0, sketched: false, kept: false };
             let Some(ahead) = self.interior_step(ports, omega, motion, &mut along, (0.0, near)) else { return false };
             let gap = along.gap(0.0) * (along.gap(ahead) / along.gap(0.0)).powi(3);
             motion.copy(&self.before);
@@ -114,13 +119,13 @@ impl Level {
 
     /// Returns the first point of the path, without rigid friction. Returns `None` if no port
     /// has it.
-    fn begin_interior(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Option<Along> {
+    fn begin_interior(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> Option<CentralPath> {
         let nh = self.harmonics().len();
         let top = self.harmonics().last().copied().unwrap_or(0);
         let samples = (SAMPLED * (top + 1)).next_power_of_two();
-        let mut along = Along {
+        let mut along = CentralPath {
             barriers: Vec::with_capacity(ports.len()),
-            alternation: Alternation::new(self.harmonics().to_vec(), samples),
+            alternation: FrequencyTime::new(self.harmonics().to_vec(), samples),
             y: vec![Complex64::default(); nh],
         };
         let limits: Vec<Option<f64>> =
@@ -131,11 +136,11 @@ impl Level {
         for (port, _) in ports.iter().zip(&limits).filter(|(_, limit)| limit.is_some()) {
             motion.force[port.first * nh..][..nh].fill(Complex64::default());
         }
-        self.respond(ports, omega, motion, GIVEN, Slopes::None);
+        self.respond(ports, omega, motion, GIVEN, DerivativeScope::None);
         self.follow(motion, GIVEN);
         for (p, (port, limit)) in ports.iter().zip(limits).enumerate() {
             argument((self, p, port), omega, motion, &mut along.y);
-            along.barriers.push(limit.map(|limit| Barrier::new(limit, &mut along.alternation, &along.y)));
+            along.barriers.push(limit.map(|limit| InteriorPort::new(limit, &mut along.alternation, &along.y)));
         }
         Some(along)
     }
@@ -150,9 +155,9 @@ impl Level {
         &mut self,
         ports: &Ports,
         omega: f64,
-        motion: &mut Solution,
-        along: &mut Along,
-        (gap, near): (f64, Near),
+        motion: &mut HarmonicSolution,
+        along: &mut CentralPath,
+        (gap, near): (f64, StepStart),
     ) -> Option<f64> {
         let nh = self.harmonics().len();
         let corrected = gap > 0.0;
@@ -190,7 +195,12 @@ impl Level {
 }
 
 /// Sets `y` to the harmonics of `λ + ε u'` along the axis of a port with one axis.
-fn argument((level, p, port): (&Level, usize, &Port), omega: f64, motion: &Solution, y: &mut [Complex64]) {
+fn argument(
+    (level, p, port): (&Discretization, usize, &Port),
+    omega: f64,
+    motion: &HarmonicSolution,
+    y: &mut [Complex64],
+) {
     let at = port.first * y.len();
     let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(level.harmonics());
     for (y, ((c, force), h)) in y.iter_mut().zip(own) {
@@ -203,8 +213,8 @@ mod tests {
     use super::super::homotopy::SOLVED;
     use super::*;
     use crate::law::{Coulomb, Jenkins};
-    use crate::method::harmonic_balance::dynamics::banded::Sparse;
-    use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
+    use crate::method::harmonic_balance::dynamics::banded::BandedForm;
+    use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
     use crate::model::{
         Disk, Force, GROUND, Joint, Mass, Model, SectorDistribution, Spring, System, normal_deviations,
     };
@@ -236,11 +246,12 @@ mod tests {
     }
 
     /// Returns the equations of a ring at a frequency, in banded form if the ring is large.
-    fn level(system: &System, hertz: f64) -> (Level, Ports) {
+    fn level(system: &System, hertz: f64) -> (Discretization, Ports) {
         let ports = Ports::new(system).unwrap();
         let harmonics: Vec<usize> = (1..=15).step_by(2).collect();
-        let mut level = Level::new(harmonics.clone(), 1024, &ports, Sparse::new(system, &ports, &harmonics));
-        level.drive(system, &ports, &Rest::new(system, &ports), TAU * hertz).unwrap();
+        let mut level =
+            Discretization::new(harmonics.clone(), 1024, &ports, BandedForm::new(system, &ports, &harmonics));
+        level.drive(system, &ports, &LinearDynamics::new(system, &ports), TAU * hertz).unwrap();
         (level, ports)
     }
 

@@ -17,11 +17,11 @@
 //! algorithms"; Cai, Li (2011), "Inexact Newton methods with restricted additive Schwarz based
 //! nonlinear elimination for problems with high local nonlinearity".
 
-use super::homotopy::Ease;
-use super::subdomain::{Neighbours, Settling, Window};
+use super::homotopy::Homotopy;
+use super::subdomain::{Adjacency, NonlinearElimination, Subdomain};
 use crate::method::harmonic_balance::aft::{Port, Ports, block};
 use crate::method::harmonic_balance::equations::harmonic_set::weight;
-use crate::method::harmonic_balance::equations::{Level, Slopes, Solution};
+use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::newton::{HALVINGS, SHORTENS};
 use num_complex::Complex64;
 
@@ -41,7 +41,7 @@ const WORTH: f64 = 0.5;
 
 /// Forces along the axes of a cluster after a trial step.
 #[derive(Debug, Default, Clone)]
-struct Trial {
+struct TrialStep {
     step: Vec<f64>,
     /// φ and its derivative.
     beyond: Vec<f64>,
@@ -52,7 +52,7 @@ struct Trial {
     size: f64,
 }
 
-impl Level {
+impl Discretization {
     /// Tells whether nonlinear elimination can follow the next step. Stores the
     /// derivatives of that step.
     pub(crate) fn can_settle(&mut self, ports: &Ports) -> bool {
@@ -60,7 +60,7 @@ impl Level {
         if ports.iter().any(|port| port.is_force() || port.marches()) {
             return false;
         }
-        let settling = self.settling.get_or_insert_with(|| Settling::new(Neighbours::new(sparse, ports)));
+        let settling = self.settling.get_or_insert_with(|| NonlinearElimination::new(Adjacency::new(sparse, ports)));
         if settling.helps {
             settling.tangents.clone_from(&self.tangents);
         }
@@ -73,8 +73,8 @@ impl Level {
     pub(crate) fn settle(
         &mut self,
         ports: &Ports,
-        (omega, ease): (f64, Ease),
-        motion: &mut Solution,
+        (omega, ease): (f64, Homotopy),
+        motion: &mut HarmonicSolution,
         (length, beaten): (f64, f64),
     ) -> Option<f64> {
         let mut settling = self.settling.take()?;
@@ -90,13 +90,13 @@ impl Level {
 
     fn settled(
         &mut self,
-        settling: &mut Settling,
+        settling: &mut NonlinearElimination,
         ports: &Ports,
-        (omega, ease): (f64, Ease),
-        motion: &mut Solution,
+        (omega, ease): (f64, Homotopy),
+        motion: &mut HarmonicSolution,
         length: f64,
     ) -> Option<f64> {
-        let Settling { neighbours, tangents, step, beyond, left, .. } = settling;
+        let NonlinearElimination { neighbours, tangents, step, beyond, left, .. } = settling;
         step.clone_from(&self.step);
         let sizes: Vec<f64> = ports.iter().map(|port| self.left_along(port)).collect();
         let largest = sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
@@ -108,7 +108,7 @@ impl Level {
         for cluster in neighbours.clusters(ports, &missed, MOST_AXES) {
             let sparse = self.sparse.as_ref()?;
             let at = (&*cluster, AROUND);
-            let mut window = Window::new(sparse, neighbours, ports, at, (tangents, &self.blocks))?;
+            let mut window = Subdomain::new(sparse, neighbours, ports, at, (tangents, &self.blocks))?;
             let along = (&**tangents, &**step, &mut **beyond, &mut **left);
             self.settle_cluster(ports, &cluster, &mut window, along, (omega, ease, length));
         }
@@ -119,7 +119,7 @@ impl Level {
             *d = step + (moved + left) / length;
         }
         self.advance(ports, motion, 1.0, length);
-        Some(self.evaluate(ports, omega, motion, ease, length, Slopes::Cheap))
+        Some(self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap))
     }
 
     /// Returns the size of the residual along a port, weighted as velocities.
@@ -136,9 +136,9 @@ impl Level {
         &mut self,
         ports: &Ports,
         cluster: &[usize],
-        window: &mut Window,
+        window: &mut Subdomain,
         (tangents, step, beyond, left): (&[f64], &[f64], &mut [f64], &mut [f64]),
-        (omega, ease, length): (f64, Ease, f64),
+        (omega, ease, length): (f64, Homotopy, f64),
     ) {
         let pair = 2 * self.harmonics().len();
         let along = |values: &[f64]| -> Vec<f64> {
@@ -147,7 +147,7 @@ impl Level {
         };
         let goal = along(step);
         let slopes = cluster.iter().map(|p| (pair * ports[*p].axes).pow(2)).sum();
-        let zero = Trial {
+        let zero = TrialStep {
             step: vec![0.0; goal.len()],
             beyond: vec![0.0; goal.len()],
             slopes: vec![0.0; slopes],
@@ -155,7 +155,7 @@ impl Level {
             residual: Vec::new(),
             size: 0.0,
         };
-        let mut trial = Trial { step: along(&self.step), ..zero.clone() };
+        let mut trial = TrialStep { step: along(&self.step), ..zero.clone() };
         let mut now = zero;
         self.measure_cluster(ports, cluster, window, tangents, &mut now);
         let whole = now.size;
@@ -203,10 +203,10 @@ impl Level {
         &mut self,
         ports: &Ports,
         cluster: &[usize],
-        window: &mut Window,
+        window: &mut Subdomain,
         (tangents, goal): (&[f64], &[f64]),
-        (omega, ease): (f64, Ease),
-        trial: &mut Trial,
+        (omega, ease): (f64, Homotopy),
+        trial: &mut TrialStep,
     ) {
         let nh = self.harmonics().len();
         let (mut at, mut from) = (0, 0);
@@ -247,9 +247,9 @@ impl Level {
         &self,
         ports: &Ports,
         cluster: &[usize],
-        window: &mut Window,
+        window: &mut Subdomain,
         tangents: &[f64],
-        trial: &mut Trial,
+        trial: &mut TrialStep,
     ) {
         let nh = self.harmonics().len();
         trial.residual.resize(trial.rest.len(), 0.0);

@@ -12,10 +12,10 @@
 //!
 //! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
 
-use super::homotopy::{Ease, GIVEN, SOLVED};
+use super::homotopy::{GIVEN, Homotopy, SOLVED};
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::equations::{Level, Slopes, Solution};
-use crate::method::harmonic_balance::newton::{Goal, Lost};
+use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
+use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 
 /// First value of `s`.
 const PULL: f64 = 1.0;
@@ -38,21 +38,32 @@ const ITERATIONS: usize = 30;
 /// Newton iterations up to which a point was found quickly.
 const QUICK: usize = 8;
 
-impl Level {
+impl Discretization {
     /// Solves by the proximal point method from `motion`. If that fails, `motion` is the last
     /// point found.
-    pub(crate) fn by_proximal_points(&mut self, ports: &Ports, omega: f64, motion: &mut Solution) -> Result<(), Lost> {
+    pub(crate) fn by_proximal_points(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut HarmonicSolution,
+    ) -> Result<(), SolveError> {
         self.begin_anew(ports);
         self.anchor.clone_from(&motion.force);
-        let mut good = Solution { residual: f64::INFINITY, ..motion.clone() };
+        let mut good = HarmonicSolution { residual: f64::INFINITY, ..motion.clone() };
         let (mut pull, mut factor) = (PULL, 1.0f64);
         for _ in 0..MOST {
             let next = pull * factor;
             let before = motion.iterations;
-            let found = self.newton(ports, omega, motion, Ease { pull: next, ..GIVEN }, (ITERATIONS, Goal::Solved));
+            let found = self.newton(
+                ports,
+                omega,
+                motion,
+                Homotopy { pull: next, ..GIVEN },
+                (ITERATIONS, StopCriterion::Solved),
+            );
             if found.is_ok() {
                 let length = self.length(motion);
-                motion.residual = self.evaluate(ports, omega, motion, GIVEN, length, Slopes::None);
+                motion.residual = self.evaluate(ports, omega, motion, GIVEN, length, DerivativeScope::None);
                 if motion.residual <= SOLVED {
                     return Ok(());
                 }
@@ -76,6 +87,6 @@ impl Level {
             }
         }
         motion.copy(&good);
-        if motion.residual <= ENOUGH { Ok(()) } else { Err(Lost::after(motion.iterations, motion.residual)) }
+        if motion.residual <= ENOUGH { Ok(()) } else { Err(SolveError::after(motion.iterations, motion.residual)) }
     }
 }

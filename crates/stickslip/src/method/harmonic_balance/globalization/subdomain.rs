@@ -1,12 +1,12 @@
 //! Subdomain of a large structure around some contacts. Places outside of it are fixed.
 
 use crate::method::harmonic_balance::aft::{Ports, block};
-use crate::method::harmonic_balance::dynamics::banded::Sparse;
+use crate::method::harmonic_balance::dynamics::banded::BandedForm;
 use stickslip_numerics::banded::BandedMatrix;
 
 /// Adjacency of ports and places.
 #[derive(Debug, Clone)]
-pub(crate) struct Neighbours {
+pub(crate) struct Adjacency {
     /// Places of every port.
     of_port: Vec<Vec<usize>>,
     /// Ports at every place, and the places that the structure couples with it.
@@ -14,8 +14,8 @@ pub(crate) struct Neighbours {
     links: Vec<Vec<usize>>,
 }
 
-impl Neighbours {
-    pub fn new(sparse: &Sparse, ports: &Ports) -> Self {
+impl Adjacency {
+    pub fn new(sparse: &BandedForm, ports: &Ports) -> Self {
         let (mut at_place, mut links) = (vec![Vec::new(); sparse.places()], vec![Vec::new(); sparse.places()]);
         let mut of_port = Vec::new();
         for (p, port) in ports.iter().enumerate() {
@@ -26,7 +26,7 @@ impl Neighbours {
             of_port.push(places);
         }
         sparse.couplings().for_each(|(i, l)| links[i].push(l));
-        Neighbours { of_port, at_place, links }
+        Adjacency { of_port, at_place, links }
     }
 
     /// Groups the marked ports into clusters of adjacent ports, with at most
@@ -88,8 +88,8 @@ impl Neighbours {
 
 /// Memory of the nonlinear elimination.
 #[derive(Debug, Clone)]
-pub(crate) struct Settling {
-    pub neighbours: Neighbours,
+pub(crate) struct NonlinearElimination {
+    pub neighbours: Adjacency,
     /// Derivatives of the forces at the beginning of the step.
     pub tangents: Vec<f64>,
     /// Newton step of all contacts, in units.
@@ -101,16 +101,16 @@ pub(crate) struct Settling {
     pub helps: bool,
 }
 
-impl Settling {
-    pub fn new(neighbours: Neighbours) -> Self {
+impl NonlinearElimination {
+    pub fn new(neighbours: Adjacency) -> Self {
         let [tangents, step, beyond, left] = [const { Vec::new() }; 4];
-        Settling { neighbours, tangents, step, beyond, left, helps: true }
+        NonlinearElimination { neighbours, tangents, step, beyond, left, helps: true }
     }
 }
 
 /// Linear equations of a subdomain: its structure with the derivatives of all its contacts.
 #[derive(Debug)]
-pub(crate) struct Window {
+pub(crate) struct Subdomain {
     /// Per axis of the cluster: (number of the place in the subdomain, direction).
     ends: Vec<Vec<(usize, f64)>>,
     /// Number of unknowns of a place.
@@ -124,12 +124,12 @@ pub(crate) struct Window {
     right: Vec<f64>,
 }
 
-impl Window {
+impl Subdomain {
     /// Creates the subdomain around some ports, with the derivatives `tangents`
     /// of all. `None` if the equations are singular.
     pub fn new(
-        sparse: &Sparse,
-        neighbours: &Neighbours,
+        sparse: &BandedForm,
+        neighbours: &Adjacency,
         ports: &Ports,
         (cluster, times): (&[usize], usize),
         (tangents, blocks): (&[f64], &[usize]),
@@ -167,7 +167,7 @@ impl Window {
             return None;
         }
         let ends = cluster.iter().flat_map(|p| ports[*p].range()).map(|q| here(sparse.ends(q))).collect();
-        Some(Window {
+        Some(Subdomain {
             ends,
             size,
             alone,
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
     use crate::law::Jenkins;
     use crate::method::harmonic_balance::aft::blocks;
-    use crate::method::harmonic_balance::dynamics::banded::Along;
+    use crate::method::harmonic_balance::dynamics::banded::StepParameters;
     use crate::model::{GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
@@ -254,7 +254,7 @@ mod tests {
     const HARMONICS: [usize; 2] = [1, 3];
 
     /// A ring, with pseudo-random derivatives of its forces.
-    fn ring() -> (Sparse, Ports, Vec<f64>, Vec<usize>) {
+    fn ring() -> (BandedForm, Ports, Vec<f64>, Vec<usize>) {
         let name = |i: usize| format!("b{}", i % BLADES);
         let mut model = Model::default();
         for i in 0..BLADES {
@@ -269,11 +269,11 @@ mod tests {
         }
         let system = model.assemble().unwrap();
         let ports = Ports::new(&system).unwrap();
-        let mut sparse = Sparse::new(&system, &ports, &HARMONICS).unwrap();
+        let mut sparse = BandedForm::new(&system, &ports, &HARMONICS).unwrap();
         sparse.drive(2.5).unwrap(); // above all resonances, where motion decays from blade to blade
         let (blocks, size) = blocks(&ports, HARMONICS.len());
         let tangents: Vec<f64> = (0..size).map(|i| 0.2 * ((i * 7919 + 13) as f64).sin()).collect();
-        let along = Along { penalty: &vec![0.0; ports.len()], ease: GIVEN };
+        let along = StepParameters { penalty: &vec![0.0; ports.len()], ease: GIVEN };
         assert!(sparse.linearise(&ports, &along, &tangents));
         (sparse, ports, tangents, blocks)
     }
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn a_window_moves_as_the_whole_does() {
         let (mut sparse, ports, tangents, blocks) = ring();
-        let neighbours = Neighbours::new(&sparse, &ports);
+        let neighbours = Adjacency::new(&sparse, &ports);
         let size = 2 * HARMONICS.len();
         let cluster = [7, 8, 9];
         let mut whole = vec![0.0; BLADES * size];
@@ -292,7 +292,7 @@ mod tests {
         sparse.receive_all(&mut whole);
         for (around, error) in [(BLADES, 1e-12), (3, 1e-3)] {
             let at = (&cluster[..], around);
-            let mut window = Window::new(&sparse, &neighbours, &ports, at, (&tangents, &blocks)).unwrap();
+            let mut window = Subdomain::new(&sparse, &neighbours, &ports, at, (&tangents, &blocks)).unwrap();
             let mut motion = forces.clone();
             window.receive(&mut motion);
             let largest = motion.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn clusters_are_neighbours() {
         let (sparse, ports, ..) = ring();
-        let neighbours = Neighbours::new(&sparse, &ports);
+        let neighbours = Adjacency::new(&sparse, &ports);
         let marked: Vec<bool> = (0..BLADES).map(|i| [0, 3, 4, 5, 20, BLADES - 1].contains(&i)).collect();
         assert_eq!(neighbours.clusters(&ports, &marked, 8), [vec![0, BLADES - 1], vec![3, 4, 5], vec![20]]);
         assert_eq!(neighbours.clusters(&ports, &marked, 2).len(), 4);

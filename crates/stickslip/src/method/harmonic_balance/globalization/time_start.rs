@@ -4,9 +4,9 @@
 use super::found_by::FoundBy;
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::NAME;
-use crate::method::harmonic_balance::equations::Solution;
-use crate::method::harmonic_balance::solver::Balance;
-use crate::method::orbit_search::describing_guess::Guess;
+use crate::method::harmonic_balance::equations::HarmonicSolution;
+use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
+use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::return_map::APPROACH;
 use crate::method::orbit_search::settling::course;
 use crate::orbit::{JointSample, ObservedMotion, Orbit, Path};
@@ -25,14 +25,19 @@ const LONGER: usize = 3;
 /// Newton's method removes the remaining transient.
 const LED: usize = 1;
 
-impl Balance {
+impl HarmonicBalanceSolver {
     /// Returns an initial guess for an orbit of several excitation periods.
     ///
     /// Describing functions know no such orbit, and Newton's method does not leave orbits of one
     /// period. The guess is the motion after [`APPROACH`] returns of time integration. Returns
     /// `None` for orbits of one period, if no integration takes the system, or if motions never
     /// separate, so that no such orbit exists.
-    pub(crate) fn approached(&mut self, top: usize, omega: f64, guess: Option<&Guess>) -> Option<Solution> {
+    pub(crate) fn approached(
+        &mut self,
+        top: usize,
+        omega: f64,
+        guess: Option<&DescribingGuess>,
+    ) -> Option<HarmonicSolution> {
         let start = guess.filter(|_| self.periods > 1 && !self.judge.proves())?.state(self.system.dofs());
         let path = self.judge.approach(&self.system, omega, start, APPROACH)?;
         self.series_of(&*path, top, omega)
@@ -42,7 +47,7 @@ impl Balance {
     ///
     /// A solver knows only the harmonics of the orbits that it found. If motions can separate,
     /// the state selects one of several orbits.
-    pub(crate) fn led(&mut self, start: &[f64], omega: f64) -> Option<(usize, Solution)> {
+    pub(crate) fn led(&mut self, start: &[f64], omega: f64) -> Option<(usize, HarmonicSolution)> {
         let dofs = self.system.dofs();
         if self.judge.proves() || self.periods > 1 || dofs > MOST_DOFS_IN_TIME || start.len() < 2 * dofs {
             return None;
@@ -76,10 +81,11 @@ impl Balance {
     }
 
     /// Returns the harmonics of a motion that was integrated over a period.
-    pub(crate) fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<Solution> {
+    pub(crate) fn series_of(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<HarmonicSolution> {
         let level = self.levels.get_mut(&top)?;
         let (nh, n) = (level.harmonics().len(), level.alternation.samples());
-        let mut motion = Solution { found_by: FoundBy::TimeIntegration, ..Solution::rest(level.linear.len()) };
+        let mut motion =
+            HarmonicSolution { found_by: FoundBy::TimeIntegration, ..HarmonicSolution::rest(level.linear.len()) };
         let samples: Vec<_> = (0..n).map(|i| path.sample(TAU / omega * i as f64 / n as f64).joints).collect();
         for port in self.ports.iter() {
             for q in port.range() {

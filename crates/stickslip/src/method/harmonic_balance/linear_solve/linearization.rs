@@ -4,16 +4,16 @@
 //! the lowest harmonics alone, or all of them.
 
 use crate::method::harmonic_balance::aft::{Port, Ports, block};
-use crate::method::harmonic_balance::globalization::homotopy::Ease;
+use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 /// The linearised equations at a motion.
-pub(crate) struct Linear<'a> {
+pub(crate) struct LinearizedEquations<'a> {
     pub ports: &'a Ports,
     pub harmonics: &'a [usize],
     pub omega: f64,
-    pub ease: Ease,
+    pub ease: Homotopy,
     pub length: f64,
     pub penalty: &'a [f64],
     pub tangents: &'a [f64],
@@ -21,7 +21,7 @@ pub(crate) struct Linear<'a> {
     pub units: &'a [f64],
 }
 
-impl Linear<'_> {
+impl LinearizedEquations<'_> {
     /// Returns K or T of a port.
     pub fn tangent(&self, p: usize, port: &Port) -> &[f64] {
         &self.tangents[block(self.blocks, p, port, self.harmonics.len())]

@@ -17,10 +17,10 @@
 //! Memory: per harmonic two complex matrices over the axes; in modes, two real
 //! matrices over the axes and one over axes and modes.
 
-use super::linearization::Linear;
+use super::linearization::LinearizedEquations;
 use crate::method::harmonic_balance::aft::{MANY_DIRECTIONS, Port, Ports};
 use crate::method::harmonic_balance::dynamics::linear_dynamics::CACHED;
-use crate::method::harmonic_balance::dynamics::receptance::{Modal, Receptance};
+use crate::method::harmonic_balance::dynamics::receptance::{ModalReceptance, Receptance};
 use crate::method::harmonic_balance::globalization::homotopy::SOLVED;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -79,17 +79,17 @@ const PAID: usize = 10;
 const ABOVE: f64 = 3.0;
 
 /// Residual flexibility of the modes above a bound, from a discarded split.
-type Above = (f64, Arc<Vec<f64>>);
+type KeptResidualFlexibility = (f64, Arc<Vec<f64>>);
 
 /// GMRES and the preconditioners that it keeps.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Coupled {
+pub(crate) struct NewtonKrylov {
     gmres: Gmres,
     /// Preconditioner for receptances as matrices, with the derivatives of this
     /// motion or a nearby one.
-    harmonics: Option<Harmonics>,
-    split: Option<Split>,
-    above: Option<Above>,
+    harmonics: Option<BlockPreconditioner>,
+    split: Option<ModalPreconditioner>,
+    above: Option<KeptResidualFlexibility>,
     /// Forces of a product, and the motions that they cause.
     force: Vec<Complex64>,
     moved: Vec<Complex64>,
@@ -99,26 +99,26 @@ pub(crate) struct Coupled {
 
 /// The state in which a Newton step begins.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Near {
-    /// The length of motions, m, see `Level::length`.
+pub(crate) struct StepStart {
+    /// The length of motions, m, see `Discretization::length`.
     pub length: f64,
     /// The size of the residual.
     pub residual: f64,
     /// True if derivatives, or all of the equations, use the coarse sampling,
-    /// see `Level::follow_slopes`.
+    /// see `Discretization::follow_slopes`.
     pub sketched: bool,
     /// True if the derivatives are those of the last step, whose preconditioner then fits.
     pub kept: bool,
 }
 
-impl Coupled {
+impl NewtonKrylov {
     /// Returns the memory of the kept preconditioner, bytes.
     #[cfg(test)]
     pub(crate) fn bytes(&self) -> usize {
-        let Some(Harmonics { lowest, others, .. }) = &self.harmonics else { return 0 };
-        let of = |answer: &Answer| match answer {
-            Answer::Inverse(inverse) => inverse.bytes(),
-            Answer::Factor(factor) => factor.bytes(),
+        let Some(BlockPreconditioner { lowest, others, .. }) = &self.harmonics else { return 0 };
+        let of = |answer: &BlockSolver| match answer {
+            BlockSolver::Inverse(inverse) => inverse.bytes(),
+            BlockSolver::Factor(factor) => factor.bytes(),
         };
         others.iter().map(of).sum::<usize>() + lowest.transposed.bytes()
     }
@@ -128,10 +128,10 @@ impl Coupled {
     /// number of products. If it was not found, `step` is the residual again.
     pub(crate) fn step(
         &mut self,
-        linear: &Linear<'_>,
+        linear: &LinearizedEquations<'_>,
         receptance: &mut Receptance,
         step: &mut [f64],
-        near: Near,
+        near: StepStart,
     ) -> (bool, usize) {
         let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
         let (residual, finest) = (near.residual, if near.sketched { FINEST_OF_SKETCHES } else { 0.0 });
@@ -139,7 +139,7 @@ impl Coupled {
         let limits = GmresLimits { tolerance: wanted, restart: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
-        let Coupled { gmres, harmonics, split, above, force, moved, parts } = self;
+        let NewtonKrylov { gmres, harmonics, split, above, force, moved, parts } = self;
         // with unknown forces, the samples that slip couple the lowest harmonics
         harmonics.take_if(|_| !near.kept && linear.ports.has_forces());
         let found = loop {
@@ -189,7 +189,7 @@ fn lowest(ports: &Ports, harmonics: usize) -> usize {
     if count < 2 { 0 } else { count.min(harmonics) }
 }
 
-impl Linear<'_> {
+impl LinearizedEquations<'_> {
     /// Multiplies the Jacobian by a step, both in units.
     fn multiply(
         &self,
@@ -273,7 +273,11 @@ impl Linear<'_> {
     fn preconditioner<'b>(
         &self,
         receptance: &Receptance,
-        (harmonics, kept, above): (&'b mut Option<Harmonics>, &'b mut Option<Split>, &mut Option<Above>),
+        (harmonics, kept, above): (
+            &'b mut Option<BlockPreconditioner>,
+            &'b mut Option<ModalPreconditioner>,
+            &mut Option<KeptResidualFlexibility>,
+        ),
         fresh: &mut bool,
     ) -> Option<Preconditioner<'b>> {
         match receptance {
@@ -283,17 +287,17 @@ impl Linear<'_> {
                     let lowest = self.lowest(&formed.matrices)?;
                     let rest = formed.matrices.iter().enumerate().skip(lowest.count);
                     let others = rest.map(|(k, matrix)| self.of_harmonic(k, matrix)).collect::<Option<_>>()?;
-                    *harmonics = Some(Harmonics { lowest, others, products: 0, excess: 0 });
+                    *harmonics = Some(BlockPreconditioner { lowest, others, products: 0, excess: 0 });
                 }
                 harmonics.as_ref().map(Preconditioner::Harmonics)
             }
             Receptance::Modal(modal) => {
-                let (bound, usable) = (Split::bound(modal), kept.take());
+                let (bound, usable) = (ModalPreconditioner::bound(modal), kept.take());
                 let usable = usable.filter(|split| split.bound == bound);
                 *fresh = usable.is_none();
                 let mut split = match usable {
                     Some(split) => split,
-                    None => Split::new(
+                    None => ModalPreconditioner::new(
                         modal,
                         (bound, above.take().filter(|(of, _)| *of == bound).map(|(_, above)| above)),
                         |p, port, a, b| {
@@ -312,17 +316,17 @@ impl Linear<'_> {
     }
 
     /// Factors the equations of the lowest harmonics, if forces are unknown.
-    fn lowest(&self, receptance: &[DMatrix<Complex64>]) -> Option<Lowest> {
+    fn lowest(&self, receptance: &[DMatrix<Complex64>]) -> Option<LowestHarmonicsFactor> {
         let count = lowest(self.ports, self.harmonics.len());
         let mut matrix = Vec::new();
         self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
         // the matrix is row-major: its transpose is factored
         let transposed = DenseLu::new(matrix, 2 * count * self.ports.count()).ok()?;
-        Some(Lowest { count, transposed })
+        Some(LowestHarmonicsFactor { count, transposed })
     }
 
     /// Factors the equations of one harmonic with the mean tangents.
-    fn of_harmonic(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<Answer> {
+    fn of_harmonic(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<BlockSolver> {
         let size = receptance.nrows();
         let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
         let mut matrix = vec![ZERO; size * size];
@@ -364,7 +368,7 @@ impl Linear<'_> {
                 }
             }
         }
-        ComplexLu::new(matrix, size).ok().map(|factor| Answer::new(factor, size))
+        ComplexLu::new(matrix, size).ok().map(|factor| BlockSolver::new(factor, size))
     }
 }
 
@@ -372,39 +376,39 @@ impl Linear<'_> {
 /// inverse is exact enough for a preconditioner. It takes a fifth of the time
 /// of triangular solutions, whose rows are too short for blocks.
 #[derive(Debug, Clone)]
-enum Answer {
+enum BlockSolver {
     Inverse(ComplexGemv),
     Factor(ComplexLu),
 }
 
-impl Answer {
+impl BlockSolver {
     fn new(factor: ComplexLu, size: usize) -> Self {
         if size > CACHED {
-            return Answer::Factor(factor);
+            return BlockSolver::Factor(factor);
         }
         let mut inverse = vec![ZERO; size * size];
         inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
         factor.solve(&mut inverse);
-        Answer::Inverse(ComplexGemv::new(&inverse, size))
+        BlockSolver::Inverse(ComplexGemv::new(&inverse, size))
     }
 
     fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
         match self {
-            Answer::Inverse(inverse) => inverse.apply(right, memory),
-            Answer::Factor(factor) => factor.solve(right),
+            BlockSolver::Inverse(inverse) => inverse.apply(right, memory),
+            BlockSolver::Factor(factor) => factor.solve(right),
         }
     }
 }
 
 /// The factor of the lowest harmonics together.
 #[derive(Debug, Clone)]
-struct Lowest {
+struct LowestHarmonicsFactor {
     count: usize,
     /// The transposed Jacobian, in units.
     transposed: DenseLu<f64>,
 }
 
-impl Lowest {
+impl LowestHarmonicsFactor {
     /// Returns the step of these harmonics alone, from the residual of all; both in units.
     fn apply(&self, v: &[f64], pair: usize) -> Vec<f64> {
         let mut own: Vec<f64> = v.chunks_exact(pair).flat_map(|v| &v[..2 * self.count]).copied().collect();
@@ -415,22 +419,22 @@ impl Lowest {
 
 /// Preconditioner with the lowest harmonics together, and the others one by one.
 #[derive(Debug, Clone)]
-struct Harmonics {
-    lowest: Lowest,
-    others: Vec<Answer>,
+struct BlockPreconditioner {
+    lowest: LowestHarmonicsFactor,
+    others: Vec<BlockSolver>,
     /// Products of the step for which it was made, and the total excess of later steps over it.
     products: usize,
     excess: usize,
 }
 
 enum Preconditioner<'a> {
-    Harmonics(&'a Harmonics),
-    Split(&'a mut Split),
+    Harmonics(&'a BlockPreconditioner),
+    Split(&'a mut ModalPreconditioner),
 }
 
 impl Preconditioner<'_> {
     /// Replaces a residual in units by a step in units.
-    fn apply(&self, linear: &Linear, v: &mut [f64]) {
+    fn apply(&self, linear: &LinearizedEquations, v: &mut [f64]) {
         let nh = linear.harmonics.len();
         let together = match self {
             Preconditioner::Harmonics(harmonics) => harmonics.lowest.apply(v, 2 * nh),
@@ -438,7 +442,7 @@ impl Preconditioner<'_> {
         };
         v.iter_mut().zip(linear.units).for_each(|(v, unit)| *v *= unit);
         match self {
-            Preconditioner::Harmonics(Harmonics { lowest, others, .. }) => {
+            Preconditioner::Harmonics(BlockPreconditioner { lowest, others, .. }) => {
                 let (mut column, mut memory) = (vec![ZERO; v.len() / (2 * nh)], Vec::new());
                 for (k, factor) in (lowest.count..).zip(others) {
                     for (c, v) in column.iter_mut().zip(v.chunks_exact(2 * nh)) {
@@ -456,7 +460,11 @@ impl Preconditioner<'_> {
             let unit = port.unit(linear.length);
             v[2 * nh * port.first..2 * nh * (port.first + port.axes)].iter_mut().for_each(|v| *v /= unit);
         }
-        if let Preconditioner::Harmonics(Harmonics { lowest: Lowest { count: count @ 1.., .. }, .. }) = self {
+        if let Preconditioner::Harmonics(BlockPreconditioner {
+            lowest: LowestHarmonicsFactor { count: count @ 1.., .. },
+            ..
+        }) = self
+        {
             let steps = v.chunks_exact_mut(2 * nh).zip(together.chunks_exact(2 * count));
             steps.for_each(|(v, own)| v[..2 * count].copy_from_slice(own));
         }
@@ -487,7 +495,7 @@ pub(crate) fn step_products(ports: &Ports, harmonics: usize) -> f64 {
 
 /// The preconditioner `(1 + R K)⁻¹` with one real K for all harmonics, for a structure in modes.
 #[derive(Debug, Clone)]
-struct Split {
+struct ModalPreconditioner {
     /// Frequency, rad/s, up to which modes are taken individually.
     bound: f64,
     /// True if the mean has closed contacts. These already precondition it.
@@ -510,9 +518,9 @@ struct Split {
     omega: f64,
 }
 
-impl Split {
+impl ModalPreconditioner {
     /// Returns the bound, rounded up so that nearby frequencies share it.
-    fn bound(modal: &Modal) -> f64 {
+    fn bound(modal: &ModalReceptance) -> f64 {
         let top = modal.rates.iter().map(|s| s.im).fold(modal.omega, f64::max);
         ABOVE * top.log2().ceil().exp2()
     }
@@ -520,7 +528,7 @@ impl Split {
     /// Creates the split from `stiffness(p, port, a, b)` of the joints. `above`
     /// is S, if it is known for this bound.
     fn new(
-        modal: &Modal,
+        modal: &ModalReceptance,
         (bound, above): (f64, Option<Arc<Vec<f64>>>),
         stiffness: impl Fn(usize, &Port, usize, usize) -> f64,
         ports: &Ports,
@@ -567,11 +575,22 @@ impl Split {
         let mut core = vec![0.0; l * l];
         multiply_blocked(&pull, &moved, &mut core, ProductShape { rows: l, inner: p, columns: l }, Transpose::No);
         let closed = modal.closed.is_some();
-        Some(Split { bound, closed, low, above, factor, pull, moved, core, harmonics: Vec::new(), omega: f64::NAN })
+        Some(ModalPreconditioner {
+            bound,
+            closed,
+            low,
+            above,
+            factor,
+            pull,
+            moved,
+            core,
+            harmonics: Vec::new(),
+            omega: f64::NAN,
+        })
     }
 
     /// Prepares the factors for an excitation frequency.
-    fn drive(&mut self, modal: &Modal) -> Option<()> {
+    fn drive(&mut self, modal: &ModalReceptance) -> Option<()> {
         if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
             return Some(());
         }
@@ -642,10 +661,10 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};
-    use crate::method::harmonic_balance::budget::{POINT, Work};
-    use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
-    use crate::method::harmonic_balance::dynamics::uncoupled_modes::Uncoupled;
-    use crate::method::harmonic_balance::equations::{Level, Solution};
+    use crate::method::harmonic_balance::budget::{POINT, WorkShare};
+    use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+    use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
+    use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
     use crate::method::harmonic_balance::globalization::homotopy::GIVEN;
     use crate::model::{Axis, System};
     use crate::structure::Structure;
@@ -679,7 +698,7 @@ mod tests {
     }
 
     #[derive(Debug, Clone, Copy, PartialEq)]
-    enum Form {
+    enum SolverForm {
         Eliminated,
         Formed,
         Modal,
@@ -688,20 +707,21 @@ mod tests {
     }
 
     /// Returns the solution, the number of products, and the number of steps of laws with memory.
-    fn solve(system: &System, omega: f64, harmonics: &[usize], form: Form) -> (Solution, usize, usize) {
+    fn solve(system: &System, omega: f64, harmonics: &[usize], form: SolverForm) -> (HarmonicSolution, usize, usize) {
         let ports = Ports::new(system).unwrap();
-        let rest = Rest::new(system, &ports);
-        let mut level = Level::new(harmonics.to_vec(), 1024, &ports, None);
-        level.coupled = (form != Form::Eliminated).then(Coupled::default);
-        if form == Form::Sketched {
+        let rest = LinearDynamics::new(system, &ports);
+        let mut level = Discretization::new(harmonics.to_vec(), 1024, &ports, None);
+        level.coupled = (form != SolverForm::Eliminated).then(NewtonKrylov::default);
+        if form == SolverForm::Sketched {
             level.keep_sketch();
         }
         level.drive(system, &ports, &rest, omega).unwrap();
-        if form == Form::Modal {
+        if form == SolverForm::Modal {
             let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
-            let structure = Arc::new(Uncoupled::new(system.structure(), &directions).unwrap());
+            let structure = Arc::new(UncoupledDynamics::new(system.structure(), &directions).unwrap());
             let series = vec![0.0; ports.count()];
-            level.receptance = Receptance::Modal(Modal::new((&structure, None), (harmonics, omega), &series).unwrap());
+            level.receptance =
+                Receptance::Modal(ModalReceptance::new((&structure, None), (harmonics, omega), &series).unwrap());
         }
         let start = level.begin(system, &ports, None, omega);
         let found = level.solve(&ports, omega, start);
@@ -709,9 +729,9 @@ mod tests {
         (found, level.products, level.alternation.marched)
     }
 
-    fn agree(system: &System, harmonics: &[usize], forms: &[Form]) {
+    fn agree(system: &System, harmonics: &[usize], forms: &[SolverForm]) {
         for omega in [0.6, 1.7] {
-            let (expected, ..) = solve(system, omega, harmonics, Form::Eliminated);
+            let (expected, ..) = solve(system, omega, harmonics, SolverForm::Eliminated);
             let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
             for form in forms {
                 let (found, products, _) = solve(system, omega, harmonics, *form);
@@ -734,7 +754,7 @@ mod tests {
             }
         };
         let contacts: Vec<_> = (0..14).map(contact).collect();
-        agree(&system(&contacts), &[0, 1, 2, 3], &[Form::Formed, Form::Modal]);
+        agree(&system(&contacts), &[0, 1, 2, 3], &[SolverForm::Formed, SolverForm::Modal]);
     }
 
     /// With a coarse sampling first, the search finds the motion of all
@@ -746,8 +766,8 @@ mod tests {
         };
         let system = system(&(0..12).map(contact).collect::<Vec<_>>());
         for omega in [0.6, 1.1, 1.7] {
-            let (expected, _, all) = solve(&system, omega, &[0, 1, 2, 3], Form::Formed);
-            let (found, _, few) = solve(&system, omega, &[0, 1, 2, 3], Form::Sketched);
+            let (expected, _, all) = solve(&system, omega, &[0, 1, 2, 3], SolverForm::Formed);
+            let (found, _, few) = solve(&system, omega, &[0, 1, 2, 3], SolverForm::Sketched);
             let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
             let apart = found.c.iter().zip(&expected.c).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
             assert!(apart < 1e-8 * size, "{omega}: {apart:.1e} of {size:.1e}");
@@ -763,7 +783,7 @@ mod tests {
             (0..201).map(|_| (Arc::new(Jenkins2d { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 2)).collect();
         let system = system(&contacts);
         let ports = Ports::new(&system).unwrap();
-        let mut level = Level::new(vec![1], 64, &ports, None);
+        let mut level = Discretization::new(vec![1], 64, &ports, None);
         level.begin_anew(&ports);
         level.assembled = 10_000;
         assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
@@ -779,12 +799,12 @@ mod tests {
     fn searches_of_a_point_share_what_it_may_take() {
         let joints: Vec<_> = (0..3).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
         let ports = Ports::new(&system(&joints)).unwrap();
-        let mut level = Level::new(vec![1, 3], 64, &ports, None);
+        let mut level = Discretization::new(vec![1, 3], 64, &ports, None);
         level.alternation.marched = usize::MAX / 2;
         assert!(level.is_exhausted(&ports));
         level.begin_anew(&ports);
         assert!(level.spent.is_beyond(POINT) && level.is_exhausted(&ports), "the point has nothing left");
-        let share = |share: f64| Work { eliminated: share * POINT.eliminated, marched: share * POINT.marched };
+        let share = |share: f64| WorkShare { eliminated: share * POINT.eliminated, marched: share * POINT.marched };
         (level.spent, level.elsewhere) = (share(0.6), share(0.3));
         assert!(!level.is_exhausted(&ports));
         level.elsewhere = share(0.5);
@@ -802,7 +822,7 @@ mod tests {
             Arc::new(Dahl { stiffness: 1.5, limit: 0.3 }),
         ];
         let joints: Vec<_> = (0..18).map(|i| (laws[i % 3].clone(), 1)).collect();
-        agree(&system(&joints), &[1, 3, 5], &[Form::Formed]);
+        agree(&system(&joints), &[1, 3, 5], &[SolverForm::Formed]);
     }
 
     /// A few joints with rigid friction and long series: GMRES converges with
@@ -813,7 +833,7 @@ mod tests {
         let joints: Vec<_> = (0..12).map(|i| (laws[usize::from(i % 3 == 2)].clone(), 1)).collect();
         let harmonics: Vec<usize> = (1..128).step_by(2).collect();
         assert!(LOWEST < 24 * harmonics.len(), "some are left to their means");
-        agree(&system(&joints), &harmonics, &[Form::Formed]);
+        agree(&system(&joints), &harmonics, &[SolverForm::Formed]);
     }
 
     /// With few joints and long series, products with the laws dominate the
@@ -823,7 +843,7 @@ mod tests {
         let joints: Vec<_> = (0..10).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
         let system = system(&joints);
         let ports = Ports::new(&system).unwrap();
-        let mut level = Level::new((1..512).step_by(2).collect(), 8192, &ports, None);
+        let mut level = Discretization::new((1..512).step_by(2).collect(), 8192, &ports, None);
         level.begin_anew(&ports);
         level.products = 1_000;
         assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
@@ -838,10 +858,10 @@ mod tests {
             (0..201).map(|_| (Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 1)).collect();
         let system = system(&contacts);
         let ports = Ports::new(&system).unwrap();
-        let rest = Rest::new(&system, &ports);
+        let rest = LinearDynamics::new(&system, &ports);
         assert!(rest.modes_for(&ports).is_some());
         for needed in [false, true] {
-            let level = Level::new(vec![1], 64, &ports, None);
+            let level = Discretization::new(vec![1], 64, &ports, None);
             let mut level = if needed { level.with_matrix() } else { level };
             level.drive(&system, &ports, &rest, 0.7).unwrap();
             let mut motion = level.begin(&system, &ports, None, 0.7);
@@ -851,7 +871,7 @@ mod tests {
                 &mut motion,
                 GIVEN,
                 1.0,
-                crate::method::harmonic_balance::equations::Slopes::All,
+                crate::method::harmonic_balance::equations::DerivativeScope::All,
             );
             assert_eq!(level.assemble(&ports, 0.7, GIVEN, 1.0), needed);
         }

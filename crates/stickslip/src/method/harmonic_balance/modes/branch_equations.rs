@@ -1,17 +1,17 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
-use crate::method::harmonic_balance::accuracy::truncation_error::{Compared, estimate};
+use crate::method::harmonic_balance::accuracy::truncation_error::{ComparedSolution, estimate};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::dynamics::banded::GUESSED;
-use crate::method::harmonic_balance::dynamics::linear_dynamics::Rest;
-use crate::method::harmonic_balance::equations::harmonic_set::Kept;
-use crate::method::harmonic_balance::equations::{Level, Solution, transfer};
+use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+use crate::method::harmonic_balance::equations::harmonic_set::HarmonicSet;
+use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution, transfer};
 use crate::method::harmonic_balance::memory_estimate::{check_memory, memory};
 use crate::method::harmonic_balance::options::{HarmonicBalance, TOLERANCE};
 use crate::method::harmonic_balance::postprocess;
 use crate::method::harmonic_balance::solver::LARGEST;
-use crate::method::orbit_search::describing_guess::Guess;
-use crate::method::orbit_search::evidence::Judge;
+use crate::method::orbit_search::describing_guess::DescribingGuess;
+use crate::method::orbit_search::evidence::OrbitCheck;
 use crate::method::{MethodError, OrbitError, ways};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -42,18 +42,18 @@ pub(crate) struct BranchEquations<'a> {
     span: f64,
     ports: Ports,
     around: Option<Ports>,
-    rest: Rest,
+    rest: LinearDynamics,
     /// System to which `rest` belongs.
     rest_of: Arc<System>,
-    level: Level,
+    level: Discretization,
     /// Equations with twice the harmonics for the error estimate, unless they are too large.
-    finer: Option<Level>,
+    finer: Option<Discretization>,
     tolerance: f64,
-    motion: Solution,
+    motion: HarmonicSolution,
     /// Unit of motions, m.
     length: f64,
-    judge: Judge,
-    kept: Kept,
+    judge: OrbitCheck,
+    kept: HarmonicSet,
 }
 
 impl<'a> BranchEquations<'a> {
@@ -66,24 +66,25 @@ impl<'a> BranchEquations<'a> {
         let (system, omega) = at(range.0);
         let system = Arc::new(system);
         // a force that is zero at the first value may be nonzero later
-        let kept = Kept::new(&system, |_| true);
+        let kept = HarmonicSet::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
         let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with(ways(&system)))?;
-        let rest = Rest::new(&system, &ports);
+        let rest = LinearDynamics::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level = |top: usize| {
-            Level::new(kept.up_to(top), method.samples_at(top, &ports, ports.has_steep()), &ports, None).with_matrix()
+            Discretization::new(kept.up_to(top), method.samples_at(top, &ports, ports.has_steep()), &ports, None)
+                .with_matrix()
         };
         let harmonics = kept.up_to(top).len();
         check_memory(memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
         let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
         let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
-        let motion = Solution::rest(level.linear.len());
+        let motion = HarmonicSolution::rest(level.linear.len());
         Ok(BranchEquations {
             at,
             rest_of: system.clone(),
-            judge: Judge::new(&system),
+            judge: OrbitCheck::new(&system),
             system,
             omega,
             value: f64::NAN,
@@ -124,14 +125,14 @@ impl<'a> BranchEquations<'a> {
         }
         let same = system.structure() == self.rest_of.structure();
         if !same {
-            self.rest = Rest::new(&system, &self.ports);
+            self.rest = LinearDynamics::new(&system, &self.ports);
             self.rest_of = system.clone();
         }
         if self.level.drive(&system, &self.ports, &self.rest, omega).is_err() {
             return false;
         }
         if !same || self.system.joints() != system.joints() {
-            self.judge = Judge::new(&system);
+            self.judge = OrbitCheck::new(&system);
         }
         (self.system, self.omega, self.value) = (system, omega, value);
         true
@@ -149,7 +150,7 @@ impl<'a> BranchEquations<'a> {
         }
         // as for a single point: the initial guess solves the whole structure; large systems
         // start without friction
-        let guess = (self.system.dofs() < GUESSED).then(|| Guess::new(&self.system, self.omega));
+        let guess = (self.system.dofs() < GUESSED).then(|| DescribingGuess::new(&self.system, self.omega));
         let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
         self.level.begin_point();
         let solved = self.level.solve(&self.ports, self.omega, start);
@@ -176,12 +177,12 @@ impl<'a> BranchEquations<'a> {
             finer.begin_point();
             finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
             let better = postprocess::places(finer, &self.rest, self.omega, &motion).ok()?;
-            let coarse = Compared { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
+            let coarse = ComparedSolution { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
             let steep = self.ports.has_steep() || self.level.jumps(&self.ports, &self.motion);
             let at = (self.kept, self.omega, steep);
             Some(estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
         });
-        let setting = postprocess::Setting {
+        let setting = postprocess::OrbitInput {
             system: &self.system,
             ports: &self.ports,
             around: self.around.as_ref(),

@@ -93,7 +93,7 @@ impl ModeArc {
 }
 
 /// Result of a step.
-pub(crate) struct Step {
+pub(crate) struct ModeStep {
     pub to: ModeArc,
     /// Newton iterations.
     pub iterations: usize,
@@ -117,7 +117,7 @@ impl ModeEquations<'_> {
     ///
     /// A `bold` step takes the full Newton step if no fraction of it reduces the residual. This
     /// passes over kinks, but a long step may then jump to another branch.
-    pub fn step(&mut self, from: &ModeArc, length: f64, bold: bool) -> Option<Step> {
+    pub fn step(&mut self, from: &ModeArc, length: f64, bold: bool) -> Option<ModeStep> {
         let row = self.weigh(from, &from.tangent);
         let predicted = from.predicted(length);
         if !(predicted.state.omega > 0.0 && predicted.amplitude.is_finite()) {
@@ -126,7 +126,7 @@ impl ModeEquations<'_> {
         let (to, iterations) = self.correct_along(predicted.clone(), &row, bold)?;
         let off = self.length(from, &predicted.towards(&to));
         let straight = dot(&row, &to.tangent);
-        Some(Step { to, iterations, off, straight })
+        Some(ModeStep { to, iterations, off, straight })
     }
 
     /// Returns the arc length from a point to a motion along the straight line.

@@ -1,6 +1,6 @@
 //! Linear modes of the structure without its joints, where nonlinear modes begin.
 
-use super::{ModeEquations, ModeState, Placed, ZERO};
+use super::{ModeEquations, ModeState, PlacedPort, ZERO};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::eigen;
@@ -69,7 +69,7 @@ impl ModeEquations<'_> {
         let mut stiffness = self.system.structure().stiffness().clone();
         // keep a small share of the joints' stiffness, so that equal blades move with or
         // against each other as the joints couple them
-        for Placed { port, w } in self.elastic.iter().chain(&self.contacts) {
+        for PlacedPort { port, w } in self.elastic.iter().chain(&self.contacts) {
             let kt = port.stiffness();
             let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
             for w in w {
@@ -138,7 +138,7 @@ impl ModeEquations<'_> {
             let omega = square.sqrt();
             let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
             stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
-            for Placed { port, w } in &self.elastic {
+            for PlacedPort { port, w } in &self.elastic {
                 let holds = port.at_rest(omega);
                 for (i, v) in w.iter().enumerate() {
                     for (k, w) in w.iter().enumerate() {

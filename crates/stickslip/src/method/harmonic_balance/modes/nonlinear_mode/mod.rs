@@ -20,7 +20,7 @@ mod mode_results;
 pub(crate) use linear_modes::LinearMode;
 
 use crate::method::MethodError;
-use crate::method::harmonic_balance::aft::{Alternation, Port, Ports};
+use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
 use crate::method::harmonic_balance::equations::contact_parameter::penalty;
 use crate::method::harmonic_balance::equations::regularization::{CLEAR, stay};
 use crate::method::harmonic_balance::newton::{HALVINGS, SHORTENS};
@@ -61,10 +61,10 @@ pub(crate) struct ModeState {
 pub(crate) struct ModeEquations<'a> {
     pub(crate) system: &'a System,
     /// Motion ports.
-    pub(super) elastic: Vec<Placed>,
+    pub(super) elastic: Vec<PlacedPort>,
     /// Force ports. Their axes have separate numbers.
-    pub(super) contacts: Vec<Placed>,
-    pub(super) alternation: Alternation,
+    pub(super) contacts: Vec<PlacedPort>,
+    pub(super) alternation: FrequencyTime,
     /// Index of the first harmonic.
     first: usize,
     /// True if motions may be mixtures of two modes of equal frequency, so that the equations
@@ -73,12 +73,12 @@ pub(crate) struct ModeEquations<'a> {
 }
 
 /// Port with the directions of its axes in the structure.
-pub(super) struct Placed {
+pub(super) struct PlacedPort {
     pub port: Port,
     pub w: Vec<DVector<f64>>,
 }
 
-impl Placed {
+impl PlacedPort {
     /// Returns the motions along the axes, [axis][harmonic], from those of the places.
     fn along(&self, x: &[Complex64], nh: usize) -> Vec<Complex64> {
         let one = |w: &DVector<f64>, k: usize| -> Complex64 {
@@ -104,24 +104,24 @@ impl<'a> ModeEquations<'a> {
         if system.structure().mass().clone().cholesky().is_none() {
             return Err(MethodError::mass_not_positive(crate::method::harmonic_balance::NAME));
         }
-        let (mut elastic, mut contacts): (Vec<Placed>, Vec<Placed>) = (Vec::new(), Vec::new());
+        let (mut elastic, mut contacts): (Vec<PlacedPort>, Vec<PlacedPort>) = (Vec::new(), Vec::new());
         let ports = Ports::new(system)?;
         for port in ports.iter() {
             let w: Vec<DVector<f64>> = port.range().map(|q| ports.axis(system, q).dense(system.dofs())).collect();
             if !port.is_force() {
-                elastic.push(Placed { port: port.clone(), w });
+                elastic.push(PlacedPort { port: port.clone(), w });
             } else if w.iter().any(|w| w.amax() > 0.0) {
                 // a contact between imposed places exerts no force on the structure, and the
                 // mode does not move it
                 let first = contacts.last().map_or(0, |last| last.port.first + last.port.axes);
                 let mut port = port.clone();
                 port.first = first;
-                contacts.push(Placed { port, w });
+                contacts.push(PlacedPort { port, w });
             }
         }
         let odd = system.joints().iter().all(|joint| joint.law().is_odd());
         let list: Vec<usize> = if odd { (1..=harmonics).step_by(2).collect() } else { (0..=harmonics).collect() };
-        let mut alternation = Alternation::new(list, samples);
+        let mut alternation = FrequencyTime::new(list, samples);
         alternation.by_frequency = Some(Vec::new());
         Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd), mixes: false })
     }
@@ -181,7 +181,7 @@ impl<'a> ModeEquations<'a> {
         let receptance = |w: &DVector<f64>| factor.as_ref().map_or(0.0, |factor| w.dot(&factor.solve(w)));
         self.contacts
             .iter()
-            .map(|Placed { port, w }| {
+            .map(|PlacedPort { port, w }| {
                 let mean = w.iter().map(receptance).sum::<f64>() / w.len() as f64;
                 penalty(mean + port.series, top, omega).max(CLEAR * port.least_penalty)
             })
