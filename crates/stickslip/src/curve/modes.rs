@@ -180,7 +180,7 @@ impl ModeBranches {
         let (low, high) = request.range;
         // A single mode has the same number at both ends. For a law with memory, large motions
         // are expensive, so the branch from small amplitudes is tried first.
-        let rising = match equations.is_alone_with_memory() {
+        let rising = match equations.is_single_dof_with_memory() {
             true => ModeCurve::from_small_amplitude(equations, request.mode, request.range),
             false => None,
         };
@@ -282,7 +282,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
         amplitude,
         omega: state.omega,
         damping: state.damping,
-        viscous: equations.viscous(state),
+        viscous: equations.viscous_damping_ratio(state),
         places: equations.places(state),
         amplitudes: equations.half_ranges(state),
     }

@@ -21,7 +21,7 @@ impl Ways {
     }
 
     /// Returns the text that follows an error message; empty if no methods are known.
-    pub(super) fn behind(&self) -> String {
+    pub(super) fn suffix(&self) -> String {
         if *self == Ways::default() { String::new() } else { format!("; {self}") }
     }
 }

@@ -6,7 +6,7 @@ use crate::structure::MAX_FULL_DOFS;
 
 /// Error of a method that cannot take a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{refusal}{}", .ways.behind())]
+#[error("{refusal}{}", .ways.suffix())]
 pub struct MethodError {
     /// The reason.
     pub refusal: Refusal,
@@ -113,7 +113,7 @@ impl MethodError {
 
     /// Returns the error that `method` needs more than joints at a place, if the system has a
     /// place with joints alone.
-    pub(crate) fn empty(method: &'static str, system: &System) -> Option<Self> {
+    pub(crate) fn only_joints(method: &'static str, system: &System) -> Option<Self> {
         let mut empty: Vec<bool> = (0..system.dofs()).map(|row| system.structure().diagonal_mass(row) == 0.0).collect();
         if !empty.contains(&true) {
             return None; // every place has mass

@@ -121,7 +121,7 @@ pub(crate) fn states_at(
         let first = states.len();
         let before = known.get(first..first + own).map_or_else(|| vec![0.0; own], <[f64]>::to_vec);
         let to = along(displacement, true);
-        states.extend(law_step::moved(joint.law(), (axes.len(), scale), (from, &before), to));
+        states.extend(law_step::states_after_motion(joint.law(), (axes.len(), scale), (from, &before), to));
     }
     if states.len() == count { states } else { vec![0.0; count] }
 }

@@ -18,7 +18,7 @@ const NAME: &str = "transient";
 /// Relative error per step for smooth laws.
 const TOLERANCE: f64 = 1e-9;
 /// Samples per interval of a free decay.
-const STRETCH: usize = 64;
+const SAMPLES_PER_INTERVAL: usize = 64;
 
 /// The excitation of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,8 +81,8 @@ fn good(last: Option<f64>) -> String {
 
 /// Most attempts to recompute an interval in which the motion broke down. Each attempt ends
 /// where the last one broke down, or at half of its length if the cause names no time. This is
-/// enough to find one of [`STRETCH`] samples.
-const SHORTENED: usize = 6;
+/// enough to find one of [`SAMPLES_PER_INTERVAL`] samples.
+const RECOMPUTE_ATTEMPTS: usize = 6;
 
 /// The motion in an interval that starts at `begin` (s).
 struct TimeInterval {
@@ -157,7 +157,7 @@ impl TimeHistory {
     pub fn visit(&self, system: &System, visitor: &mut dyn FnMut(Instant<'_>) -> bool) -> Result<(), TimeHistoryError> {
         let shared = Arc::new(system.clone());
         let mut flow = TimeHistory::flow(system, self.width)?;
-        flow.keep(true);
+        flow.set_recording(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         if state.len() + self.states.len() == flow.states() {
             state.extend(&self.states);
@@ -169,12 +169,12 @@ impl TimeHistory {
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             let omega = self.frequency(begin);
-            let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
+            let length = if omega > 0.0 { TAU / omega } else { SAMPLES_PER_INTERVAL as f64 * self.step };
             // shorten a cycle that outlasts the motion
             let length = if length > self.duration { self.duration + self.step } else { length };
-            flow.set_drive(system, omega);
+            flow.set_excitation(system, omega);
             let start = state.clone();
-            let followed = flow.follow(&mut state, length);
+            let followed = flow.run_accurately(&mut state, length);
             let end = begin + length;
             let inside = (next..=samples).take_while(|i| (*i as f64 * self.step) < end);
             let whole = inside.last();
@@ -183,7 +183,9 @@ impl TimeHistory {
                     let path = flow.path(&shared, Symmetry::FullPeriod, length);
                     Some(TimeInterval { begin, length, last: whole, path })
                 }
-                Err(cause) => whole.and_then(|last| self.before(&shared, &start, (begin, next, last), cause)),
+                Err(cause) => {
+                    whole.and_then(|last| self.recompute_before_breakdown(&shared, &start, (begin, next, last), cause))
+                }
             };
             if let Some(stretch) = stretch {
                 while stretch.last.is_some_and(|last| next <= last) {
@@ -212,7 +214,7 @@ impl TimeHistory {
     ///
     /// The interval begins at `begin` from the state `start` and has the samples `first` to
     /// `last`. Returns `None` if it has no motion or no sample before the breakdown.
-    fn before(
+    fn recompute_before_breakdown(
         &self,
         system: &Arc<System>,
         start: &[f64],
@@ -221,16 +223,16 @@ impl TimeHistory {
     ) -> Option<TimeInterval> {
         let since = |sample: usize| sample as f64 * self.step - begin;
         let mut cause = cause.clone();
-        for _ in 0..SHORTENED {
+        for _ in 0..RECOMPUTE_ATTEMPTS {
             let reached = cause.time().unwrap_or(0.5 * since(last + 1));
             last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
             // a sample at the very start needs a short motion behind it
             let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
             // a new flow, without memory of the failed attempt
             let mut flow = TimeHistory::flow(system, self.width).ok()?;
-            flow.keep(true);
-            flow.set_drive(system, self.frequency(begin));
-            match flow.follow(&mut start.to_vec(), length) {
+            flow.set_recording(true);
+            flow.set_excitation(system, self.frequency(begin));
+            match flow.run_accurately(&mut start.to_vec(), length) {
                 Ok(()) => {
                     let path = flow.path(system, Symmetry::FullPeriod, length);
                     return Some(TimeInterval { begin, length, last: Some(last), path });
@@ -251,7 +253,7 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        integrator_choice::of(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
+        integrator_choice::integrator(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
     }
 
     /// Returns the excitation frequency of the cycle that begins at `time`.

@@ -36,11 +36,11 @@ const ANY_WIDTH: f64 = 1e-3;
 
 /// Returns the methods of the list that take a system.
 pub fn ways(system: &System) -> Ways {
-    among(system, |_| true)
+    alternatives_among(system, |_| true)
 }
 
 /// Tests the methods with names that `asked` accepts.
-fn among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
+fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
     let mut ways = Ways::default();
     for row in LIST.iter().filter(|row| asked(row.name)) {
         let plain = Options::new();
@@ -74,10 +74,10 @@ struct WithAlternatives<'a> {
 
 impl Solver for WithAlternatives<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.solver.orbit(omega, start).map_err(|error| with_ways(error, self.system))
+        self.solver.orbit(omega, start).map_err(|error| with_alternatives(error, self.system))
     }
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.solver.between(omega, start).map_err(|error| with_ways(error, self.system))
+        self.solver.between(omega, start).map_err(|error| with_alternatives(error, self.system))
     }
     fn effort(&self) -> f64 {
         self.solver.effort()
@@ -89,15 +89,15 @@ impl Solver for WithAlternatives<'_> {
 
 /// Errors of larger systems name no alternatives: no other method is fast enough there, and
 /// testing all methods takes 0.1 s.
-const ASKED: usize = 200;
+const MAX_DOFS_FOR_ALTERNATIVES: usize = 200;
 
 /// Adds alternative methods to an error.
-fn with_ways(mut error: OrbitError, system: &System) -> OrbitError {
-    if system.dofs() > ASKED {
+fn with_alternatives(mut error: OrbitError, system: &System) -> OrbitError {
+    if system.dofs() > MAX_DOFS_FOR_ALTERNATIVES {
         return error;
     }
     let words = |asked: &dyn Fn(&str) -> bool| {
-        let ways = among(system, asked);
+        let ways = alternatives_among(system, asked);
         if ways.any() { format!(", or {ways}") } else { String::new() }
     };
     match &mut error {

@@ -17,12 +17,12 @@ use std::sync::Arc;
 /// Relative velocity, as a fraction of the largest one, that counts as zero. Switch times are
 /// accurate to 1e-15 of the velocity scale. Joints that switch together by symmetry differ by
 /// the rounding of the whole orbit, about 1e-12.
-pub(crate) const REST: f64 = 1e-10;
+pub(crate) const ZERO_VELOCITY: f64 = 1e-10;
 
 /// Largest mass ratio at a place between rigid sliders. Accelerations below 1e-9 of those that
 /// the limits cause at the lightest mass count as zero. At this ratio, that is a tenth of those
 /// at the heaviest mass. Measured: correct up to 1e8, chatter from 1e9, wrong orbits from 1e12.
-const LIGHTEST: f64 = 1e8;
+const MAX_MASS_RATIO: f64 = 1e8;
 
 /// The kind of a part of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +64,7 @@ impl JointPart {
     }
 
     /// Returns the largest force in stick, N.
-    pub fn holds(&self) -> f64 {
+    pub fn static_limit(&self) -> f64 {
         match self.kind {
             PartKind::Rigid { static_limit, .. } => static_limit,
             PartKind::Elastic { limit, .. } => limit,
@@ -86,8 +86,8 @@ impl JointPart {
     }
 
     /// Returns whether its force drops at the onset of slip.
-    pub fn drops(&self) -> bool {
-        self.holds() > self.limit() && self.is_slider()
+    pub fn force_drops(&self) -> bool {
+        self.static_limit() > self.limit() && self.is_slider()
     }
 
     /// Iterates over the rows on which it acts.
@@ -237,7 +237,7 @@ fn refusal(law: &dyn Law) -> Option<&'static str> {
 }
 
 /// Returns whether the method supports a law.
-pub(crate) fn takes(law: &dyn Law) -> bool {
+pub(crate) fn supports(law: &dyn Law) -> bool {
     refusal(law).is_none()
 }
 
@@ -265,17 +265,17 @@ pub(crate) struct Mechanics {
 
 /// Returns an error if a place between several rigid sliders is too light compared with an
 /// adjacent mass.
-fn light(system: &System, parts: &[JointPart], method: &'static str) -> Option<MethodError> {
+fn light_place_error(system: &System, parts: &[JointPart], method: &'static str) -> Option<MethodError> {
     let rigid = || parts.iter().filter(|part| matches!(part.kind, PartKind::Rigid { .. }));
     let mass = |row: usize| system.structure().diagonal_mass(row);
     rigid().find_map(|part| {
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
         let several = rigid().filter(|part| part.direction[lightest] != 0.0).nth(1).is_some();
-        (several && ratio > LIGHTEST).then(|| {
+        (several && ratio > MAX_MASS_RATIO).then(|| {
             let place = system.structure().places()[lightest].clone();
             let joint = system.joints()[part.joint].name().to_owned();
-            Refusal::Light { method, place, joint, ratio, least: LIGHTEST.recip() }.into()
+            Refusal::Light { method, place, joint, ratio, least: MAX_MASS_RATIO.recip() }.into()
         })
     })
 }
@@ -290,7 +290,7 @@ impl Deref for Mechanics {
 
 impl Mechanics {
     /// Multiplies the slip limits of these joints by a factor.
-    pub fn strengthen(&mut self, joints: &[usize], factor: f64) {
+    pub fn scale_limits(&mut self, joints: &[usize], factor: f64) {
         let mut parts = self.parts.to_vec();
         for part in parts.iter_mut().filter(|part| joints.contains(&part.joint)) {
             match &mut part.kind {
@@ -357,7 +357,7 @@ impl Mechanics {
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
             .ok_or_else(|| MethodError::mass_not_positive(method))?;
-        if let Some(error) = light(system, &parts, method) {
+        if let Some(error) = light_place_error(system, &parts, method) {
             return Err(error);
         }
         let rate = |i: usize| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt();
@@ -378,15 +378,15 @@ impl Mechanics {
 
     /// Returns the distance within which a stop counts as touching, m. `velocity_scale` is the
     /// largest relative velocity of the motion, m/s.
-    pub fn touch(&self, stop: &JointPart, omega: f64, velocity_scale: f64) -> f64 {
+    pub fn contact_tolerance(&self, stop: &JointPart, omega: f64, velocity_scale: f64) -> f64 {
         let PartKind::Stop { stiffness, gap } = stop.kind else { return 0.0 };
         let own = || (stiffness * self.inverse_mass.amax()).sqrt();
         let rate = Some(omega.max(self.fastest)).filter(|rate| *rate > 0.0).unwrap_or_else(own);
-        REST * (velocity_scale / rate).max(gap.abs())
+        ZERO_VELOCITY * (velocity_scale / rate).max(gap.abs())
     }
 
     /// Returns the joint of every part; for several sliders along one line, the first.
-    pub fn owners(&self) -> Vec<usize> {
+    pub fn part_joints(&self) -> Vec<usize> {
         self.parts.iter().map(|part| part.joint).collect()
     }
 

@@ -25,14 +25,14 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// redundant.
 const REDUNDANT: f64 = 1e-11;
 /// Relative eigenvalue below which a mode has frequency zero: the rounding of `QuadraticModes`.
-const STILL: f64 = 1e-13;
+const ZERO_MODE: f64 = 1e-13;
 /// Relative distance of a harmonic to a mode below which they are integrated as a resonant
 /// pair. At smaller distances, the ordinary particular solution would lose more than five
 /// digits.
 const RESONANT: f64 = 1e-5;
 /// Number of states from which the sensitivity is carried joint by joint, in a product that is
 /// blocked for the cache.
-const LARGE: usize = 24;
+const BLOCKED_STATES: usize = 24;
 
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
@@ -40,13 +40,13 @@ pub(crate) struct Pattern {
     /// Marks stuck sliders and closed stops.
     pub stuck: Vec<bool>,
     /// Indices of the stuck rigid sliders.
-    pub held: Vec<usize>,
+    pub stuck_rigid: Vec<usize>,
     /// True if fewer of them would constrain the same motion, so that their forces are not
     /// unique.
     pub redundant: bool,
     /// Marks springs, in series with sliders or in stops, that the stuck rigid sliders keep
     /// from moving.
-    pub frozen: Vec<bool>,
+    pub immobile: Vec<bool>,
     /// Exponents of the modes.
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
@@ -56,9 +56,9 @@ pub(crate) struct Pattern {
     start: DMatrix<Complex64>,
     /// In addition to the modes, a state moves by `place + drift τ + fall τ²/2`, n × states
     /// each.
-    place: DMatrix<f64>,
-    drift: DMatrix<f64>,
-    fall: DMatrix<f64>,
+    constant: DMatrix<f64>,
+    linear: DMatrix<f64>,
+    quadratic: DMatrix<f64>,
     /// Modal force of a unit force, modes × n. A constant force shifts the modal coordinate by
     /// `-1/λ` times its modal force.
     input: DMatrix<Complex64>,
@@ -138,7 +138,7 @@ impl Pattern {
         let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
-            &held.iter().map(|&s| mechanics.parts[s].holds()).collect::<Vec<_>>(),
+            &held.iter().map(|&s| mechanics.parts[s].static_limit()).collect::<Vec<_>>(),
         )
         .ok_or(out_of_range)?;
         let redundant = !held.is_empty() && {
@@ -190,7 +190,7 @@ impl Pattern {
         let fastest = modes.lambda.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let mut lambda = modes.lambda.clone();
         let drifting: Vec<usize> =
-            (0..count).filter(|&k| lambda[k].norm() <= STILL * fastest || fastest == 0.0).collect();
+            (0..count).filter(|&k| lambda[k].norm() <= ZERO_MODE * fastest || fastest == 0.0).collect();
         for &k in &drifting {
             lambda[k] = ZERO;
         }
@@ -224,14 +224,14 @@ impl Pattern {
         let directions = DMatrix::from_fn(n, stuck.len(), |i, s| mechanics.parts[s].direction[i]);
         Ok(Pattern {
             stuck: stuck.to_vec(),
-            held,
+            stuck_rigid: held,
             redundant,
-            frozen,
+            immobile: frozen,
             lambda,
             start,
-            place,
-            drift,
-            fall: &free * &free_input * &force_from_state,
+            constant: place,
+            linear: drift,
+            quadratic: &free * &free_input * &force_from_state,
             input,
             drifting,
             free,
@@ -267,7 +267,7 @@ impl Pattern {
     /// Returns its memory, bytes: matrices of some multiples of n² numbers.
     pub fn bytes(&self) -> usize {
         let complex = self.lambda.len() + self.shape.len() + self.start.len() + self.input.len();
-        let real = 3 * self.place.len()
+        let real = 3 * self.constant.len()
             + self.free.len()
             + self.free_coordinate.len()
             + self.free_input.len()
@@ -290,7 +290,7 @@ impl Pattern {
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
         for (h, &rate) in drive.rates.iter().enumerate() {
             let s = Complex64::new(0.0, rate);
-            let held = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]]);
+            let held = DVector::from_fn(self.stuck_rigid.len(), |i, _| drive.imposed[h][self.stuck_rigid[i]]);
             let moved = complex(&self.hold) * held; // S g: the constrained part moves with -S g
             let mut force =
                 drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
@@ -318,7 +318,8 @@ impl Pattern {
             }
             let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
             steady += complex(&self.free) * &free;
-            let inertia = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]] * (rate * rate));
+            let inertia =
+                DVector::from_fn(self.stuck_rigid.len(), |i, _| drive.imposed[h][self.stuck_rigid[i]] * (rate * rate));
             let held = complex(&self.multiplier) * &drive.forces[h] - complex(&self.inverse_delassus) * inertia;
             driven.held.push(held);
             driven.free_steady.push(free);
@@ -346,7 +347,7 @@ impl Pattern {
         work.force.clear();
         work.force.extend(drive.constant.iter());
         work.held.clear();
-        work.held.extend(self.held.iter().map(|&s| drive.imposed_at(s, time, 0)));
+        work.held.extend(self.stuck_rigid.iter().map(|&s| drive.imposed_at(s, time, 0)));
         for (i, part) in mechanics.parts.iter().enumerate() {
             let value = match (contacts[i], part.kind) {
                 (Contact::Stick, PartKind::Rigid { .. }) => continue,
@@ -360,7 +361,7 @@ impl Pattern {
         for row in 0..n {
             // displacement S c with the part of c due to imposed motion; `place` contains the
             // part due to x0
-            let shift: f64 = (0..self.held.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
+            let shift: f64 = (0..self.stuck_rigid.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
             out[row * nb + constant].re += shift;
             work.shift[row] = shift;
         }
@@ -383,7 +384,7 @@ impl Pattern {
             for (eta, start) in work.eta.iter_mut().zip(&self.start.as_slice()[j * count..(j + 1) * count]) {
                 *eta += start * z;
             }
-            for (row, place) in self.place.as_slice()[j * n..(j + 1) * n].iter().enumerate() {
+            for (row, place) in self.constant.as_slice()[j * n..(j + 1) * n].iter().enumerate() {
                 out[row * nb + constant].re += place * z;
             }
         }
@@ -429,8 +430,8 @@ impl Pattern {
         let (n, nb, constant) = (mechanics.n, driven.basis.len(), driven.basis.constant());
         for (j, &z) in state.iter().enumerate().filter(|(_, z)| **z != 0.0) {
             for row in 0..n {
-                out[row * nb + constant + 1].re += self.drift[(row, j)] * z;
-                out[row * nb + constant + 2].re += self.fall[(row, j)] * z;
+                out[row * nb + constant + 1].re += self.linear[(row, j)] * z;
+                out[row * nb + constant + 2].re += self.quadratic[(row, j)] * z;
             }
         }
         for &k in &self.drifting {
@@ -478,7 +479,7 @@ impl Pattern {
                 (imaginary[row], imaginary[n + row]) = (now.im, rate.im);
             }
         }
-        if states >= LARGE {
+        if states >= BLOCKED_STATES {
             self.carry_by_joints(mechanics, length, sensitivity, work);
             return;
         }
@@ -521,11 +522,11 @@ impl Pattern {
     /// its start, in `motion` (2n).
     fn moved_by(&self, j: usize, length: f64, moved: &[f64], motion: &mut [f64]) {
         let (n, count) = (motion.len() / 2, self.lambda.len());
-        motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
+        motion[..n].copy_from_slice(&self.constant.as_slice()[j * n..(j + 1) * n]);
         motion[n..].fill(0.0);
         if self.drifts() {
             for row in 0..n {
-                let (drift, fall) = (self.drift[(row, j)], self.fall[(row, j)]);
+                let (drift, fall) = (self.linear[(row, j)], self.quadratic[(row, j)]);
                 motion[row] += drift * length + 0.5 * fall * length * length;
                 motion[n + row] += drift + fall * length;
             }
@@ -687,7 +688,7 @@ struct JointSprings {
 impl PatternScratch {
     pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
         let n = mechanics.n;
-        let small = if mechanics.states() < LARGE { mechanics.states() } else { 0 };
+        let small = if mechanics.states() < BLOCKED_STATES { mechanics.states() } else { 0 };
         PatternScratch {
             force: vec![0.0; n],
             held: Vec::with_capacity(mechanics.parts.len()),
@@ -782,7 +783,7 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), OMEGA);
+        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), OMEGA);
         let pattern = Pattern::new(&mechanics, &[contact == Contact::Stick]).unwrap();
         let driven = pattern.drive(&mechanics, &drive);
         let mut work = PatternScratch::new(&mechanics, drive.rates.len());

@@ -68,7 +68,7 @@ impl PatternCache {
         let driven = Arc::new(pattern.drive(mechanics, drive));
         let bytes = pattern.bytes() + driven.bytes();
         if self.bytes + bytes > self.limit {
-            self.forget(self.limit / 2);
+            self.evict(self.limit / 2);
         }
         self.bytes += bytes;
         let slot = CachedPattern { pattern: pattern.clone(), driven: Some(driven.clone()), used: self.uses, bytes };
@@ -82,7 +82,7 @@ impl PatternCache {
     }
 
     /// Drops the least recently used patterns until the others use at most `bytes`.
-    fn forget(&mut self, bytes: usize) {
+    fn evict(&mut self, bytes: usize) {
         let mut uses: Vec<(u64, usize)> = self.slots.values().map(|slot| (slot.used, slot.bytes)).collect();
         uses.sort_unstable();
         let mut oldest = 0;
@@ -125,7 +125,7 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), 3.0);
+        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), 3.0);
         (mechanics, drive)
     }
 

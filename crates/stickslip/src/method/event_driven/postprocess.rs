@@ -2,7 +2,7 @@
 
 use super::mechanics::{JointPart, PartShare};
 use super::segments::{Segment, SegmentedMotion};
-use super::tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
+use super::tolerances::{ENERGY_GAP, NAME, RESIDUAL_TOLERANCE, REST_FRACTION};
 use crate::law::Contact;
 use crate::method::IntegrationError;
 use crate::method::orbit_search::return_map::{ClosedState, norm};
@@ -19,9 +19,9 @@ use stickslip_numerics::signal_range::{RangeScratch, SignalSegment, ValueRange};
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Fraction of the stored energy below which the work is not a suitable reference for the
-/// energy gap. An orbit with a residual of `CLOSED` can have gained or lost that much energy,
-/// and the resulting gap must stay below the tolerance.
-const STORED: f64 = CLOSED / ENERGY_GAP;
+/// energy gap. An orbit with a residual of `RESIDUAL_TOLERANCE` can have gained or lost that much
+/// energy, and the resulting gap must stay below the tolerance.
+const STORED_ENERGY_FRACTION: f64 = RESIDUAL_TOLERANCE / ENERGY_GAP;
 
 /// The closed-form segments of one return, with the data for their evaluation.
 #[derive(Debug, Clone)]
@@ -57,8 +57,8 @@ pub(super) fn orbit(
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
     let measured = results(system, &ExactMeasurement::new(&path), omega, (symmetry, period))?;
-    let rest = NEAR_REST * flow.energy_scale;
-    let share = vibration_share::share(&path, (symmetry, period), &closed.state, (weights, rest));
+    let rest = REST_FRACTION * flow.energy_scale;
+    let share = vibration_share::fraction(&path, (symmetry, period), &closed.state, (weights, rest));
     let stored = share * norm(weights, &closed.state).powi(2);
     let mut orbit = Orbit {
         method: NAME,
@@ -68,11 +68,11 @@ pub(super) fn orbit(
         initial_state: closed.state,
         evidence: Evidence {
             residual: closed.residual,
-            energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, STORED * stored)),
+            energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, STORED_ENERGY_FRACTION * stored)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             harmonics: None,
-            error_estimate: closed.missing,
+            error_estimate: closed.distance,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
             history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
@@ -88,7 +88,7 @@ pub(super) fn orbit(
         contracts,
         path: Arc::new(path),
     };
-    vibration_share::relate(&mut orbit.evidence, share);
+    vibration_share::rescale_evidence(&mut orbit.evidence, share);
     Ok(orbit)
 }
 

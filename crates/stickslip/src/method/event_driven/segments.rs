@@ -1,10 +1,10 @@
 //! The motion over a time interval: closed-form segments joined at the switches, with exact
 //! sensitivity.
 
-use super::mechanics::{JointPart, Mechanics, PartKind, REST};
+use super::mechanics::{JointPart, Mechanics, PartKind, ZERO_VELOCITY};
 use super::pattern::{ForcedResponse, Pattern, PatternScratch, SegmentStart};
 use super::pattern_cache::PatternCache;
-use super::tolerances::NEAR_REST;
+use super::tolerances::REST_FRACTION;
 use super::transition::{AT_LIMIT, Transition};
 use crate::law::Contact;
 use crate::method::IntegrationError;
@@ -27,10 +27,10 @@ const SEGMENT_LIMIT: usize = 256 << 20;
 /// Number of switches without motion, per part, after which rounding makes the decision and the
 /// signals contradict each other. This occurs for a motion that creeps towards a border and has
 /// reached it up to rounding.
-const EASED_AFTER: usize = 2;
+const MAX_IDLE_SWITCHES: usize = 2;
 /// Number of switches at the same instant, per part, above which the decision cycles. Every
 /// part can change once per derivative that decides.
-const AT_ONCE_LIMIT: usize = 8;
+const MAX_SIMULTANEOUS_SWITCHES: usize = 8;
 
 /// One closed-form segment of the motion.
 #[derive(Debug, Clone, Default)]
@@ -160,7 +160,7 @@ impl SegmentedMotion {
         let end = start + duration;
         let mut time = start;
         let (mut at_once, mut idle, mut bytes) = (0, 0, 0);
-        if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
+        if !self.decision.determine(&self.mechanics, &self.drive, time, state, velocity_scale) {
             return Err(IntegrationError::NoContactState { time });
         }
         loop {
@@ -173,8 +173,8 @@ impl SegmentedMotion {
                     _ => IntegrationError::OutOfRange { time },
                 })?;
             self.start_segment(time, &pattern, driven, state);
-            let eased = idle > EASED_AFTER * (1 + self.mechanics.parts.len());
-            self.watch(&pattern, &state[2 * n..], velocity_scale, eased);
+            let eased = idle > MAX_IDLE_SWITCHES * (1 + self.mechanics.parts.len());
+            self.set_event_signals(&pattern, &state[2 * n..], velocity_scale, eased);
             self.from.copy_from_slice(&state[..2 * n]);
             let rest = end - time;
             let basis = self.segments[self.used].basis();
@@ -189,22 +189,22 @@ impl SegmentedMotion {
             time += length;
             self.switches += 1;
             at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
-            idle = if self.moved(state) <= REST * velocity_scale { idle + 1 } else { 0 };
+            idle = if self.moved(state) <= ZERO_VELOCITY * velocity_scale { idle + 1 } else { 0 };
             bytes += self.segments[self.used - 1].bytes();
             let many = self.switches > SWITCH_LIMIT || bytes > SEGMENT_LIMIT;
-            if many || at_once > AT_ONCE_LIMIT * (1 + self.mechanics.parts.len()) {
+            if many || at_once > MAX_SIMULTANEOUS_SWITCHES * (1 + self.mechanics.parts.len()) {
                 let joint = self.mechanics.names[self.mechanics.parts[part].joint].clone();
                 if pattern.redundant {
                     return Err(IntegrationError::Redundant { time, joint });
                 }
                 return Err(IntegrationError::Chatter { time, switches: self.switches, joint });
             }
-            self.snap(part, state);
-            if !self.decision.decide(&self.mechanics, &self.drive, time, state, velocity_scale) {
+            self.set_to_limit(part, state);
+            if !self.decision.determine(&self.mechanics, &self.drive, time, state, velocity_scale) {
                 return Err(IntegrationError::NoContactState { time });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
-                self.jump(part, &pattern, time, state, sensitivity);
+                self.apply_saltation(part, &pattern, time, state, sensitivity);
             }
         }
     }
@@ -242,7 +242,7 @@ impl SegmentedMotion {
         let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
         self.energy_scale = loads + springs.map(|energy| energy.min(most)).sum::<f64>();
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
-        self.moving = drive.imposed_velocity().max(NEAR_REST * self.energy_scale * mobility);
+        self.moving = drive.imposed_velocity().max(REST_FRACTION * self.energy_scale * mobility);
         self.drive = drive;
         self.memory.change_drive();
     }
@@ -302,7 +302,7 @@ impl SegmentedMotion {
         }
         // stuck rigid sliders: λ = multiplier (F - C v - K x - other parts) + inverse_delassus
         // g''
-        for (s, &held) in shape.held.iter().enumerate() {
+        for (s, &held) in shape.stuck_rigid.iter().enumerate() {
             let (before, rest) = force.split_at_mut(held * nb);
             let (row, after) = rest.split_at_mut(nb);
             for (h, turn) in turns.iter().enumerate() {
@@ -314,7 +314,7 @@ impl SegmentedMotion {
                 add(row, &displacement[k * nb..(k + 1) * nb], -shape.held_by_displacement[(s, k)]);
             }
             for (i, contact) in contacts.iter().enumerate() {
-                if shape.held.contains(&i) {
+                if shape.stuck_rigid.contains(&i) {
                     continue; // the multipliers are computed here
                 }
                 let (factor, elastic) = (-shape.held_by_parts[(s, i)], *contact == Contact::Stick);
@@ -334,9 +334,9 @@ impl SegmentedMotion {
     /// direction in slip. For stops, it is the depth of a closed one or the remaining gap of an
     /// open one. If `eased`, signals that begin at zero may change sign within the tolerance of
     /// zero.
-    fn watch(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
+    fn set_event_signals(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
         let segment = &self.segments[self.used];
-        nearest(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
+        monitored_parts(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
         let driven = &segment.driven;
         let (n, nb) = (self.mechanics.n, driven.basis.len());
         let (constant, modes) = (driven.basis.constant(), shape.lambda.len());
@@ -348,11 +348,11 @@ impl SegmentedMotion {
         for (i, part) in self.mechanics.parts.iter().enumerate() {
             let contact = segment.contacts[i];
             if part.is_slider() && contact == Contact::Stick {
-                if shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
+                if shape.immobile[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
                     continue; // its force is constant; rounding must not cause a switch
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
-                let (now, limit) = (real_dot(force, &self.values), part.holds());
+                let (now, limit) = (real_dot(force, &self.values), part.static_limit());
                 let sides = [1.0, -1.0].into_iter().zip(self.nearest[i]);
                 for side in sides.filter_map(|(side, nearest)| nearest.then_some(side)) {
                     let at = self.signals.len();
@@ -364,7 +364,7 @@ impl SegmentedMotion {
                 }
                 continue;
             }
-            if !part.is_slider() && shape.frozen[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
+            if !part.is_slider() && shape.immobile[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
                 continue;
             }
             if !self.nearest[i][usize::from(contact == Contact::SlipBackward)] {
@@ -378,9 +378,14 @@ impl SegmentedMotion {
                 PartKind::Stop { gap, .. } => {
                     let sign = if contact == Contact::Stick { 1.0 } else { -1.0 };
                     signal[constant].re = -sign * gap;
-                    (&segment.displacement, sign, 0, self.mechanics.touch(part, self.drive.omega, velocity_scale))
+                    (
+                        &segment.displacement,
+                        sign,
+                        0,
+                        self.mechanics.contact_tolerance(part, self.drive.omega, velocity_scale),
+                    )
                 }
-                _ => (&self.velocity, contact.sign(), 1, REST * velocity_scale),
+                _ => (&self.velocity, contact.sign(), 1, ZERO_VELOCITY * velocity_scale),
             };
             for k in 0..n {
                 add(signal, &motion[k * nb..(k + 1) * nb], sign * part.direction[k]);
@@ -428,7 +433,7 @@ impl SegmentedMotion {
     }
 
     /// Sets a spring force that reached its limit exactly to the limit.
-    fn snap(&self, part: usize, state: &mut [f64]) {
+    fn set_to_limit(&self, part: usize, state: &mut [f64]) {
         let old = self.segments[self.used - 1].contacts[part];
         if let (PartKind::Elastic { limit, state: s, .. }, Contact::Stick) = (self.mechanics.parts[part].kind, old) {
             let force = &mut state[2 * self.mechanics.n + s];
@@ -441,7 +446,14 @@ impl SegmentedMotion {
     ///
     /// `shape` is the pattern of the segment that ends. Source: Leine and Nijmeijer (2004),
     /// Sec. 7.
-    fn jump(&mut self, part: usize, shape: &Pattern, time: f64, state: &[f64], sensitivity: &mut DMatrix<f64>) {
+    fn apply_saltation(
+        &mut self,
+        part: usize,
+        shape: &Pattern,
+        time: f64,
+        state: &[f64],
+        sensitivity: &mut DMatrix<f64>,
+    ) {
         let n = self.mechanics.n;
         let segment = &self.segments[self.used - 1];
         let contacts = &segment.contacts;
@@ -468,9 +480,9 @@ impl SegmentedMotion {
                 self.before[2 * n + s]
             }
             // a rigid slider begins to slip with continuous forces, so that there is no jump
-            (Contact::Stick, PartKind::Rigid { .. }) if !body.drops() => return,
+            (Contact::Stick, PartKind::Rigid { .. }) if !body.force_drops() => return,
             (Contact::Stick, PartKind::Rigid { .. }) => {
-                let Some(held) = shape.held.iter().position(|&h| h == part) else { return };
+                let Some(held) = shape.stuck_rigid.iter().position(|&h| h == part) else { return };
                 // the stick force: λ = multiplier (F - C v - K x - other parts) + …
                 for k in 0..n {
                     self.row[k] = -shape.held_by_displacement[(held, k)];
@@ -518,7 +530,7 @@ impl SegmentedMotion {
 ///
 /// The parts of one joint share its displacement. Of the stuck ones, only the part that reaches
 /// its limit first is monitored; of the slipping ones, only one.
-fn nearest(parts: &[JointPart], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
+fn monitored_parts(parts: &[JointPart], contacts: &[Contact], springs: &[f64], out: &mut Vec<[bool; 2]>) {
     out.clear();
     out.resize(parts.len(), [true; 2]);
     let mut first = 0;
@@ -596,7 +608,7 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), 0.7);
+        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), 0.7);
         let mut flow = SegmentedMotion::new(mechanics, HarmonicExcitation::default());
         flow.set_drive(drive);
         flow
@@ -670,7 +682,7 @@ mod tests {
                 for pair in flow.segments().windows(2) {
                     let let_go = |s: &usize| pair[0].contacts[*s] == Contact::Stick && pair[1].contacts[*s].slips();
                     drops += (0..flow.mechanics.parts.len())
-                        .filter(|s| flow.mechanics.parts[*s].drops() && let_go(s))
+                        .filter(|s| flow.mechanics.parts[*s].force_drops() && let_go(s))
                         .count();
                 }
                 let step = 1e-6;

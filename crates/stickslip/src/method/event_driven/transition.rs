@@ -19,19 +19,19 @@
 //!
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
-use super::mechanics::{JointPart, Mechanics, PartKind, REST};
+use super::mechanics::{JointPart, Mechanics, PartKind, ZERO_VELOCITY};
 use crate::law::Contact;
 use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 
 /// A force within this fraction of its limit counts as at the limit. The reason is that of
-/// [`REST`].
+/// [`ZERO_VELOCITY`].
 pub(crate) const AT_LIMIT: f64 = 1e-10;
 /// An acceleration or higher derivative below this fraction of its terms counts as zero.
-const BALANCED: f64 = 1e-9;
+const ZERO_ACCELERATION: f64 = 1e-9;
 /// Number of derivatives after which contacts exactly at the border remain in stick.
-const LEVELS: u32 = 4;
+const MAX_DERIVATIVES: u32 = 4;
 
 /// The contacts after a transition, with the accelerations.
 #[derive(Debug, Clone)]
@@ -136,7 +136,7 @@ impl Transition {
             dropped: Vec::new(),
             undecided: Vec::new(),
             problem: ContactProblem::default(),
-            derivatives: vec![DVector::zeros(mechanics.n); LEVELS as usize + 3],
+            derivatives: vec![DVector::zeros(mechanics.n); MAX_DERIVATIVES as usize + 3],
         }
     }
 
@@ -146,7 +146,7 @@ impl Transition {
     /// Returns false if the complementarity problem has no solution, which requires an
     /// indefinite mass matrix. It also returns false if sliders with dropping forces drive each
     /// other back and forth.
-    pub fn decide(
+    pub fn determine(
         &mut self,
         mechanics: &Mechanics,
         drive: &HarmonicExcitation,
@@ -156,7 +156,7 @@ impl Transition {
     ) -> bool {
         let n = mechanics.n;
         let (x, v) = (&state[..n], &state[n..2 * n]);
-        let still = REST * velocity_scale;
+        let still = ZERO_VELOCITY * velocity_scale;
         self.resting.clear();
         self.dropped.clear();
         let mut springs_undecided = false;
@@ -181,7 +181,7 @@ impl Transition {
                 }
                 PartKind::Stop { gap, .. } => {
                     let depth = part.along(x) + drive.imposed_at(i, time, 0) - gap;
-                    if depth.abs() > mechanics.touch(part, drive.omega, velocity_scale) {
+                    if depth.abs() > mechanics.contact_tolerance(part, drive.omega, velocity_scale) {
                         closed(depth)
                     } else if velocity.abs() > still {
                         closed(velocity)
@@ -196,12 +196,12 @@ impl Transition {
         for _ in 0..=2 * self.resting.len() {
             self.accelerate(mechanics, drive, time, state);
             self.at_rest.clone_from(&self.resting);
-            if !self.settle_rigid(mechanics, drive, time, state) {
+            if !self.decide_rigid(mechanics, drive, time, state) {
                 return false;
             }
-            if !self.let_go(mechanics, drive, time) {
+            if !self.release(mechanics, drive, time) {
                 if springs_undecided {
-                    self.settle_springs(mechanics, drive, time, state, velocity_scale);
+                    self.decide_springs(mechanics, drive, time, state, velocity_scale);
                 }
                 return true;
             }
@@ -235,15 +235,15 @@ impl Transition {
 
     /// Moves sliders whose force drops from `resting` to `dropped`, or returns one slider that
     /// is driven backwards. Returns whether anything changed.
-    fn let_go(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64) -> bool {
-        let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].drops();
+    fn release(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64) -> bool {
+        let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].force_drops();
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
         }
         let terms = self.terms(mechanics, drive);
         let back = self.dropped.iter().position(|&i| {
             let relative = mechanics.parts[i].direction.dot(&self.acceleration) + drive.imposed_at(i, time, 2);
-            relative * self.contacts[i].sign() < -BALANCED * terms.size(i, &self.response, 2)
+            relative * self.contacts[i].sign() < -ZERO_ACCELERATION * terms.size(i, &self.response, 2)
         });
         let contacts = &mut self.contacts;
         if let Some(back) = back {
@@ -254,7 +254,7 @@ impl Transition {
         let dropped = &mut self.dropped;
         if back.is_none() {
             self.resting.retain(|&i| {
-                let drops = contacts[i] != Contact::Stick && mechanics.parts[i].drops();
+                let drops = contacts[i] != Contact::Stick && mechanics.parts[i].force_drops();
                 if drops {
                     dropped.push(i);
                 }
@@ -270,14 +270,14 @@ impl Transition {
 
     /// Decides on rigid sliders at zero velocity: by accelerations first, then by higher
     /// derivatives for those at their limit.
-    fn settle_rigid(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) -> bool {
+    fn decide_rigid(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) -> bool {
         if self.at_rest.is_empty() {
             return true;
         }
-        self.pose(mechanics, drive, time, 2, None);
+        self.set_up_problem(mechanics, drive, time, 2, None);
         let problem = &mut self.problem;
         for (k, &i) in self.at_rest.iter().enumerate() {
-            let limit = mechanics.parts[i].holds();
+            let limit = mechanics.parts[i].static_limit();
             (problem.low[k], problem.high[k]) = (-limit, limit);
         }
         if !problem.solve() {
@@ -291,7 +291,7 @@ impl Transition {
             let own = problem.delassus.column(k);
             let held: f64 = own.iter().zip(&problem.high).map(|(d, limit)| d.abs() * limit).sum();
             let size = problem.push[k].abs() + held;
-            if relative.abs() > BALANCED * size {
+            if relative.abs() > ZERO_ACCELERATION * size {
                 // a joint that only imposed motion moves has no force here
                 self.contacts[i] = Contact::slip(relative);
             } else if lambda.abs() >= problem.high[k] * (1.0 - AT_LIMIT) {
@@ -307,7 +307,7 @@ impl Transition {
 
     /// Returns the magnitude of the terms of accelerations, for all parts together.
     fn terms<'a>(&self, mechanics: &'a Mechanics, drive: &HarmonicExcitation) -> AccelerationScale<'a> {
-        let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(JointPart::holds).fold(0.0, f64::max);
+        let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(JointPart::static_limit).fold(0.0, f64::max);
         let imposed = drive
             .rates
             .iter()
@@ -326,7 +326,7 @@ impl Transition {
     /// The unknown is their relative acceleration (`order` 2) or a higher derivative. It comes
     /// from the derivative with index `derivative`, or from the acceleration, plus the imposed
     /// motion.
-    fn pose(
+    fn set_up_problem(
         &mut self,
         mechanics: &Mechanics,
         drive: &HarmonicExcitation,
@@ -357,12 +357,12 @@ impl Transition {
     fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) {
         self.begin_derivatives(mechanics.n, state);
         let terms = self.terms(mechanics, drive);
-        for level in 1..LEVELS {
+        for level in 1..MAX_DERIVATIVES {
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
             self.free_derivative(mechanics, drive, time, level);
             let next = level as usize + 2;
             multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
-            self.pose(mechanics, drive, time, level + 2, Some(next));
+            self.set_up_problem(mechanics, drive, time, level + 2, Some(next));
             let problem = &mut self.problem;
             for (k, i) in self.at_rest.iter().enumerate() {
                 // a force at its limit can only decrease
@@ -377,11 +377,11 @@ impl Transition {
             self.undecided.retain(|&(i, sign)| {
                 let Some(k) = at_rest.iter().position(|&rest| rest == i) else { return false };
                 let size = problem.push[k].abs().max(problem.held[k].abs()).max(terms.size(i, response, level + 2));
-                if problem.relative[k] * sign > BALANCED * size && size > 0.0 {
+                if problem.relative[k] * sign > ZERO_ACCELERATION * size && size > 0.0 {
                     contacts[i] = Contact::slip(sign);
                     return false;
                 }
-                problem.lambda[k] * sign * problem.delassus[(k, k)] > -BALANCED * size
+                problem.lambda[k] * sign * problem.delassus[(k, k)] > -ZERO_ACCELERATION * size
             });
             for (k, &i) in self.at_rest.iter().enumerate() {
                 self.derivatives[next].axpy(-problem.lambda[k], &self.response.column(i), 1.0);
@@ -410,7 +410,7 @@ impl Transition {
 
     /// Decides on sliders in series with springs at their limit and on stops at their gap, for
     /// zero relative velocity. The first nonzero derivative decides.
-    fn settle_springs(
+    fn decide_springs(
         &mut self,
         mechanics: &Mechanics,
         drive: &HarmonicExcitation,
@@ -419,7 +419,7 @@ impl Transition {
         velocity_scale: f64,
     ) {
         let n = mechanics.n;
-        let still = REST * velocity_scale;
+        let still = ZERO_VELOCITY * velocity_scale;
         let mut undecided: Vec<(usize, f64)> = (0..mechanics.parts.len())
             .filter_map(|i| {
                 let part = &mechanics.parts[i];
@@ -432,7 +432,7 @@ impl Transition {
                     }
                     PartKind::Stop { gap, .. } => {
                         let depth = part.along(&state[..n]) + drive.imposed_at(i, time, 0) - gap;
-                        (depth.abs() <= mechanics.touch(part, drive.omega, velocity_scale), 1.0)
+                        (depth.abs() <= mechanics.contact_tolerance(part, drive.omega, velocity_scale), 1.0)
                     }
                 };
                 (at_border && velocity.abs() <= still).then_some((i, sign))
@@ -440,13 +440,13 @@ impl Transition {
             .collect();
         self.begin_derivatives(n, state);
         let terms = self.terms(mechanics, drive);
-        for level in 1..=LEVELS {
+        for level in 1..=MAX_DERIVATIVES {
             let order = level + 1;
             undecided.retain(|&(i, sign)| {
                 let size = terms.size(i, &self.response, order);
                 let part = &mechanics.parts[i];
                 let slope = part.direction.dot(&self.derivatives[order as usize]) + drive.imposed_at(i, time, order);
-                if slope.abs() <= BALANCED * size {
+                if slope.abs() <= ZERO_ACCELERATION * size {
                     return true;
                 }
                 if slope * sign > 0.0 {
@@ -454,7 +454,7 @@ impl Transition {
                 }
                 false
             });
-            if undecided.is_empty() || level == LEVELS {
+            if undecided.is_empty() || level == MAX_DERIVATIVES {
                 return;
             }
             // the next derivative with the present contacts: rigid sliders at zero velocity
@@ -464,7 +464,7 @@ impl Transition {
             let next = level as usize + 2;
             multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
             if !self.at_rest.is_empty() {
-                self.pose(mechanics, drive, time, level + 2, Some(next));
+                self.set_up_problem(mechanics, drive, time, level + 2, Some(next));
                 self.problem.low.fill(f64::NEG_INFINITY);
                 self.problem.high.fill(f64::INFINITY);
                 if !self.problem.solve() {
@@ -521,9 +521,9 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.owners(), 1.0);
+        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), 1.0);
         let mut decision = Transition::new(&mechanics);
-        assert!(decision.decide(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));
+        assert!(decision.determine(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));
         (decision.contacts.clone(), [decision.acceleration[0], decision.acceleration[1]])
     }
 

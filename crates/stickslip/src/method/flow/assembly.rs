@@ -26,7 +26,7 @@ pub(crate) struct Assembly {
     /// Number of internal states of all laws.
     pub internal: usize,
     /// Names of the places, and their axes in the coordinates.
-    seen: Vec<(String, Axis)>,
+    places: Vec<(String, Axis)>,
 }
 
 /// A law with the indices of its axes and states.
@@ -57,12 +57,12 @@ impl IndexedLaw {
     /// step of average acceleration of length `h`.
     ///
     /// `slopes` holds the derivatives by `(u₀, u₀', z₀, u₁, u₁')`.
-    pub fn by_end(&self, slopes: &[f64], e: usize, h: f64) -> f64 {
+    pub fn derivative_by_end_velocity(&self, slopes: &[f64], e: usize, h: f64) -> f64 {
         let after = 2 * self.directions + self.states;
         0.5 * h * slopes[after + e] + slopes[after + self.directions + e]
     }
     /// Returns the error that the law answers with NaN or infinity.
-    pub fn no_number(&self, time: f64) -> IntegrationError {
+    pub fn not_finite_error(&self, time: f64) -> IntegrationError {
         IntegrationError::NotFinite { time, joint: self.joint.clone(), law: self.law.name() }
     }
 }
@@ -121,7 +121,7 @@ impl Assembly {
             directions: DMatrix::from_fn(n, first_axis, |row, axis| axes[axis][row]),
             joints,
             internal,
-            seen: system.places().iter().cloned().zip(system.place_axes().iter().cloned()).collect(),
+            places: system.places().iter().cloned().zip(system.place_axes().iter().cloned()).collect(),
         })
     }
 
@@ -133,7 +133,7 @@ impl Assembly {
     /// Returns the place with the largest displacement.
     pub fn farthest(&self, state: &[f64]) -> Option<String> {
         let far = |axis: &Axis| axis.component(&state[..self.n]).abs();
-        let farthest = self.seen.iter().max_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
+        let farthest = self.places.iter().max_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
         farthest.map(|(place, _)| place.clone())
     }
 
@@ -166,7 +166,7 @@ impl Assembly {
     }
 
     /// Returns the largest acceleration of the masses due to forces along the axes, m/s².
-    pub fn pushed(&self, force: &[f64]) -> f64 {
+    pub fn largest_acceleration(&self, force: &[f64]) -> f64 {
         let on_masses = &self.directions * nalgebra::DVectorView::from_slice(force, force.len());
         if self.n == 0 { 0.0 } else { (&self.inverse_mass * on_masses).amax() }
     }

@@ -24,8 +24,8 @@ impl Flow for ExactFlow {
     fn states(&self) -> usize {
         self.segments.mechanics.states()
     }
-    fn set_drive(&mut self, system: &System, omega: f64) {
-        let owners = self.segments.mechanics.owners();
+    fn set_excitation(&mut self, system: &System, omega: f64) {
+        let owners = self.segments.mechanics.part_joints();
         self.segments.set_drive(HarmonicExcitation::at(system, &owners, omega));
     }
     fn weights(&self) -> Vec<f64> {
@@ -42,11 +42,11 @@ impl Flow for ExactFlow {
     ) -> Result<(), IntegrationError> {
         self.segments.run(state, 0.0, duration, sensitivity)
     }
-    fn strengthen(&mut self, joints: &[usize], factor: f64) {
-        self.segments.mechanics.strengthen(joints, factor);
+    fn scale_limits(&mut self, joints: &[usize], factor: f64) {
+        self.segments.mechanics.scale_limits(joints, factor);
     }
     // the computation needs the segments, so it always records them
-    fn keep(&mut self, _keep: bool) {}
+    fn set_recording(&mut self, _keep: bool) {}
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
         Arc::new(ExactPath::new(system.clone(), &self.segments, symmetry, period))
     }

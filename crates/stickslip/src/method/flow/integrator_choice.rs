@@ -1,12 +1,12 @@
 //! Choice of the time integration for a system.
 //!
-//! - [`ExactFlow`](super::event_flow::ExactFlow): laws of sliders and stops; closed forms
+//! - [`ExactFlow`]: laws of sliders and stops; closed forms
 //!   between switches.
-//! - [`RadauFlow`](super::radau::step_size_control::RadauFlow): laws with a rate; Radau IIA-9 with
+//! - [`RadauFlow`]: laws with a rate; Radau IIA-9 with
 //!   controlled steps.
-//! - [`SetValuedFlow`](super::set_valued::located_switches::SetValuedFlow): friction that slides along a smooth
+//! - [`SetValuedFlow`]: friction that slides along a smooth
 //!   curve, together with laws with a rate; Radau IIA-9 between located switches.
-//! - [`AverageAccelerationFlow`](super::average_acceleration::flow::AverageAccelerationFlow): laws with a step and laws
+//! - [`AverageAccelerationFlow`]: laws with a step and laws
 //!   with a rate together; average acceleration in equal steps.
 
 use super::Flow;
@@ -18,7 +18,7 @@ use super::set_valued;
 use super::set_valued::located_switches::SetValuedFlow;
 use crate::law::SharedLaw;
 use crate::method::MethodError;
-use crate::method::event_driven::{Mechanics, takes};
+use crate::method::event_driven::{Mechanics, supports};
 use crate::model::System;
 
 /// Makes the integration for the laws of a system.
@@ -28,7 +28,7 @@ use crate::model::System;
 ///
 /// # Errors
 /// Fails if no integration takes the law of a joint, or if a place has no mass.
-pub(crate) fn of(
+pub(crate) fn integrator(
     system: &System,
     width: Option<f64>,
     tolerance: f64,
@@ -60,15 +60,15 @@ impl IntegratorKind {
     pub fn of(system: &System, width: Option<f64>) -> IntegratorKind {
         // a width that smooths no law has no effect
         let smooths = |width| system.joints().iter().any(|joint| joint.law().regularised(width).is_some());
-        if !width.is_some_and(smooths) && system.joints().iter().all(|joint| takes(joint.law().as_ref())) {
+        if !width.is_some_and(smooths) && system.joints().iter().all(|joint| supports(joint.law().as_ref())) {
             return IntegratorKind::Exact;
         }
-        IntegratorKind::integrated(system, width)
+        IntegratorKind::stepping(system, width)
     }
 
-    /// Chooses among the integrations with steps. Returns [`IntegratorKind::Exact`] only for sliders
-    /// without a width.
-    pub fn integrated(system: &System, width: Option<f64>) -> IntegratorKind {
+    /// Chooses among the integrations with steps. Returns [`IntegratorKind::Exact`] only for
+    /// sliders without a width.
+    pub fn stepping(system: &System, width: Option<f64>) -> IntegratorKind {
         let all = |has: &dyn Fn(&SharedLaw) -> bool| system.joints().iter().all(|joint| has(joint.law()));
         let regular = |law: &SharedLaw| width.and_then(|width| law.regularised(width));
         // a law that carries no force counts as smooth even without a rate
@@ -77,7 +77,7 @@ impl IntegratorKind {
             IntegratorKind::Smooth
         } else if width.is_none() && all(&|law| law.sliders().is_some()) {
             IntegratorKind::Exact
-        } else if width.is_none() && set_valued::takes(system) {
+        } else if width.is_none() && set_valued::supports(system) {
             IntegratorKind::Switched
         } else {
             IntegratorKind::Incremental
@@ -224,7 +224,7 @@ mod tests {
     /// Checks the derivative of a run against central differences of its end by its start.
     fn check_derivative(flow: &mut dyn Flow, system: &System, start: &[f64]) {
         let states = flow.states();
-        flow.set_drive(system, 1.3);
+        flow.set_excitation(system, 1.3);
         let mut derivative = DMatrix::identity(states, states);
         flow.run(&mut start.to_vec(), 2.0, Some(&mut derivative)).unwrap();
         let step = 1e-5;
@@ -250,7 +250,7 @@ mod tests {
         let smooth = system(&[joint.clone(), relaxing.clone()]);
         let start = [0.3, -0.2, 0.5, 0.1, 0.2, -0.4, 0.1, 0.3];
         let mut flow = RadauFlow::new(super::super::radau::assembly(&smooth, None, "test").unwrap(), 1e-8);
-        flow.set_drive(&smooth, 1.3);
+        flow.set_excitation(&smooth, 1.3);
         flow.run(&mut start.to_vec(), 2.0, None).unwrap();
         flow.lengths = super::super::radau::step_size_control::StepSizes::Repeated;
         check_derivative(&mut flow, &smooth, &start);
@@ -342,7 +342,7 @@ mod tests {
     /// A slider in a plane follows a circle. Its spring is stretched by r = limit/stiffness at
     /// right angles to its path of radius √(a² - r²). It loses 2π limit √(a² - r²) per cycle.
     #[test]
-    fn a_slider_led_round_a_circle_loses_what_it_must() {
+    fn slider_on_a_circle_has_the_closed_form_loss() {
         let a = 0.3;
         let circle = [Complex64::new(a, 0.0), Complex64::new(0.0, -a)]
             .map(|g| Axis::new(Vec::new()).with_imposed_motion([(1, g)]));
@@ -453,15 +453,15 @@ mod tests {
         let shared = Arc::new(system.clone());
         let omega = 1.3;
         let period = TAU / omega;
-        let mut exact = of(&system, None, 1e-9, "test").unwrap();
+        let mut exact = integrator(&system, None, 1e-9, "test").unwrap();
         let mut steps = AverageAccelerationFlow::new(&system, None, "test").unwrap();
         let mut states = [vec![0.0; exact.states()], vec![0.0; steps.states()]];
-        exact.set_drive(&system, omega);
-        steps.set_drive(&system, omega);
-        steps.keep(true);
+        exact.set_excitation(&system, omega);
+        steps.set_excitation(&system, omega);
+        steps.set_recording(true);
         for cycle in 1..=12 {
-            exact.follow(&mut states[0], period).unwrap();
-            steps.follow(&mut states[1], period).unwrap();
+            exact.run_accurately(&mut states[0], period).unwrap();
+            steps.run_accurately(&mut states[1], period).unwrap();
             assert!(steps.count <= 4096, "{} steps", steps.count);
             let size = states[0].iter().fold(0.0, |a: f64, z| a.max(z.abs()));
             for (a, b) in states[0].iter().zip(&states[1]) {

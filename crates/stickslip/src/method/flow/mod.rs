@@ -36,7 +36,7 @@ pub(crate) trait Flow: Send {
     /// Returns the length of the state: displacements, velocities, states of the joints.
     fn states(&self) -> usize;
     /// Sets the excitation frequency, rad/s; at zero, only the constant forces act.
-    fn set_drive(&mut self, system: &System, omega: f64);
+    fn set_excitation(&mut self, system: &System, omega: f64);
     /// Returns the weights of the energy norm under the excitation, one per state.
     fn weights(&self) -> Vec<f64>;
     /// Returns the square root of an energy that the loads can supply, √J.
@@ -45,7 +45,7 @@ pub(crate) trait Flow: Send {
     fn set_tolerance(&mut self, _tolerance: f64) {}
     /// Sets the fraction of the steps of a full run, for a flow in equal steps. A run over the
     /// same fraction of the duration then keeps the step length.
-    fn set_share(&mut self, _share: f64) {}
+    fn set_step_fraction(&mut self, _share: f64) {}
     /// Integrates from `state` over `duration` (s), beginning at excitation phase zero, and
     /// replaces `state` by the end state. `sensitivity`, if given, is multiplied from the left
     /// by the derivative of the end state by the initial state.
@@ -57,14 +57,14 @@ pub(crate) trait Flow: Send {
     ) -> Result<(), IntegrationError>;
     /// Integrates with an error that the flow controls, for a motion that is not closed to an
     /// orbit.
-    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
+    fn run_accurately(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
         self.run(state, duration, None)
     }
     /// Multiplies the slip limits of these joints by a factor, until a call with the inverse
     /// factor.
-    fn strengthen(&mut self, _joints: &[usize], _factor: f64) {}
+    fn scale_limits(&mut self, _joints: &[usize], _factor: f64) {}
     /// Switches the recording of later runs for [`Flow::path`] on or off.
-    fn keep(&mut self, keep: bool);
+    fn set_recording(&mut self, keep: bool);
     /// Returns the motion of the last recorded run, with the period `period` (s).
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path>;
 }

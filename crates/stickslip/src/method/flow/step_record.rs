@@ -15,8 +15,8 @@ pub(crate) struct StepRecord {
     pub spans: Vec<(f64, f64)>,
     /// Numbers of degrees of freedom, axes and joints.
     size: [usize; 3],
-    /// The values of [`RecordedInstant`], instant by instant: one more than there are steps, or two per
-    /// step with `jumps`.
+    /// The values of [`RecordedInstant`], instant by instant: one more than there are steps, or
+    /// two per step with `jumps`.
     instants: Vec<f64>,
     /// True if forces may jump between steps. Each step then stores both of its ends, and a
     /// contact state holds for a whole step.
@@ -75,7 +75,7 @@ impl StepRecord {
 
     /// Appends an instant with the displacements and velocities of `state`; returns the memory
     /// for its accelerations.
-    pub fn keep_instant(&mut self, state: &[f64], force: &[f64]) -> &mut [f64] {
+    pub fn push_instant(&mut self, state: &[f64], force: &[f64]) -> &mut [f64] {
         let [n, axes, _] = self.size;
         self.instants.extend_from_slice(&state[..2 * n]);
         let acceleration = self.instants.len();
@@ -85,7 +85,7 @@ impl StepRecord {
     }
 
     /// Appends a node.
-    pub fn keep_node(
+    pub fn push_node(
         &mut self,
         [displacement, velocity]: [&[f64]; 2],
         [relative, force]: [&[f64]; 2],
@@ -126,7 +126,7 @@ impl StepRecord {
     }
 
     /// Returns all nodes in order.
-    pub fn each(&self) -> impl Iterator<Item = RecordedNode<'_>> {
+    pub fn nodes(&self) -> impl Iterator<Item = RecordedNode<'_>> {
         (0..self.count()).map(|at| self.node(at))
     }
 

@@ -17,7 +17,7 @@ const ROUNDED: f64 = 1e-9;
 
 /// Halvings of the interval between two nodes with different contact states; a millionth
 /// remains.
-const HALVED: usize = 20;
+const BISECTIONS: usize = 20;
 
 pub(crate) struct Trajectory {
     steps: StepRecord,
@@ -131,9 +131,9 @@ impl Trajectory {
 
     /// Returns the first `s` in [0, 1], at most `to`, at which a joint leaves the contact state
     /// of `from`.
-    fn change(&self, joint: usize, step: usize, from: (f64, Contact), to: f64) -> f64 {
+    fn contact_change(&self, joint: usize, step: usize, from: (f64, Contact), to: f64) -> f64 {
         let (mut low, mut high) = (from.0, to);
-        for _ in 0..HALVED {
+        for _ in 0..BISECTIONS {
             let between = 0.5 * (low + high);
             if self.contact(joint, (step, between)) == from.1 { low = between } else { high = between }
         }
@@ -143,13 +143,13 @@ impl Trajectory {
     /// Returns the contact states between the nodes of a step and their durations. The state is
     /// constant between nodes with equal states, and changes once, at a bisected instant,
     /// between others.
-    fn stretches(&self, joint: usize, step: usize) -> impl Iterator<Item = (Contact, f64)> {
+    fn contact_intervals(&self, joint: usize, step: usize) -> impl Iterator<Item = (Contact, f64)> {
         let (count, length) = (self.steps.nodes.len(), self.steps.spans[step].1);
         let mut last = (0.0, self.contact(joint, (step, 0.0)));
         (0..count).flat_map(move |i| {
             let next = (self.steps.nodes[i].0, self.steps.node(step * count + i).contact[joint]);
             let (from, to) = (std::mem::replace(&mut last, next), next);
-            let change = if from.1 == to.1 { to.0 } else { self.change(joint, step, from, to.0) };
+            let change = if from.1 == to.1 { to.0 } else { self.contact_change(joint, step, from, to.0) };
             [(from.1, (change - from.0) * length), (to.1, (to.0 - change) * length)]
         })
     }
@@ -262,16 +262,16 @@ impl PathSignals for Trajectory {
     type Error = Infallible;
 
     fn displacement(&self, row: usize) -> Vec<f64> {
-        self.steps.each().map(|node| node.displacement[row]).collect()
+        self.steps.nodes().map(|node| node.displacement[row]).collect()
     }
     fn velocity(&self, row: usize) -> Vec<f64> {
-        self.steps.each().map(|node| node.velocity[row]).collect()
+        self.steps.nodes().map(|node| node.velocity[row]).collect()
     }
     fn relative_velocity(&self, axis: usize) -> Vec<f64> {
-        self.steps.each().map(|node| node.relative[axis]).collect()
+        self.steps.nodes().map(|node| node.relative[axis]).collect()
     }
     fn force(&self, axis: usize) -> Vec<f64> {
-        self.steps.each().map(|node| node.force[axis]).collect()
+        self.steps.nodes().map(|node| node.force[axis]).collect()
     }
     fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<f64> {
         let at = |time: f64| parts.iter().map(|(rate, a)| (a * Complex64::cis(rate * time)).re).sum();
@@ -298,9 +298,9 @@ impl PathSignals for Trajectory {
     }
     fn faces(&self, joint: usize) -> ContactSummary {
         let shares = if self.steps.nodes.len() > 1 {
-            ContactFractions::of((0..self.steps.spans.len()).flat_map(|step| self.stretches(joint, step)))
+            ContactFractions::of((0..self.steps.spans.len()).flat_map(|step| self.contact_intervals(joint, step)))
         } else {
-            let nodes = self.steps.each().enumerate();
+            let nodes = self.steps.nodes().enumerate();
             ContactFractions::of(nodes.map(|(i, node)| (node.contact[joint], self.steps.time(i).1)))
         };
         let at_end = |step: usize| self.steps.contact_at_end(step)[joint];
@@ -314,7 +314,7 @@ impl PathSignals for Trajectory {
         ContactSummary {
             shares,
             switches,
-            sticks_throughout: sticks(self.steps.each().map(|node| node.contact[joint])),
+            sticks_throughout: sticks(self.steps.nodes().map(|node| node.contact[joint])),
         }
     }
 }

@@ -2,11 +2,11 @@
 //! computed.
 
 use super::aft::Ports;
-use super::budget::{FEWEST, POINT, WORK};
+use super::budget::{LEAST_ELIMINATIONS, POINT_LIMIT, SEARCH_MULTIPLICATIONS};
 use super::dynamics::banded::BandedForm;
 use super::equations::harmonic_set::HarmonicSet;
-use super::linear_solve::newton_krylov::{by_products, step_products};
-use super::options::FIRST;
+use super::linear_solve::newton_krylov::{krylov_step_work, uses_krylov};
+use super::options::FIRST_HARMONICS;
 use crate::law::IdealElement;
 use crate::model::System;
 use num_complex::Complex64;
@@ -24,18 +24,18 @@ use num_complex::Complex64;
 /// assert_eq!(step_work(&system, 15), 16f64.powi(3) / 3.0);
 /// ```
 pub fn step_work(system: &System, top: usize) -> f64 {
-    let Ok((ports, _)) = Ports::of_sector(system) else { return 0.0 };
+    let Ok((ports, _)) = Ports::for_sector(system) else { return 0.0 };
     let harmonics = HarmonicSet::new(system, |z| z != Complex64::new(0.0, 0.0)).up_to(top).len();
-    step(BandedForm::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
+    step_multiplications(BandedForm::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
 }
 
 /// Returns the multiplications of a step with this number of harmonics. `banded` is one
 /// harmonic in banded form, if the system has that form.
-pub(super) fn step(banded: Option<&BandedForm>, ports: &Ports, harmonics: usize) -> f64 {
+pub(super) fn step_multiplications(banded: Option<&BandedForm>, ports: &Ports, harmonics: usize) -> f64 {
     let size = 2 * harmonics * ports.count();
     match banded {
         Some(banded) => banded.work(harmonics),
-        None if by_products(size, ports) => step_products(ports, harmonics),
+        None if uses_krylov(size, ports) => krylov_step_work(ports, harmonics),
         None => (size as f64).powi(3) / 3.0,
     }
 }
@@ -45,7 +45,7 @@ pub(super) fn step(banded: Option<&BandedForm>, ports: &Ports, harmonics: usize)
 /// The result is zero unless the whole structure is factored for every harmonic at every
 /// frequency.
 pub fn factor_bytes(system: &System) -> usize {
-    let Ok((ports, _)) = Ports::of_sector(system) else { return 0 };
+    let Ok((ports, _)) = Ports::for_sector(system) else { return 0 };
     let is_banded = || BandedForm::new(system, &ports, &[1]).is_some();
     if ports.wave().is_some() || is_banded() { 0 } else { system.structure().factor_bytes() }
 }
@@ -53,21 +53,22 @@ pub fn factor_bytes(system: &System) -> usize {
 /// Returns the multiplications of one step at each series length, doubled from the first up to
 /// `longest`, plus one step at twice each length for its error estimate.
 pub fn doubling_work(system: &System, longest: f64) -> f64 {
-    let tops = std::iter::successors(Some(FIRST), |top| ((*top as f64) < longest).then_some(2 * top));
+    let tops = std::iter::successors(Some(FIRST_HARMONICS), |top| ((*top as f64) < longest).then_some(2 * top));
     tops.map(|top| step_work(system, top) + step_work(system, 2 * top)).sum()
 }
 
 /// Returns the work limit, in multiplications, of a point with rigid friction if the method
 /// chooses the harmonics.
 pub fn most_work(system: &System) -> f64 {
-    POINT.eliminated * WORK.max(FEWEST * step_work(system, FIRST))
+    POINT_LIMIT.multiplications * SEARCH_MULTIPLICATIONS.max(LEAST_ELIMINATIONS * step_work(system, FIRST_HARMONICS))
 }
 
 /// Highest harmonic that rigid friction usually needs.
-const USUAL: f64 = 31.0;
-/// Newton steps at each series length. Measured with [`USUAL`]: 14 trees of 8 to 30 masses took
-/// 0.02 to 2 s per point, with 15 to 255 harmonics. Rings of 8 to 24 masses took 0.15 to 0.6 s.
-const STEPS: f64 = 3.0;
+const USUAL_HARMONICS: f64 = 31.0;
+/// Newton steps at each series length. Measured with [`USUAL_HARMONICS`]: 14 trees of 8 to 30
+/// masses took 0.02 to 2 s per point, with 15 to 255 harmonics. Rings of 8 to 24 masses took 0.15
+/// to 0.6 s.
+const STEPS_PER_LENGTH: f64 = 3.0;
 /// Multiplications per degree of freedom of everything except Newton steps: motions at the
 /// samples of a period.
 const PER_DOF: f64 = 2e5;
@@ -93,7 +94,7 @@ pub fn orbit_work(system: &System) -> f64 {
         count += 1.0;
         rigid |= matches!(piece, IdealElement::Slider(slider) if slider.stiffness.is_none());
     }
-    let searched = if rigid { STEPS * doubling_work(system, USUAL) } else { 0.0 };
+    let searched = if rigid { STEPS_PER_LENGTH * doubling_work(system, USUAL_HARMONICS) } else { 0.0 };
     PER_DOF * system.dofs() as f64 + PER_PIECE * count + searched
 }
 
@@ -124,7 +125,7 @@ mod tests {
     /// The work of a long chain is proportional to its length, because its equations are
     /// banded. A short chain is eliminated as a full matrix.
     #[test]
-    fn work_goes_with_the_length_of_a_chain() {
+    fn work_is_proportional_to_the_chain_length() {
         let (long, longer) = (chain(60), chain(120));
         assert!((longer / long - 2.0).abs() < 0.1, "{long:.1} {longer:.1}");
         assert!(chain(4) > 0.0 && chain(4) < long);

@@ -1,7 +1,7 @@
 //! Estimate of the memory for the equations, before they are built.
 
 use super::NAME;
-use super::aft::{Ports, at_once};
+use super::aft::{Ports, derivative_batch};
 use super::dynamics::banded::BandedForm;
 use super::dynamics::linear_dynamics::{CACHED, LinearDynamics};
 use super::linear_solve::newton_krylov;
@@ -14,7 +14,7 @@ pub(super) const MEMORY: f64 = 4e9;
 
 /// Returns the option to reduce, and a hint. An orbit of several excitation periods has that
 /// many times the harmonics.
-fn fewer(periods: usize) -> (&'static str, &'static str) {
+fn option_to_reduce(periods: usize) -> (&'static str, &'static str) {
     if periods > 1 { (PERIOD.key, "fewer periods, ") } else { ("harmonics", "") }
 }
 
@@ -23,7 +23,7 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
     if bytes <= MEMORY {
         return Ok(());
     }
-    let (key, fewer) = fewer(periods);
+    let (key, fewer) = option_to_reduce(periods);
     let message = format!(
         "the equations of {} joint directions and {harmonics} harmonics need {:.0} GB, but the limit is {:.0} GB; \
          use {fewer}fewer harmonics, or fewer joints",
@@ -39,7 +39,7 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
 /// It includes the Jacobians of the ports, the receptances and the preconditioners. With
 /// uncoupled modes it includes the modes along the axes and their factor instead. `always`
 /// states that the Jacobian is always a matrix; otherwise it is counted if its size allows one.
-pub(super) fn memory(ports: &Ports, rest: &LinearDynamics, harmonics: usize, always: bool) -> f64 {
+pub(super) fn unbanded_memory(ports: &Ports, rest: &LinearDynamics, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
     let structure = match rest.modes_for(ports).filter(|_| !always) {
@@ -48,17 +48,17 @@ pub(super) fn memory(ports: &Ports, rest: &LinearDynamics, harmonics: usize, alw
             // the matrices; their copies for products and for the longer series, if they stay
             // in the cache; and the preconditioner
             let each = if ports.count() <= CACHED { 4.0 } else { 2.0 };
-            2.0 * each * harmonics as f64 * axes * axes + newton_krylov::of_lowest(ports, harmonics) as f64
+            2.0 * each * harmonics as f64 * axes * axes + newton_krylov::lowest_factor_entries(ports, harmonics) as f64
         }
     };
     // equations that always use the matrix keep it, its factor and the factor of the previous
     // step
     let formed = match always {
         true => 3.0 * size * size,
-        false if size <= newton_krylov::FORMED as f64 => size * size,
+        false if size <= newton_krylov::FORMED_UNKNOWNS as f64 => size * size,
         false => 0.0,
     };
-    tangents(ports, harmonics) + 8.0 * (structure + formed)
+    jacobian_memory(ports, harmonics) + 8.0 * (structure + formed)
 }
 
 /// Returns the memory of the equations with this number of harmonics and samples, in bytes.
@@ -70,20 +70,20 @@ pub(super) fn level_memory(
     (harmonics, samples): (usize, usize),
 ) -> f64 {
     let equations = match banded {
-        Some(banded) => tangents(ports, harmonics) + banded.memory(harmonics),
-        None => memory(ports, rest, harmonics, false),
+        Some(banded) => jacobian_memory(ports, harmonics) + banded.memory(harmonics),
+        None => unbanded_memory(ports, rest, harmonics, false),
     };
-    equations + marched(ports, harmonics, samples)
+    equations + time_stepping_memory(ports, harmonics, samples)
 }
 
 /// Returns the memory for integrating laws with memory, one after the other, in bytes.
-fn marched(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
-    let axes = ports.iter().filter(|port| port.marches()).map(|port| port.axes).max();
-    axes.map_or(0.0, |axes| at_once(axes, samples, harmonics).1)
+fn time_stepping_memory(ports: &Ports, harmonics: usize, samples: usize) -> f64 {
+    let axes = ports.iter().filter(|port| port.has_memory_steps()).map(|port| port.axes).max();
+    axes.map_or(0.0, |axes| derivative_batch(axes, samples, harmonics).1)
 }
 
 /// Returns the memory of the Jacobians of the ports, in bytes.
-fn tangents(ports: &Ports, harmonics: usize) -> f64 {
+fn jacobian_memory(ports: &Ports, harmonics: usize) -> f64 {
     8.0 * ports.iter().map(|port| (2.0 * (harmonics * port.axes) as f64).powi(2)).sum::<f64>()
 }
 
@@ -93,7 +93,7 @@ mod tests {
     use super::super::dynamics::linear_dynamics::LinearDynamics;
     use super::super::dynamics::receptance::Receptance;
     use super::super::equations::Discretization;
-    use super::memory;
+    use super::unbanded_memory;
     use crate::law::{Coulomb, Jenkins2d, SharedLaw};
     use crate::model::{Axis, System};
     use crate::structure::Structure;
@@ -118,7 +118,7 @@ mod tests {
     /// The estimate covers the receptances and preconditioners that are kept: matrices that
     /// stay in the cache, larger ones, and systems with unknown forces.
     #[test]
-    fn what_steps_keep_is_counted() {
+    fn the_memory_estimate_covers_the_kept_matrices() {
         let plane: SharedLaw = Arc::new(Jenkins2d { stiffness: 1.0, limit: 0.1 });
         let rigid: SharedLaw = Arc::new(Coulomb { limit: 0.1 });
         for (joints, law) in [(20, &plane), (70, &plane), (30, &rigid)] {
@@ -127,17 +127,17 @@ mod tests {
             let rest = LinearDynamics::new(&system, &ports);
             let harmonics = [1, 3, 5, 7, 9, 11, 13];
             let mut level = Discretization::new(harmonics.to_vec(), 128, &ports, None);
-            level.drive(&system, &ports, &rest, 0.9).unwrap();
-            let start = level.begin(&system, &ports, None, 0.9);
+            level.set_frequency(&system, &ports, &rest, 0.9).unwrap();
+            let start = level.initial_guess(&system, &ports, None, 0.9);
             level.solve(&ports, 0.9, start).unwrap();
             let Receptance::Formed(formed) = &level.receptance else { panic!("receptances are matrices") };
-            let coupled = level.coupled.as_ref().expect("by products");
+            let coupled = level.newton_krylov.as_ref().expect("by products");
             assert!(coupled.bytes() > 0, "{joints}: none is kept");
             let kept = formed.bytes() + rest.bytes() + coupled.bytes() + size_of_val(&level.tangents[..]);
             // the estimate also counts a matrix that may be formed
             let size = level.residual.len() as f64;
-            let formed = if size <= super::newton_krylov::FORMED as f64 { 8.0 * size * size } else { 0.0 };
-            let counted = memory(&ports, &rest, harmonics.len(), false) - formed;
+            let formed = if size <= super::newton_krylov::FORMED_UNKNOWNS as f64 { 8.0 * size * size } else { 0.0 };
+            let counted = unbanded_memory(&ports, &rest, harmonics.len(), false) - formed;
             assert!((1.0..1.5).contains(&(counted / kept as f64)), "{joints}: {counted:.1e} of {kept:.1e}");
         }
     }

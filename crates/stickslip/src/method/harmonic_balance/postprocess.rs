@@ -31,21 +31,21 @@ pub(super) fn places(
     motion: &HarmonicSolution,
 ) -> Result<Vec<DVector<Complex64>>, f64> {
     let nh = level.harmonics().len();
-    let acting = level.acting(motion).to_vec();
+    let acting = level.structure_forces(motion).to_vec();
     (0..nh)
         .map(|k| {
             let h = level.harmonics()[k];
             let along = |q: usize| acting[q * nh + k];
-            let Some(sparse) = &mut level.sparse else {
+            let Some(sparse) = &mut level.banded else {
                 let singular = |_| h as f64 * omega;
-                let mut x = &level.free[k] - rest.respond_along(h, omega, along).map_err(singular)?;
+                let mut x = &level.free_response[k] - rest.respond_along(h, omega, along).map_err(singular)?;
                 if h == 0 {
-                    rest.settle(omega, &mut x, |q| level.mean(q, motion)).map_err(singular)?;
+                    rest.correct_mean(omega, &mut x, |q| level.mean(q, motion)).map_err(singular)?;
                 }
                 return Ok(x);
             };
-            let forces = rest.spread(h, along);
-            let mut x = level.free[k].clone();
+            let forces = rest.force_on_places(h, along);
+            let mut x = level.free_response[k].clone();
             let mut moved = x.clone();
             sparse.respond(k, |i| forces[i], moved.as_mut_slice());
             x -= moved;
@@ -56,13 +56,13 @@ pub(super) fn places(
 
 /// Share of the mean forces that may be unbalanced. The regularizing spring of an unsupported
 /// direction carries the difference.
-const UNHELD: f64 = 1e-6;
+const UNBALANCED_FORCE: f64 = 1e-6;
 /// Rounding error of sums of spring forces, in units of the rounding of their largest terms.
 const ROUNDING: f64 = 1e3;
 
 /// Returns true if the mean forces balance without the springs that regularize unsupported
 /// directions.
-pub(super) fn stays(
+pub(super) fn mean_forces_balance(
     setting: &OrbitInput,
     level: &Discretization,
     motion: &HarmonicSolution,
@@ -95,7 +95,7 @@ pub(super) fn stays(
         let missing = (left.re - held).abs() - rounding;
         missing.max(0.0).powi(2)
     });
-    missing.sum::<f64>().sqrt() <= UNHELD * size
+    missing.sum::<f64>().sqrt() <= UNBALANCED_FORCE * size
 }
 
 #[derive(Debug, Clone)]
@@ -116,12 +116,12 @@ pub(super) struct OrbitInput<'a> {
     pub system: &'a Arc<System>,
     pub ports: &'a Ports,
     /// Ports of the whole ring, if one of its sectors was solved.
-    pub around: Option<&'a Ports>,
+    pub ring_ports: Option<&'a Ports>,
     pub omega: f64,
     /// Harmonic at the excitation frequency.
-    pub first: usize,
+    pub excitation_harmonic: usize,
     /// True if the motion changes its sign after half a period.
-    pub odd: bool,
+    pub half_period: bool,
     pub truncation: Option<f64>,
     /// Tolerance of the truncation error.
     pub tolerance: f64,
@@ -135,16 +135,26 @@ pub(super) fn orbit(
     motion: &HarmonicSolution,
     x: Vec<DVector<Complex64>>,
 ) -> Option<Orbit> {
-    if let (Some(wave), Some(ports)) = (setting.ports.wave(), setting.around) {
-        let (mut level, motion) = level.around(wave, ports, motion);
-        return orbit(OrbitInput { ports, around: None, ..setting }, &mut level, &motion, x);
+    if let (Some(wave), Some(ports)) = (setting.ports.wave(), setting.ring_ports) {
+        let (mut level, motion) = level.over_ring(wave, ports, motion);
+        return orbit(OrbitInput { ports, ring_ports: None, ..setting }, &mut level, &motion, x);
     }
-    if !stays(&setting, level, motion, &x) {
+    if !mean_forces_balance(&setting, level, motion, &x) {
         return None;
     }
     let harmonics = level.harmonics().to_vec();
-    let JointSamples { force, contact, states } = sampled(&setting, level, motion, &x);
-    let OrbitInput { system, ports, omega, first, odd, truncation, tolerance, judge, around: _ } = setting;
+    let JointSamples { force, contact, states } = sample_joints(&setting, level, motion, &x);
+    let OrbitInput {
+        system,
+        ports,
+        omega,
+        excitation_harmonic: first,
+        half_period: odd,
+        truncation,
+        tolerance,
+        judge,
+        ring_ports: _,
+    } = setting;
     let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
     let period = TAU / omega;
     let measuring = SolutionSignals {
@@ -155,7 +165,7 @@ pub(super) fn orbit(
         harmonics: &harmonics,
         contact: &contact,
         omega,
-        halves: if odd { 2 } else { 1 },
+        returns_per_period: if odd { 2 } else { 1 },
         level: RefCell::new(level),
     };
     let Ok(mut measured) = results(system, &measuring, omega, (symmetry, period));
@@ -172,9 +182,9 @@ pub(super) fn orbit(
     let ReturnEvidence { derivative, defect } = judge.map_or_else(ReturnEvidence::default, |judge| {
         judge.judge(system, omega, (&path, symmetry), &start, &path.stuck())
     });
-    // Where a normal force changes the slip limit, or vanishes, a series with twice the harmonics may
-    // be as wrong as the shorter one. The return defect shows it, except on an unstable orbit, whose
-    // return multiplies the error.
+    // Where a normal force changes the slip limit, or vanishes, a series with twice the harmonics
+    // may be as wrong as the shorter one. The return defect shows it, except on an unstable
+    // orbit, whose return multiplies the error.
     let joints = system.joints().iter().zip(&measured.joints);
     let rubs = joints.filter(|(joint, _)| joint.law().normal().is_some()).any(|(_, moved)| moved.stick_fraction < 1.0);
     let repels = derivative.as_ref().is_some_and(|map| eigen::largest_modulus(map).is_none_or(|modulus| modulus > 1.0));
@@ -188,7 +198,7 @@ pub(super) fn orbit(
         initial_state: start,
         evidence: Evidence {
             residual: motion.residual,
-            energy_gap: measured.energy_gap(still(system, omega)),
+            energy_gap: measured.energy_gap(negligible_energy(system, omega)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: motion.iterations,
             harmonics: top,
@@ -222,7 +232,7 @@ struct JointSamples {
     states: Vec<f64>,
 }
 
-fn sampled(
+fn sample_joints(
     setting: &OrbitInput,
     level: &mut Discretization,
     motion: &HarmonicSolution,
@@ -230,7 +240,7 @@ fn sampled(
 ) -> JointSamples {
     let OrbitInput { system, ports, omega, .. } = *setting;
     let harmonics = level.harmonics().to_vec();
-    let samples = level.alternation.samples();
+    let samples = level.aft.samples();
     let mut force = vec![vec![[0.0; MAX_DIRECTIONS]; samples]; system.joints().len()];
     let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
     let mut states = Vec::new();
@@ -239,13 +249,13 @@ fn sampled(
         // without a port the joint carries no force and slips permanently
         let mut told = false;
         for (p, port) in ports.iter().enumerate() {
-            let Some(&PortMember { share, .. }) = port.member(j) else { continue };
+            let Some(&PortMember { force_ratio: share, .. }) = port.member(j) else { continue };
             level.sample(ports, p, omega, motion);
-            let alternation = &level.alternation;
+            let alternation = &level.aft;
             for (a, own) in alternation.force.iter().enumerate().take(port.axes) {
                 force.iter_mut().zip(own).for_each(|(force, own)| force[a] += share * own);
             }
-            if port.tells_slip() {
+            if port.samples_slip() {
                 let slips = alternation.slips.iter().zip(&alternation.force[0]);
                 for (contact, (slips, force)) in contact.iter_mut().zip(slips) {
                     if *slips {
@@ -253,7 +263,7 @@ fn sampled(
                     }
                 }
             }
-            told |= port.tells_slip();
+            told |= port.samples_slip();
             match joint.law().rate() {
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
@@ -276,8 +286,8 @@ fn sampled(
                 let u = relative(axis, &harmonics, x);
                 let velocity: Vec<_> =
                     harmonics.iter().zip(u).map(|(&h, c)| (h, Complex64::new(0.0, h as f64 * omega) * c)).collect();
-                level.alternation.fourier.synthesize(&velocity, &mut level.alternation.signal);
-                level.alternation.signal.clone()
+                level.aft.fourier.synthesize(&velocity, &mut level.aft.signal);
+                level.aft.signal.clone()
             })
             .collect();
         for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
@@ -323,7 +333,7 @@ struct SolutionSignals<'a> {
     contact: &'a [Vec<Contact>],
     omega: f64,
     /// Number of returns per period.
-    halves: usize,
+    returns_per_period: usize,
     /// Scratch memory of the transforms.
     level: RefCell<&'a mut Discretization>,
 }
@@ -331,11 +341,11 @@ struct SolutionSignals<'a> {
 impl SolutionSignals<'_> {
     /// Returns the duration of a return, s.
     fn length(&self) -> f64 {
-        TAU / (self.omega * self.halves as f64)
+        TAU / (self.omega * self.returns_per_period as f64)
     }
 
     fn range_of(&self, signal: &[Complex64]) -> (f64, f64) {
-        self.level.borrow_mut().alternation.range(signal)
+        self.level.borrow_mut().aft.range(signal)
     }
 
     fn derivative(&self, mut signal: Vec<Complex64>) -> Vec<Complex64> {
@@ -371,7 +381,7 @@ impl PathSignals for SolutionSignals<'_> {
         // use the unknown, not the displacement under the forces: the energies then balance
         // only as well as the equations hold
         let nh = self.harmonics.len();
-        let unknown = self.ports[axis].first().map(|(q, PortMember { factor, .. })| {
+        let unknown = self.ports[axis].first().map(|(q, PortMember { motion_ratio: factor, .. })| {
             let along = &self.motion.c[q * nh..(q + 1) * nh];
             along.iter().map(|c| c * factor).collect()
         });
@@ -379,7 +389,8 @@ impl PathSignals for SolutionSignals<'_> {
     }
     fn force(&self, axis: usize) -> Vec<Complex64> {
         let nh = self.harmonics.len();
-        let acting = |k: usize| self.ports[axis].iter().map(move |(q, m)| self.motion.force[q * nh + k] * m.share);
+        let acting =
+            |k: usize| self.ports[axis].iter().map(move |(q, m)| self.motion.force[q * nh + k] * m.force_ratio);
         (0..nh).map(|k| acting(k).sum()).collect()
     }
     fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<Complex64> {
@@ -415,7 +426,7 @@ impl PathSignals for SolutionSignals<'_> {
         let changes = runs.len() - usize::from(contact.first() == contact.last());
         ContactSummary {
             shares: ContactFractions::of(runs.into_iter()),
-            switches: changes / self.halves,
+            switches: changes / self.returns_per_period,
             sticks_throughout: sticks(contact.iter().copied()),
         }
     }
@@ -423,27 +434,28 @@ impl PathSignals for SolutionSignals<'_> {
 
 /// Relative energy gap above which a solution is no orbit. Energies balance to the residual,
 /// except at a resonance without damping, where the receptance is infinite.
-const UNBALANCED: f64 = 1e-2;
+const UNBALANCED_ENERGY: f64 = 1e-2;
 /// Energies below this share of the energy that the loads could store in the structure are
 /// rounding: all joints stick.
-const STILL: f64 = 1e-9;
+const NEGLIGIBLE_ENERGY: f64 = 1e-9;
 
 /// Returns the energy (J) that counts as zero at this frequency.
-fn still(system: &System, omega: f64) -> f64 {
+fn negligible_energy(system: &System, omega: f64) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let stiff = stiffness.max(omega * omega * mass);
     let loads: f64 = system.excitation(omega).iter().map(|(_, load)| load.norm_squared()).sum();
-    STILL * loads / stiff.max(f64::MIN_POSITIVE)
+    NEGLIGIBLE_ENERGY * loads / stiff.max(f64::MIN_POSITIVE)
 }
 
 /// Returns true if the energies of an orbit balance, or count as zero.
-pub(super) fn balances(system: &System, orbit: &Orbit) -> bool {
+pub(super) fn energies_balance(system: &System, orbit: &Orbit) -> bool {
     let Energy { work_in, viscous, friction } = orbit.energy;
-    orbit.evidence.energy_gap <= UNBALANCED || (work_in - viscous - friction).abs() <= still(system, orbit.omega)
+    orbit.evidence.energy_gap <= UNBALANCED_ENERGY
+        || (work_in - viscous - friction).abs() <= negligible_energy(system, orbit.omega)
 }
 
 /// Returns the harmonic `h` of an imposed motion.
-fn moved(place: &MovedPlace, h: usize) -> Complex64 {
+fn imposed_amplitude(place: &MovedPlace, h: usize) -> Complex64 {
     amplitude_at(&place.motion, h)
 }
 
@@ -457,7 +469,7 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
     let place = &system.moved_places()[m];
     let mut force = -amplitude_at(&place.force, h);
     for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-        force += moved(&system.moved_places()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
+        force += imposed_amplitude(&system.moved_places()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
     }
     for i in 0..x.len() {
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
@@ -487,7 +499,7 @@ impl Path for FourierPath {
                 a[i] += (s * s * z).re;
             }
             for (m, now) in moved_now.iter_mut().enumerate() {
-                now.0 += (moved(&self.system.moved_places()[m], h) * turn).re;
+                now.0 += (imposed_amplitude(&self.system.moved_places()[m], h) * turn).re;
                 now.1 += (linear_reaction(&self.system, m, h, s, amplitude) * turn).re;
             }
         }

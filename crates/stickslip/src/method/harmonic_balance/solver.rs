@@ -1,7 +1,7 @@
 //! The solver of harmonic balance: one orbit after another, with warm starts.
 
 use super::aft::Ports;
-use super::budget::{self, POINT, WorkShare, is_affordable};
+use super::budget::{self, POINT_LIMIT, WorkShare, is_affordable};
 use super::dynamics::banded::{self, BandedForm};
 use super::dynamics::linear_dynamics::LinearDynamics;
 use super::equations::harmonic_set::HarmonicSet;
@@ -10,7 +10,7 @@ use super::globalization::found_by::FoundBy;
 use super::linear_solve::newton_krylov;
 use super::memory_estimate::{MEMORY, check_memory, level_memory};
 use super::newton::SolveError;
-use super::options::{FIRST, HarmonicBalance, NAME, TOLERANCE};
+use super::options::{FIRST_HARMONICS, HarmonicBalance, NAME, TOLERANCE};
 use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
 use super::warm_start::{RECENT, RecentOrbit};
 use super::{cost_model, postprocess};
@@ -25,16 +25,16 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 /// Newton iterations from a warm start; 2 to 5 are usual.
-const NEARBY: usize = 20;
+const WARM_ITERATIONS: usize = 20;
 /// Highest harmonic of a cold start with force ports. Longer series start from the solution
 /// with half the harmonics, in which the slipping samples are nearly known.
-const COLD: usize = 15;
+const COLD_START_HARMONICS: usize = 15;
 /// Number of unknowns beyond which elimination is too slow for an error estimate. One
 /// elimination would take seconds, and a search takes ten or more.
-pub(super) const LARGEST: usize = 2600;
+pub(super) const MOST_ELIMINATED_UNKNOWNS: usize = 2600;
 /// Largest number of harmonics times squared number of axes for which an error is estimated
 /// with GMRES. Products with all of them then take a tenth of a second.
-const ESTIMATED: f64 = 1e7;
+const MOST_ESTIMATE_PRODUCTS: f64 = 1e7;
 
 /// Solver of a system.
 pub(super) struct HarmonicBalanceSolver {
@@ -45,18 +45,18 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) periods: usize,
     /// Frequency of the excitation, rad/s. In this method, `omega` is the frequency of the
     /// orbit.
-    pub(super) drive: f64,
+    pub(super) excitation_frequency: f64,
     /// Ports. For a ring in a travelling wave, those of the first sector.
     pub(super) ports: Ports,
     /// Ports of the whole ring, for a travelling wave.
-    pub(super) around: Option<Ports>,
+    pub(super) ring_ports: Option<Ports>,
     /// Receptance of the linear part.
-    pub(super) rest: LinearDynamics,
+    pub(super) receptance: LinearDynamics,
     /// One harmonic in banded form, if the system has that form. It sizes the work and memory
     /// of longer series.
     pub(super) banded: Option<BandedForm>,
     /// Set of harmonics in a series.
-    pub(super) kept: HarmonicSet,
+    pub(super) harmonic_set: HarmonicSet,
     /// Highest harmonic of the first series.
     pub(super) first: usize,
     /// True once a law was met whose force jumps between two samples.
@@ -65,44 +65,44 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) judge: OrbitCheck,
     /// State in static equilibrium: displacements, velocities (zero), internal states of the
     /// joints.
-    pub(super) static_start: Option<Vec<f64>>,
+    pub(super) static_state: Option<Vec<f64>>,
     /// Equations by their highest harmonic.
-    pub(super) levels: BTreeMap<usize, Discretization>,
+    pub(super) discretizations: BTreeMap<usize, Discretization>,
     /// Number of consecutive failed points that used much of the work limit, see
-    /// [`budget::ENOUGH`].
-    pub(super) in_vain: usize,
+    /// [`budget::REDUCED_SHARE`].
+    pub(super) expensive_failures: usize,
     /// Lower work limit of the present point, if it has an orbit whose error it tries to reduce.
     pub(super) limit: Option<WorkShare>,
     /// The last orbits, newest first.
     pub(super) recent: VecDeque<RecentOrbit>,
     /// Frequency (rad/s) and state from which the next searches continue, see
     /// [`Solver::begin_at`].
-    pub(super) begun: Option<(f64, Vec<f64>)>,
+    pub(super) branch_start: Option<(f64, Vec<f64>)>,
     /// Frequencies (rad/s) without an orbit at which the motion was integrated in time, and how
     /// that motion behaved and ended.
-    pub(super) followed: Vec<(f64, ObservedMotion, Vec<f64>)>,
+    pub(super) failed_frequencies: Vec<(f64, ObservedMotion, Vec<f64>)>,
     /// Number of time integrations that were made to find an orbit.
-    pub(super) tried_in_time: usize,
+    pub(super) time_integrations: usize,
     /// By highest harmonic, in systems with many contacts: the last solution whose error was
     /// estimated, and the finer solution with twice the harmonics.
-    pub(super) compared: BTreeMap<usize, [HarmonicSolution; 2]>,
+    pub(super) comparisons: BTreeMap<usize, [HarmonicSolution; 2]>,
 }
 
 impl HarmonicBalanceSolver {
     pub(super) fn new(system: System, method: HarmonicBalance, periods: usize) -> Result<Self, MethodError> {
         let kept = if periods > 1 {
-            HarmonicSet::slowed(&system, periods)
+            HarmonicSet::subharmonic(&system, periods)
         } else {
             HarmonicSet::new(&system, |z| z != Complex64::new(0.0, 0.0))
         };
         method.check(kept.highest)?;
-        if let Some(error) = MethodError::empty(NAME, &system) {
+        if let Some(error) = MethodError::only_joints(NAME, &system) {
             return Err(error);
         }
-        let (mut ports, mut around) = Ports::of_sector(&system)?;
+        let (mut ports, mut around) = Ports::for_sector(&system)?;
         let rest = LinearDynamics::new(&system, &ports);
         let system = Arc::new(system);
-        let first = (FIRST * kept.scale).max(kept.highest);
+        let first = (FIRST_HARMONICS * kept.count_factor).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         let banded = BandedForm::new(&system, &ports, &[1]);
         let steep = ports.has_steep();
@@ -110,36 +110,36 @@ impl HarmonicBalanceSolver {
         let bytes = level_memory(banded.as_ref(), &ports, &rest, (harmonics.len(), samples));
         check_memory(bytes, &ports, (harmonics.len(), periods))?;
         let mut static_start = None;
-        if kept.has(0)
+        if kept.contains(0)
             && let Some(SolvedEquilibrium { orbit, states }) =
                 static_equilibrium(&system, (&ports, around.as_ref()), &rest)
         {
-            ports.begin_at(&states);
-            around.iter_mut().for_each(|around| around.begin_at(&states));
+            ports.set_static_states(&states);
+            around.iter_mut().for_each(|around| around.set_static_states(&states));
             static_start = Some(orbit.initial_state);
         }
         Ok(HarmonicBalanceSolver {
             method,
             periods,
-            drive: 0.0,
+            excitation_frequency: 0.0,
             ports,
-            around,
-            rest,
+            ring_ports: around,
+            receptance: rest,
             banded,
-            kept,
+            harmonic_set: kept,
             first,
             steep,
             judge: OrbitCheck::new(&system),
             system,
-            static_start,
-            levels: BTreeMap::new(),
-            in_vain: 0,
+            static_state: static_start,
+            discretizations: BTreeMap::new(),
+            expensive_failures: 0,
             limit: None,
             recent: VecDeque::new(),
-            begun: None,
-            followed: Vec::new(),
-            tried_in_time: 0,
-            compared: BTreeMap::new(),
+            branch_start: None,
+            failed_frequencies: Vec::new(),
+            time_integrations: 0,
+            comparisons: BTreeMap::new(),
         })
     }
 
@@ -147,53 +147,55 @@ impl HarmonicBalanceSolver {
     ///
     /// # Errors
     /// A resonance without damping.
-    pub(super) fn level(&mut self, top: usize, omega: f64) -> Result<&mut Discretization, SolveError> {
-        let harmonics = self.kept.up_to(top);
+    pub(super) fn discretization(&mut self, top: usize, omega: f64) -> Result<&mut Discretization, SolveError> {
+        let harmonics = self.harmonic_set.up_to(top);
         let samples = self.method.samples_at(top, &self.ports, self.steep);
         let (system, ports) = (&self.system, &self.ports);
-        let level = self.levels.entry(top).or_insert_with(|| {
+        let level = self.discretizations.entry(top).or_insert_with(|| {
             let sparse = BandedForm::new(system, ports, &harmonics);
             Discretization::new(harmonics, samples, ports, sparse)
         });
-        level.drive(&self.system, &self.ports, &self.rest, omega).map_err(SolveError::at)?;
-        let elsewhere = self.taken(Some(top));
-        let allowed = self.allowed();
-        let level = self.levels.get_mut(&top).expect("made above");
-        (level.elsewhere, level.allowed) = (elsewhere, allowed);
+        level.set_frequency(&self.system, &self.ports, &self.receptance, omega).map_err(SolveError::resonance)?;
+        let elsewhere = self.work_used(Some(top));
+        let allowed = self.work_limit();
+        let level = self.discretizations.get_mut(&top).expect("made above");
+        (level.work_elsewhere, level.work_limit) = (elsewhere, allowed);
         Ok(level)
     }
 
     /// Resets the work counters for a new point.
     pub(super) fn begin_point(&mut self, drive: f64) {
-        self.drive = drive;
+        self.excitation_frequency = drive;
         self.limit = None;
-        self.levels.values_mut().for_each(Discretization::begin_point);
+        self.discretizations.values_mut().for_each(Discretization::begin_point);
     }
 
     /// Returns the work of the point so far, without that of the equations up to harmonic
     /// `but`.
-    pub(super) fn taken(&self, but: Option<usize>) -> WorkShare {
-        let counted = self.levels.iter().filter(|(top, _)| but != Some(**top));
-        counted.map(|(_, level)| level.taken_of_point(&self.ports)).fold(WorkShare::default(), WorkShare::and)
+    pub(super) fn work_used(&self, but: Option<usize>) -> WorkShare {
+        let counted = self.discretizations.iter().filter(|(top, _)| but != Some(**top));
+        counted.map(|(_, level)| level.point_work_used(&self.ports)).fold(WorkShare::default(), WorkShare::and)
     }
 
     /// Returns the work limit of the point.
-    fn allowed(&self) -> WorkShare {
-        let allowed = budget::allowed_after(self.in_vain);
+    fn work_limit(&self) -> WorkShare {
+        let allowed = budget::work_limit_after(self.expensive_failures);
         self.limit.map_or(allowed, |limit| limit.and_at_most(allowed))
     }
 
     /// Returns true if the point has used its work limit.
-    pub(super) fn is_spent(&self) -> bool {
-        self.taken(None).is_beyond(self.allowed())
+    pub(super) fn is_budget_used(&self) -> bool {
+        self.work_used(None).exceeds(self.work_limit())
     }
 
     /// Ends a point. Counts consecutive expensive failures, which shrink the limit of the next
     /// point.
     fn end_point(&mut self, found: Result<Orbit, OrbitError>) -> Result<Orbit, OrbitError> {
         match &found {
-            Ok(_) => self.in_vain = 0,
-            Err(_) if self.taken(None).is_beyond(POINT.times(budget::ENOUGH)) => self.in_vain += 1,
+            Ok(_) => self.expensive_failures = 0,
+            Err(_) if self.work_used(None).exceeds(POINT_LIMIT.times(budget::REDUCED_SHARE)) => {
+                self.expensive_failures += 1
+            }
             Err(_) => {}
         }
         found
@@ -201,22 +203,26 @@ impl HarmonicBalanceSolver {
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in
     /// memory. The budget of a point that has used `taken` must cover it too.
-    pub(super) fn can_compare(&self, top: usize, taken: WorkShare) -> bool {
-        let harmonics = self.kept.up_to(self.kept.double(top)).len();
+    pub(super) fn can_estimate_error(&self, top: usize, taken: WorkShare) -> bool {
+        let harmonics = self.harmonic_set.up_to(self.harmonic_set.doubled(top)).len();
         let axes = self.ports.count();
         let products = (harmonics * axes * axes) as f64;
         let size = 2 * axes * harmonics;
-        let multiplied = newton_krylov::by_products(size, &self.ports) && products <= ESTIMATED;
+        let multiplied = newton_krylov::uses_krylov(size, &self.ports) && products <= MOST_ESTIMATE_PRODUCTS;
         let few = match &self.banded {
             Some(_) => true,
-            None => size <= LARGEST || multiplied,
+            None => size <= MOST_ELIMINATED_UNKNOWNS || multiplied,
         };
         let bounded = self.banded.is_some() || self.ports.has_forces();
         let affordable = !bounded
-            || is_affordable(cost_model::step(self.banded.as_ref(), &self.ports, harmonics), taken, self.allowed());
+            || is_affordable(
+                cost_model::step_multiplications(self.banded.as_ref(), &self.ports, harmonics),
+                taken,
+                self.work_limit(),
+            );
         // the error estimate also takes twice the samples
-        let samples = 2 * self.method.samples_at(self.kept.double(top), &self.ports, self.steep);
-        let fits = level_memory(self.banded.as_ref(), &self.ports, &self.rest, (harmonics, samples)) <= MEMORY;
+        let samples = 2 * self.method.samples_at(self.harmonic_set.doubled(top), &self.ports, self.steep);
+        let fits = level_memory(self.banded.as_ref(), &self.ports, &self.receptance, (harmonics, samples)) <= MEMORY;
         few && affordable && fits
     }
 
@@ -231,18 +237,18 @@ impl HarmonicBalanceSolver {
         omega: f64,
         from: Option<(usize, &HarmonicSolution)>,
     ) -> Result<HarmonicSolution, SolveError> {
-        let motion = self.solve_as_known(top, omega, from)?;
-        if self.steep || !self.levels[&top].jumps(&self.ports, &motion) {
+        let motion = self.solve_with_present_samples(top, omega, from)?;
+        if self.steep || !self.discretizations[&top].states_cross_within_sample(&self.ports, &motion) {
             return Ok(motion);
         }
         self.steep = true;
-        self.levels.clear();
-        self.compared.clear();
-        self.solve_as_known(top, omega, Some((top, &motion)))
+        self.discretizations.clear();
+        self.comparisons.clear();
+        self.solve_with_present_samples(top, omega, Some((top, &motion)))
     }
 
     /// Solves with the number of samples that is set.
-    fn solve_as_known(
+    fn solve_with_present_samples(
         &mut self,
         top: usize,
         omega: f64,
@@ -250,40 +256,44 @@ impl HarmonicBalanceSolver {
     ) -> Result<HarmonicSolution, SolveError> {
         let start = match from {
             Some((other, motion)) => {
-                let harmonics = self.kept.up_to(other);
-                equations::transfer(motion, &harmonics, self.level(top, omega)?.harmonics())
+                let harmonics = self.harmonic_set.up_to(other);
+                equations::with_harmonics(motion, &harmonics, self.discretization(top, omega)?.harmonics())
             }
-            None if self.ports.has_forces() && top > COLD * self.kept.scale && top / 2 >= self.first => {
+            None if self.ports.has_forces()
+                && top > COLD_START_HARMONICS * self.harmonic_set.count_factor
+                && top / 2 >= self.first =>
+            {
                 let coarse = self.solve(top / 2, omega, None)?;
                 return self.solve(top, omega, Some((top / 2, &coarse)));
             }
             None => {
                 // the initial guess solves the whole structure densely; large systems start
                 // without friction
-                let guess = (self.system.dofs() < banded::GUESSED).then(|| DescribingGuess::new(&self.system, omega));
-                self.level(top, omega)?;
-                let begun = self.levels[&top].begin(&self.system, &self.ports, guess.as_ref(), omega);
-                self.approached(top, omega, guess.as_ref()).unwrap_or(begun)
+                let guess =
+                    (self.system.dofs() < banded::DESCRIBING_DOFS).then(|| DescribingGuess::new(&self.system, omega));
+                self.discretization(top, omega)?;
+                let begun = self.discretizations[&top].initial_guess(&self.system, &self.ports, guess.as_ref(), omega);
+                self.guess_by_integration(top, omega, guess.as_ref()).unwrap_or(begun)
             }
         };
-        let level = self.levels.get_mut(&top).expect("made above");
+        let level = self.discretizations.get_mut(&top).expect("made above");
         level.solve(&self.ports, omega, start)
     }
 
     /// Converts the failure of a search to the error of the method.
-    pub(super) fn lost(&self, lost: SolveError) -> OrbitError {
+    pub(super) fn solve_error(&self, lost: SolveError) -> OrbitError {
         if let Some(resonance) = lost.resonance {
-            return OrbitError::Resonance { method: NAME, omega: self.drive, resonance };
+            return OrbitError::Resonance { method: NAME, omega: self.excitation_frequency, resonance };
         }
-        if lost.away {
-            return OrbitError::drift(NAME, self.drive);
+        if lost.left_contacts {
+            return OrbitError::drift(NAME, self.excitation_frequency);
         }
         OrbitError::NotConverged {
             method: NAME,
-            omega: self.drive,
+            omega: self.excitation_frequency,
             iterations: lost.iterations,
             residual: lost.residual,
-            work_limit_reached: self.is_spent(),
+            work_limit_reached: self.is_budget_used(),
             advice: String::new(),
         }
     }
@@ -295,12 +305,12 @@ impl HarmonicBalanceSolver {
         omega: f64,
         motion: &HarmonicSolution,
     ) -> Result<Vec<DVector<Complex64>>, SolveError> {
-        postprocess::places(self.levels.get_mut(&top).expect("solved"), &self.rest, omega, motion)
-            .map_err(SolveError::at)
+        postprocess::places(self.discretizations.get_mut(&top).expect("solved"), &self.receptance, omega, motion)
+            .map_err(SolveError::resonance)
     }
 
     /// Makes the orbit of a solution, checks its energy balance, and keeps it for warm starts.
-    pub(super) fn finish(
+    pub(super) fn make_orbit(
         &mut self,
         top: usize,
         omega: f64,
@@ -310,7 +320,12 @@ impl HarmonicBalanceSolver {
     ) -> Result<Orbit, OrbitError> {
         let orbit = self.orbit_of(top, omega, &motion, x, truncation)?;
         self.recent.truncate(RECENT - 1);
-        self.recent.push_front(RecentOrbit { start: orbit.initial_state.clone(), omega, top, motion });
+        self.recent.push_front(RecentOrbit {
+            start: orbit.initial_state.clone(),
+            omega,
+            highest_harmonic: top,
+            solution: motion,
+        });
         Ok(orbit)
     }
 
@@ -326,58 +341,64 @@ impl HarmonicBalanceSolver {
         let setting = postprocess::OrbitInput {
             system: &self.system,
             ports: &self.ports,
-            around: self.around.as_ref(),
+            ring_ports: self.ring_ports.as_ref(),
             omega,
-            first: self.periods,
-            odd: self.kept.half_period(),
+            excitation_harmonic: self.periods,
+            half_period: self.harmonic_set.has_half_period_symmetry(),
             truncation,
             tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
             judge: Some(&mut self.judge),
         };
-        let level = self.levels.get_mut(&top).expect("solved");
-        let orbit = postprocess::orbit(setting, level, motion, x).ok_or(OrbitError::drift(NAME, self.drive))?;
-        if !postprocess::balances(&self.system, &orbit) {
-            let lost = SolveError::after(motion.iterations, orbit.evidence.energy_gap);
-            return Err(self.lost(lost));
+        let level = self.discretizations.get_mut(&top).expect("solved");
+        let orbit =
+            postprocess::orbit(setting, level, motion, x).ok_or(OrbitError::drift(NAME, self.excitation_frequency))?;
+        if !postprocess::energies_balance(&self.system, &orbit) {
+            let lost = SolveError::not_converged(motion.iterations, orbit.evidence.energy_gap);
+            return Err(self.solve_error(lost));
         }
-        Ok(Orbit { omega: self.drive, periods: self.periods, ..orbit })
+        Ok(Orbit { omega: self.excitation_frequency, periods: self.periods, ..orbit })
     }
 
     /// Finds the solution near another one, without an error estimate and without the
     /// slip-limit homotopy of [`Discretization::solve`].
     ///
     /// Searches between orbits use it. They can do without a failed point.
-    pub(super) fn nearby(&mut self, top: usize, omega: f64, near: &HarmonicSolution) -> Result<Orbit, OrbitError> {
-        self.level(top, omega).map(|_| ()).map_err(|l| self.lost(l))?;
+    pub(super) fn solve_nearby(
+        &mut self,
+        top: usize,
+        omega: f64,
+        near: &HarmonicSolution,
+    ) -> Result<Orbit, OrbitError> {
+        self.discretization(top, omega).map(|_| ()).map_err(|l| self.solve_error(l))?;
         let mut motion = HarmonicSolution { iterations: 0, ..near.clone() };
-        let level = self.levels.get_mut(&top).expect("made above");
-        let mut found = level.polish(&self.ports, omega, &mut motion, NEARBY);
+        let level = self.discretizations.get_mut(&top).expect("made above");
+        let mut found = level.newton_from(&self.ports, omega, &mut motion, WARM_ITERATIONS);
         if found.is_err() && self.ports.has_forces() {
             motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
-            found = level.by_interior_points(&self.ports, omega, &mut motion);
+            found = level.interior_point_method(&self.ports, omega, &mut motion);
             motion.found_by = FoundBy::InteriorPoints;
             if found.is_err() {
                 motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
-                found = level.by_proximal_points(&self.ports, omega, &mut motion);
+                found = level.proximal_point_method(&self.ports, omega, &mut motion);
                 motion.found_by = FoundBy::ProximalPoints;
             }
         }
-        found.map_err(|l| self.lost(l))?;
-        let x = self.places(top, omega, &motion).map_err(|l| self.lost(l))?;
-        self.finish(top, omega, motion, x, None)
+        found.map_err(|l| self.solve_error(l))?;
+        let x = self.places(top, omega, &motion).map_err(|l| self.solve_error(l))?;
+        self.make_orbit(top, omega, motion, x, None)
     }
 
     /// Finds the orbit with the user's number of harmonics. Without one, doubles the harmonics
     /// from `first` until the tolerance is met.
-    pub(super) fn from(
+    pub(super) fn converge(
         &mut self,
         first: usize,
         omega: f64,
         warm: Option<(usize, HarmonicSolution)>,
     ) -> Result<Orbit, OrbitError> {
         match self.method.harmonics {
-            Some(top) => self.fixed(top, omega, warm),
-            None => self.chosen(first, omega, warm),
+            Some(top) => self.with_given_harmonics(top, omega, warm),
+            None => self.with_chosen_harmonics(first, omega, warm),
         }
     }
 
@@ -386,9 +407,9 @@ impl HarmonicBalanceSolver {
     /// This holds in systems with many contacts. It also holds for elastic friction if no two
     /// motions separate, because every initial guess then leads to the same orbit. With rigid
     /// friction the set of slipping samples changes abruptly, and extrapolation does not help.
-    pub(super) fn goes_ahead(&self, top: usize) -> bool {
+    pub(super) fn extrapolates(&self, top: usize) -> bool {
         let unique = self.judge.proves() && !self.ports.has_forces();
-        unique || self.levels.get(&top).is_some_and(Discretization::is_coupled)
+        unique || self.discretizations.get(&top).is_some_and(Discretization::uses_krylov)
     }
 
     /// Returns the initial guess.
@@ -396,14 +417,15 @@ impl HarmonicBalanceSolver {
     /// If `start` belongs to an orbit of this solver, the guess is a warm start. If it belongs
     /// to an orbit of another solver and several orbits may exist, the guess comes from a time
     /// integration that begins there.
-    pub(super) fn near(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
+    pub(super) fn initial_guess(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
         let foreign = start.filter(|start| self.recent.iter().all(|recent| recent.start != *start));
-        let led = foreign.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.led(start, omega));
-        led.or_else(|| self.warm(start, omega))
+        let led =
+            foreign.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.guess_from_state(start, omega));
+        led.or_else(|| self.warm_start(start, omega))
     }
 
     /// Returns the index of the recent orbit with this start.
-    fn same(&self, start: &[f64]) -> Option<usize> {
+    fn recent_with_start(&self, start: &[f64]) -> Option<usize> {
         self.recent.iter().position(|recent| recent.start == start)
     }
 
@@ -413,31 +435,31 @@ impl HarmonicBalanceSolver {
     /// This is the orbit with that start. Otherwise, if `start` is the announced state of
     /// [`Solver::begin_at`], it is the orbit at the nearest frequency, provided that it is
     /// nearer than that state.
-    fn neighbour(&self, start: &[f64], omega: f64) -> Option<usize> {
+    fn recent_for_length(&self, start: &[f64], omega: f64) -> Option<usize> {
         let distance = |at: &usize| (self.recent[*at].omega - omega).abs();
         let nearer = || {
-            let (from, _) = self.begun.as_ref().filter(|(_, begun)| begun == start)?;
+            let (from, _) = self.branch_start.as_ref().filter(|(_, begun)| begun == start)?;
             let nearest = (0..self.recent.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
             (distance(&nearest) <= (from - omega).abs()).then_some(nearest)
         };
-        self.same(start).or_else(nearer)
+        self.recent_with_start(start).or_else(nearer)
     }
 
     /// Returns the warm start from the recent orbit with this start, or otherwise from the last
     /// orbit. Both are closer than an initial guess.
-    pub(super) fn warm(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
-        self.warm_by(self.same(start?).unwrap_or(0), omega)
+    pub(super) fn warm_start(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
+        self.warm_start_from(self.recent_with_start(start?).unwrap_or(0), omega)
     }
 
     /// Returns the warm start from a recent orbit.
-    fn warm_by(&self, at: usize, omega: f64) -> Option<(usize, HarmonicSolution)> {
+    fn warm_start_from(&self, at: usize, omega: f64) -> Option<(usize, HarmonicSolution)> {
         let near = self.recent.get(at)?;
-        let before = self.recent.iter().skip(at + 1).find(|recent| recent.top == near.top);
+        let before = self.recent.iter().skip(at + 1).find(|recent| recent.highest_harmonic == near.highest_harmonic);
         let motion = match before {
-            Some(before) if self.goes_ahead(near.top) => near.towards(before, omega),
-            _ => near.motion.clone(),
+            Some(before) if self.extrapolates(near.highest_harmonic) => near.extrapolate(before, omega),
+            _ => near.solution.clone(),
         };
-        Some((near.top, HarmonicSolution { found_by: FoundBy::Newton, ..motion }))
+        Some((near.highest_harmonic, HarmonicSolution { found_by: FoundBy::Newton, ..motion }))
     }
 }
 
@@ -448,10 +470,10 @@ impl Solver for HarmonicBalanceSolver {
         }
         self.begin_point(omega);
         let omega = omega / self.periods as f64;
-        let warm = self.near(start, omega);
-        let found = match self.from(self.first, omega, warm) {
+        let warm = self.initial_guess(start, omega);
+        let found = match self.converge(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
-                self.by_its_course(omega).unwrap_or_else(|| self.by_time(omega).ok_or(error))
+                self.solve_or_classify(omega).unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error))
             }
             found => found,
         };
@@ -464,12 +486,13 @@ impl Solver for HarmonicBalanceSolver {
 
     fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         let at = omega / self.periods as f64;
-        let known = start.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.neighbour(start, at));
-        match known.and_then(|known| self.warm_by(known, at)) {
+        let known =
+            start.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.recent_for_length(start, at));
+        match known.and_then(|known| self.warm_start_from(known, at)) {
             // the number of harmonics of the neighbouring orbit is sufficient
             Some((top, motion)) => {
                 self.begin_point(omega);
-                let found = self.nearby(top, at, &motion);
+                let found = self.solve_nearby(top, at, &motion);
                 self.end_point(found)
             }
             // no suitable orbit is known, so the number of harmonics is chosen anew
@@ -478,12 +501,12 @@ impl Solver for HarmonicBalanceSolver {
     }
 
     fn begin_at(&mut self, omega: f64, start: &[f64]) {
-        self.begun = Some((omega / self.periods as f64, start.to_vec()));
+        self.branch_start = Some((omega / self.periods as f64, start.to_vec()));
     }
 
     fn effort(&self) -> f64 {
-        let WorkShare { eliminated, marched } = self.taken(None);
-        (eliminated / POINT.eliminated).max(marched / POINT.marched)
+        let WorkShare { multiplications: eliminated, time_steps: marched } = self.work_used(None);
+        (eliminated / POINT_LIMIT.multiplications).max(marched / POINT_LIMIT.time_steps)
     }
 }
 
@@ -499,7 +522,7 @@ mod tests {
     /// the peak, where the joint slips, uses the harmonics of the peak. With those of the last
     /// orbit the peak was 2.4 % too low.
     #[test]
-    fn a_peak_that_is_sought_after_the_curve_has_its_own_harmonics() {
+    fn a_later_peak_search_uses_the_harmonics_of_the_peak() {
         let spring = |on: &str, stiffness, damping| Spring { between: [on.into(), GROUND.into()], stiffness, damping };
         let model = Model {
             masses: vec![Mass::new("a", 1.0), Mass::new("d", 0.2)],
@@ -529,23 +552,23 @@ mod tests {
 
     /// Expensive failed points shrink the work limit of the next point. A success restores it.
     #[test]
-    fn points_in_vain_leave_less_to_the_next() {
+    fn expensive_failures_reduce_the_work_limit() {
         let system = example::blade_couple_massless().assemble().unwrap();
         let mut balance = HarmonicBalanceSolver::new(system, HarmonicBalance::default(), 1).unwrap();
         let omega = std::f64::consts::TAU * 121.0;
         let vain = |balance: &mut HarmonicBalanceSolver, marched: usize| {
             balance.begin_point(omega);
-            balance.level(7, omega).unwrap().alternation.marched = marched;
+            balance.discretization(7, omega).unwrap().aft.law_steps = marched;
             balance.end_point(Err(OrbitError::Frequency { omega })).unwrap_err();
-            balance.allowed()
+            balance.work_limit()
         };
-        assert_eq!([0, usize::MAX / 2, 0].map(|marched| vain(&mut balance, marched)), [POINT; 3]);
+        assert_eq!([0, usize::MAX / 2, 0].map(|marched| vain(&mut balance, marched)), [POINT_LIMIT; 3]);
         let less = vain(&mut balance, usize::MAX / 2);
-        assert_eq!(less, POINT.times(budget::ENOUGH));
-        assert_eq!(balance.level(7, omega).unwrap().allowed, less);
+        assert_eq!(less, POINT_LIMIT.times(budget::REDUCED_SHARE));
+        assert_eq!(balance.discretization(7, omega).unwrap().work_limit, less);
         assert!(balance.effort() > 1.0);
         balance.orbit(omega, None).unwrap();
-        assert_eq!(balance.allowed(), POINT);
+        assert_eq!(balance.work_limit(), POINT_LIMIT);
         assert!(balance.effort() > 0.0 && balance.effort() < 1e-3, "{}", balance.effort());
     }
 }

@@ -29,14 +29,14 @@ const ITERATIONS: usize = 60;
 const POINTS: usize = 60;
 /// Stiffness of the springs of the first proximal point, relative to closed contacts. Nothing
 /// slides far at that point.
-const STIFFEST: f64 = 1.0;
+const FIRST_STIFFNESS: f64 = 1.0;
 /// Number of samples of a constant motion.
 const SAMPLES: usize = 8;
 
 /// Returns the static equilibrium of a system, as an orbit at rest. Returns `None` as
 /// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
-    let (ports, around) = Ports::of_sector(system).ok()?;
+    let (ports, around) = Ports::for_sector(system).ok()?;
     let rest = LinearDynamics::new(system, &ports);
     let system = Arc::new(system.clone());
     static_equilibrium(&system, (&ports, around.as_ref()), &rest).map(|found| found.orbit)
@@ -58,17 +58,17 @@ pub(super) fn static_equilibrium(
     rest: &LinearDynamics,
 ) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
-    let omega = scale_of_rates(system);
+    let omega = characteristic_rate(system);
     let sparse = BandedForm::new(system, ports, &harmonics);
     let mut level = Discretization::new(harmonics, SAMPLES, ports, sparse);
-    level.drive(system, ports, rest, omega).ok()?;
-    let start = if level.stands() { level.at_rest(1.0) } else { level.unhindered() };
+    level.set_frequency(system, ports, rest, omega).ok()?;
+    let start = if level.is_held_by_contacts() { level.static_solution(1.0) } else { level.frictionless_motion() };
     let mut solution = start;
-    found(&mut level, ports, omega, &mut solution)?;
+    solve_static(&mut level, ports, omega, &mut solution)?;
     let mut states = vec![StaticState::default(); ports.len()];
     for (p, port) in ports.iter().enumerate() {
         level.sample(ports, p, omega, &solution);
-        states[p].states.clone_from(&level.alternation.state);
+        states[p].states.clone_from(&level.aft.state);
         for (to, c) in states[p].displacement.iter_mut().zip(&solution.c[port.range()]) {
             *to = c.re;
         }
@@ -77,10 +77,10 @@ pub(super) fn static_equilibrium(
     let setting = postprocess::OrbitInput {
         system,
         ports,
-        around,
+        ring_ports: around,
         omega,
-        first: 1,
-        odd: false,
+        excitation_harmonic: 1,
+        half_period: false,
         truncation: None,
         tolerance: 0.0,
         judge: None,
@@ -98,24 +98,24 @@ pub(super) fn static_equilibrium(
 /// structure that sinks under its load.
 ///
 /// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
-fn found(level: &mut Discretization, ports: &Ports, omega: f64, solution: &mut HarmonicSolution) -> Option<()> {
+fn solve_static(level: &mut Discretization, ports: &Ports, omega: f64, solution: &mut HarmonicSolution) -> Option<()> {
     let begin = solution.clone();
-    if level.polish(ports, omega, solution, ITERATIONS).is_ok() {
+    if level.newton_from(ports, omega, solution, ITERATIONS).is_ok() {
         return Some(());
     }
-    if !level.stands() {
+    if !level.is_held_by_contacts() {
         return None;
     }
     *solution = begin;
-    let (mut share, mut softer) = (STIFFEST, 0.1f64);
+    let (mut share, mut softer) = (FIRST_STIFFNESS, 0.1f64);
     for _ in 0..POINTS {
         let anchor = solution.c.iter().map(|c| c.re).collect();
-        level.tether = Some(ProximalSprings { share, anchor });
+        level.tether = Some(ProximalSprings { relative_stiffness: share, anchor });
         let mut next = solution.clone();
-        let tied = level.polish(ports, omega, &mut next, ITERATIONS).is_ok();
+        let tied = level.newton_from(ports, omega, &mut next, ITERATIONS).is_ok();
         level.tether = None;
         if !tied {
-            if share >= STIFFEST {
+            if share >= FIRST_STIFFNESS {
                 return None;
             }
             share /= softer;
@@ -123,7 +123,7 @@ fn found(level: &mut Discretization, ports: &Ports, omega: f64, solution: &mut H
             continue;
         }
         *solution = next.clone();
-        if level.polish(ports, omega, &mut next, ITERATIONS).is_ok() {
+        if level.newton_from(ports, omega, &mut next, ITERATIONS).is_ok() {
             *solution = next;
             return Some(());
         }
@@ -134,7 +134,7 @@ fn found(level: &mut Discretization, ports: &Ports, omega: f64, solution: &mut H
 
 /// Returns a rate of the system, 1/s, from its largest stiffness and mass. Equations at rest
 /// need one.
-fn scale_of_rates(system: &System) -> f64 {
+fn characteristic_rate(system: &System) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let rate = (stiffness / mass).sqrt();
     if rate.is_finite() && rate > 0.0 { rate } else { 1.0 }
@@ -175,7 +175,7 @@ mod tests {
     /// In stick, `z (kn sin² + kt cos²) = Q`. In slip, `z kn (sin² + µ sin cos) = Q`. The
     /// friction coefficient selects the case.
     #[test]
-    fn a_wedge_sinks_until_its_faces_carry_the_load() {
+    fn the_equilibrium_of_a_wedge_is_exact() {
         let (sine, cosine) = ANGLE.to_radians().sin_cos();
         for (friction, sticks) in [(0.9, true), (0.25, false)] {
             let SolvedEquilibrium { orbit, states } = equilibrium(&wedge(500.0, friction)).unwrap();
@@ -190,7 +190,7 @@ mod tests {
 
     /// A load that pulls the wedge out has no equilibrium.
     #[test]
-    fn a_load_that_nothing_carries_has_none() {
+    fn an_unsupported_load_has_no_equilibrium() {
         assert!(equilibrium(&wedge(-500.0, 0.25)).is_none());
     }
 }

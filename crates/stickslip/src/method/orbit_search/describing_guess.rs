@@ -24,11 +24,11 @@ pub(crate) struct DescribingGuess {
 }
 
 /// Returns the complex stiffness at amplitude `a`, directions × directions, N/m.
-fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
+fn complex_stiffness(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
     let d = law.directions();
     let along = match law.prox() {
         _ if d == 1 => law.describing_function(a, omega),
-        None => return at_rest(law, omega),
+        None => return small_motion_stiffness(law, omega),
         Some(prox) => {
             let rigid = Complex64::new(0.0, 4.0 * law.force_scale() / (PI * a));
             rigid / (1.0 + rigid * prox.compliance())
@@ -39,7 +39,7 @@ fn linearised(law: &dyn Law, a: f64, omega: f64) -> DMatrix<Complex64> {
 
 /// Returns the complex stiffness of small motions about rest, directions × directions, N/m. It
 /// is zero for a law without a step and a rate.
-pub(crate) fn at_rest(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
+pub(crate) fn small_motion_stiffness(law: &dyn Law, omega: f64) -> DMatrix<Complex64> {
     let d = law.directions();
     let zero = Complex64::new(0.0, 0.0);
     if let Some(step) = law.step() {
@@ -87,13 +87,16 @@ impl DescribingGuess {
         let mut guess = DescribingGuess { harmonics: Vec::new(), joints: Vec::new() };
         for _ in 0..ROUNDS {
             let joints = system.joints().iter().zip(&amplitudes);
-            guess.joints = joints
-                .map(
-                    |(joint, &a)| {
-                        if a.is_finite() { linearised(&**joint.law(), a, omega) } else { none(joint.axes().len()) }
-                    },
-                )
-                .collect();
+            guess.joints =
+                joints
+                    .map(|(joint, &a)| {
+                        if a.is_finite() {
+                            complex_stiffness(&**joint.law(), a, omega)
+                        } else {
+                            none(joint.axes().len())
+                        }
+                    })
+                    .collect();
             guess.harmonics = harmonics
                 .iter()
                 .map(|&h| {

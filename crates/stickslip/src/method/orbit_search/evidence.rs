@@ -32,16 +32,16 @@ const LARGEST: usize = 24;
 const JOINTS: usize = 12;
 /// Factor on the limits of permanently stuck joints while the derivative of the return is
 /// computed. A power of two avoids rounding.
-const HELD: f64 = 2.0;
+const LIMIT_FACTOR: f64 = 2.0;
 /// Distance of the largest multiplier from one, in return defects, below which its side of one
 /// is uncertain. With stops that open and close, multipliers err by two to three times the
 /// error of the motion.
 const MARGIN: f64 = 10.0;
 /// Newton steps from the given state to the orbit of the time integration; convergence is
 /// quadratic.
-const STEPS_NEARER: usize = 3;
+const NEWTON_STEPS: usize = 3;
 /// Largest ratio of the distances from the return after and before such a step.
-const LEFT: f64 = 0.5;
+const LARGEST_RATIO: f64 = 0.5;
 /// Relative error per step of the integration of smooth laws.
 const TOLERANCE: f64 = 1e-8;
 /// Equal steps per return for laws with a step only; they follow the motion to about 1e-6.
@@ -94,8 +94,8 @@ impl OrbitCheck {
         OrbitCheck { proven, ..OrbitCheck::of_any_size(system) }
     }
 
-    /// Makes a [`OrbitCheck`] for any system, even where stability is proven or the integration is
-    /// slow.
+    /// Makes an [`OrbitCheck`] for any system, even where stability is proven or the integration
+    /// is slow.
     pub fn of_any_size(system: &System) -> Self {
         let name = "the judge of stability"; // this name appears in no message
         let flow: Option<Box<dyn Flow>> = match IntegratorKind::of(system, None) {
@@ -107,7 +107,7 @@ impl OrbitCheck {
                 })
             }
             IntegratorKind::Exact | IntegratorKind::Smooth | IntegratorKind::Switched => {
-                integrator_choice::of(system, None, TOLERANCE, name).ok()
+                integrator_choice::integrator(system, None, TOLERANCE, name).ok()
             }
         };
         OrbitCheck { flow, proven: false }
@@ -120,7 +120,7 @@ impl OrbitCheck {
 
     /// Integrates from `start` over this number of returns, then records one period. Returns
     /// `None` if no integration follows the system.
-    pub fn approach(
+    pub fn settle_and_record(
         &mut self,
         system: &System,
         omega: f64,
@@ -129,8 +129,8 @@ impl OrbitCheck {
     ) -> Option<Arc<dyn Path>> {
         let flow = self.flow.as_mut()?;
         let period = TAU / omega;
-        flow.set_drive(system, omega);
-        flow.set_share(1.0);
+        flow.set_excitation(system, omega);
+        flow.set_step_fraction(1.0);
         start.resize(flow.states(), 0.0);
         for _ in 0..returns {
             flow.run(&mut start, period, None).ok()?;
@@ -138,9 +138,9 @@ impl OrbitCheck {
                 return None;
             }
         }
-        flow.keep(true);
+        flow.set_recording(true);
         let run = flow.run(&mut start, period, None);
-        flow.keep(false);
+        flow.set_recording(false);
         run.ok()?;
         Some(flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period))
     }
@@ -180,15 +180,15 @@ impl OrbitCheck {
     ) -> ReturnEvidence {
         let Some(flow) = &mut self.flow else { return ReturnEvidence::default() };
         let back = ReturnSymmetry::of(system, symmetry);
-        flow.set_drive(system, omega);
+        flow.set_excitation(system, omega);
         let (weights, rest) = (flow.weights(), NEAR_REST * flow.energy_scale());
-        let share = vibration_share::share(path, (symmetry, TAU / omega), start, (&weights, rest));
+        let share = vibration_share::fraction(path, (symmetry, TAU / omega), start, (&weights, rest));
         flow.set_tolerance(share * TOLERANCE);
         let states = flow.states();
         let mut state = start.to_vec();
         state.resize(states, 0.0);
         let duration = back.part * TAU / omega;
-        flow.set_share(back.share);
+        flow.set_step_fraction(back.share);
         let mut derivative = sensitive.map(|_| DMatrix::identity(states, states));
         let stuck = sensitive.unwrap_or_default();
         let alone = derivative.as_mut().filter(|_| stuck.is_empty());
@@ -200,9 +200,9 @@ impl OrbitCheck {
         if !stuck.is_empty() {
             let mut again = start.to_vec();
             again.resize(states, 0.0);
-            flow.strengthen(stuck, HELD);
+            flow.scale_limits(stuck, LIMIT_FACTOR);
             let run = flow.run(&mut again, duration, derivative.as_mut());
-            flow.strengthen(stuck, 1.0 / HELD);
+            flow.scale_limits(stuck, 1.0 / LIMIT_FACTOR);
             derivative = derivative.filter(|_| run.is_ok());
         }
         // internal states that the method does not compute start wrong; their return does not
@@ -222,11 +222,18 @@ impl OrbitCheck {
             && eigen::largest_modulus(of_series)
                 .is_some_and(|modulus| (modulus.powi(back.times as i32) - 1.0).abs() <= MARGIN * defect)
         {
-            let near =
-                of_the_orbit_beside(&mut **flow, (start, gap, of_series), (&back, system.dofs()), (duration, &weights));
+            let near = derivative_at_nearby_orbit(
+                &mut **flow,
+                (start, gap, of_series),
+                (&back, system.dofs()),
+                (duration, &weights),
+            );
             of_return = near.or(of_return);
         }
-        ReturnEvidence { derivative: of_return.map(|derivative| back.whole(&derivative, system.dofs())), defect }
+        ReturnEvidence {
+            derivative: of_return.map(|derivative| back.over_full_cycle(&derivative, system.dofs())),
+            defect,
+        }
     }
 }
 
@@ -303,7 +310,7 @@ impl ReturnSymmetry {
     }
 
     /// Returns the derivative over all returns that bring the ring back to its start.
-    fn whole(&self, of_return: &DMatrix<f64>, dofs: usize) -> DMatrix<f64> {
+    fn over_full_cycle(&self, of_return: &DMatrix<f64>, dofs: usize) -> DMatrix<f64> {
         let power = (1..self.times).fold(of_return.clone(), |power, _| &power * of_return);
         let back = self.sectors - self.turned * self.times % self.sectors;
         self.rows_turned(&power, dofs, back % self.sectors)
@@ -314,14 +321,14 @@ impl ReturnSymmetry {
 ///
 /// `gap` and `of_series` are the return defect and the derivative at `start`. Returns `None` if
 /// Newton's method does not reduce the gap.
-fn of_the_orbit_beside(
+fn derivative_at_nearby_orbit(
     flow: &mut dyn Flow,
     (start, mut gap, of_series): (&[f64], DVector<f64>, &DMatrix<f64>),
     (back, dofs): (&ReturnSymmetry, usize),
     (duration, weights): (f64, &[f64]),
 ) -> Option<DMatrix<f64>> {
     let (mut state, mut nearer) = (start.to_vec(), None);
-    for _ in 0..STEPS_NEARER {
+    for _ in 0..NEWTON_STEPS {
         let step = newton_step(nearer.as_ref().unwrap_or(of_series), &gap, back.sign, weights);
         let from: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
         let (mut end, mut derivative) = (from.clone(), DMatrix::identity(from.len(), from.len()));
@@ -329,7 +336,7 @@ fn of_the_orbit_beside(
         let end = back.returned(&end, dofs);
         let left = DVector::from_iterator(from.len(), from.iter().zip(&end).map(|(z, end)| z - end));
         let share = norm(weights, left.as_slice()) / norm(weights, gap.as_slice());
-        if share.is_nan() || share > LEFT {
+        if share.is_nan() || share > LARGEST_RATIO {
             break;
         }
         (state, gap, nearer) = (from, left, Some(back.derivative(&derivative, dofs)));

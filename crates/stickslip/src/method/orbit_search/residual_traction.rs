@@ -7,10 +7,11 @@
 //! motion is its own mirror image, `o` is zero. Otherwise the mean depends on `o`; with a gap
 //! or another law of position, so does the whole motion.
 //!
-//! All methods choose `o = u_s - f_s/kt` of static equilibrium ([`crate::method::static_equilibrium`]),
-//! or the nearest place that respects the limit. Harmonic balance finds this orbit directly.
-//! Newton's method on a return map may find any orbit of the continuum. This file replaces the
-//! rows of such sliders by `z = kt (u - o)` and iterates `o`.
+//! All methods choose `o = u_s - f_s/kt` of static equilibrium
+//! ([`crate::method::static_equilibrium`]), or the nearest place that respects the limit.
+//! Harmonic balance finds this orbit directly. Newton's method on a return map may find any orbit
+//! of the continuum. This file replaces the rows of such sliders by `z = kt (u - o)` and iterates
+//! `o`.
 
 use super::return_map::{ClosedState, ClosingTargets, ReturnMap, close};
 use crate::method::OrbitError;
@@ -32,7 +33,7 @@ const LOOK_BACK: usize = 4;
 /// Differences between rounds below this fraction of the largest count as zero.
 const SAME: f64 = 1e-8;
 /// Factor on the limit of a held slider, which may pass its limit during the iteration.
-const HOLDS: f64 = 1e3;
+const LIMIT_FACTOR: f64 = 1e3;
 
 /// A slider in series with a spring, in a flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,13 +74,9 @@ struct HeldMap<'m> {
 }
 
 impl ReturnMap for HeldMap<'_> {
-    fn returned(
-        &mut self,
-        state: &mut [f64],
-        mut derivative: Option<&mut DMatrix<f64>>,
-    ) -> Result<(), IntegrationError> {
+    fn apply(&mut self, state: &mut [f64], mut derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         let forces: Vec<f64> = self.pins.iter().map(|pin| pin.force(state)).collect();
-        self.map.returned(state, derivative.as_deref_mut())?;
+        self.map.apply(state, derivative.as_deref_mut())?;
         if let Some(derivative) = derivative.as_deref() {
             self.own.copy_from(derivative);
         }
@@ -115,7 +112,7 @@ pub(crate) trait OrbitMap: ReturnMap {
 /// equilibrium, or are unloaded without one. Closes it with the same targets.
 ///
 /// Returns `first` if it is a single orbit, or if the iteration fails.
-pub(crate) fn as_in_equilibrium(
+pub(crate) fn select_equilibrium_orbit(
     map: &mut dyn OrbitMap,
     (system, equilibrium): (&System, Option<&StaticEquilibrium>),
     first: Orbit,
@@ -160,7 +157,7 @@ fn iterate(
         let mut limits = springs.to_vec();
         for spring in &mut limits {
             if pins.iter().any(|pin| pin.spring.state == spring.state) {
-                spring.limit *= HOLDS;
+                spring.limit *= LIMIT_FACTOR;
             }
         }
         map.limit(&limits);
@@ -170,7 +167,7 @@ fn iterate(
         let derivative = pinned.own;
         let iterations = orbit.evidence.iterations + closed.iterations;
         let missing = orbit.evidence.error_estimate;
-        orbit = map.finish(ClosedState { iterations, missing, derivative, ..closed }).ok()?;
+        orbit = map.finish(ClosedState { iterations, distance: missing, derivative, ..closed }).ok()?;
     }
     None
 }
@@ -181,13 +178,13 @@ struct StuckSlider {
     /// Relative displacement at t = 0, m.
     begin: f64,
     /// Actual and required displacement of the relaxed spring, m.
-    is: f64,
-    ought: f64,
+    actual: f64,
+    required: f64,
 }
 
 impl StuckSlider {
     fn gap(&self) -> f64 {
-        self.ought - self.is
+        self.required - self.actual
     }
 }
 
@@ -215,7 +212,7 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<St
             let reach = (reach * (1.0 - 2.0 * RELAXED)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
             let is = begin - orbit.initial_state[spring.state] / spring.stiffness;
-            Some(StuckSlider { spring, begin, is, ought: place.max(high - reach).min(low + reach) })
+            Some(StuckSlider { spring, begin, actual: is, required: place.max(high - reach).min(low + reach) })
         })
         .collect()
 }
@@ -237,7 +234,7 @@ impl AndersonHistory {
         if states != self.states {
             *self = AndersonHistory { states, ..AndersonHistory::default() };
         }
-        let place = DVector::from_iterator(held.len(), held.iter().map(|slider| slider.is));
+        let place = DVector::from_iterator(held.len(), held.iter().map(|slider| slider.actual));
         let gap = DVector::from_iterator(held.len(), held.iter().map(StuckSlider::gap));
         let mut next = &place + &gap;
         let count = self.places.len();

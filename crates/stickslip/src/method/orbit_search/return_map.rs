@@ -17,7 +17,7 @@ use stickslip_numerics::eigen;
 pub(crate) trait ReturnMap {
     /// Replaces `state` by its return, and `derivative` by the derivative of the return by the
     /// state.
-    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError>;
+    fn apply(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError>;
     /// Returns the weights of the energy norm, one per state.
     fn weights(&self) -> &[f64];
     /// Reports the relative change of the state in the last return; infinite before the first.
@@ -25,7 +25,7 @@ pub(crate) trait ReturnMap {
     /// A flow that chooses new steps in every return has a different error in each, so the
     /// iteration may never settle. Once the change is as small as this error, the flow must
     /// keep its steps.
-    fn moves(&mut self, _change: f64) {}
+    fn report_change(&mut self, _change: f64) {}
 }
 
 /// Targets of the iteration.
@@ -59,7 +59,7 @@ pub(crate) struct ClosedState {
     pub iterations: usize,
     /// Estimated distance to the orbit, relative to the state, if the search stopped before
     /// rounding.
-    pub missing: Option<f64>,
+    pub distance: Option<f64>,
 }
 
 /// The algorithm that searches for the closed orbit.
@@ -115,7 +115,7 @@ impl ClosingMethod {
         }
         let first = guess(map);
         let found = self.close(map, &first, aim);
-        let far = aim.rest > 0.0 && norm(map.weights(), &first) > FAR * aim.rest;
+        let far = aim.rest > 0.0 && norm(map.weights(), &first) > RESONANT_GUESS * aim.rest;
         match found {
             Err(error) if far => self.close(map, &vec![0.0; states], aim).map_err(|_| error),
             found => found,
@@ -136,10 +136,10 @@ impl ClosingMethod {
 pub(crate) const APPROACH: usize = 60;
 
 /// Iterates the map [`APPROACH`] times and returns the state.
-pub(crate) fn approached(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64) -> Vec<f64> {
+pub(crate) fn iterate_map(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f64) -> Vec<f64> {
     for _ in 0..APPROACH {
         let mut next = state.clone();
-        if map.returned(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
+        if map.apply(&mut next, None).is_err() || next.iter().any(|z| !z.is_finite()) {
             break;
         }
         state = next.iter().map(|z| sign * z).collect();
@@ -173,10 +173,10 @@ fn settle(
     let mut last_states = VecDeque::with_capacity(MOST_REPEATS + 1);
     let mut hopeless = 0;
     let mut smallest = f64::INFINITY;
-    map.moves(f64::INFINITY);
+    map.report_change(f64::INFINITY);
     for count in 1..=returns {
         let before = state.clone();
-        map.returned(&mut state, None).map_err(broke)?;
+        map.apply(&mut state, None).map_err(broke)?;
         state.iter_mut().for_each(|z| *z *= aim.sign);
         if state.iter().any(|z| !z.is_finite()) {
             return Err(broke(IntegrationError::Unbounded { time: f64::INFINITY, place: None }));
@@ -191,12 +191,12 @@ fn settle(
         if too_large(size, aim) {
             return Err(OrbitError::not_converged(aim.method, aim.omega, count, 1.0));
         }
-        map.moves(residual);
+        map.report_change(residual);
         smallest = f64::min(smallest, residual);
         changes.push(residual);
         last_states.push_front(before);
         last_states.truncate(MOST_REPEATS);
-        if count >= PATIENCE && count.is_power_of_two() {
+        if count >= FIRST_PROGRESS_CHECK && count.is_power_of_two() {
             let distance = |earlier: &Vec<f64>| {
                 let apart: Vec<f64> = state.iter().zip(earlier).map(|(a, b)| a - aim.sign * b).collect();
                 norm(map.weights(), &apart) / size
@@ -205,7 +205,7 @@ fn settle(
             let repeats = last_states.iter().position(|earlier| distance(earlier) <= REPEATS * residual);
             let needed = returns_needed(&changes, tolerance);
             hopeless = if needed <= (returns - count) as f64 { 0 } else { hopeless + 1 };
-            if residual > tolerance && (repeats.is_some() || hopeless == HOPELESS) {
+            if residual > tolerance && (repeats.is_some() || hopeless == FAILED_CHECKS) {
                 let (method, omega) = (aim.method, aim.omega);
                 let repeats = repeats.map(|back| back + 1);
                 return Err(OrbitError::Unsettled {
@@ -240,7 +240,7 @@ fn settle(
         }
         let residual = norm(map.weights(), gap.as_slice()) / size;
         let missing = if at_rounding { ROUNDING } else { missing };
-        return Ok(ClosedState { state, gap, derivative, residual, iterations: count, missing: Some(missing) });
+        return Ok(ClosedState { state, gap, derivative, residual, iterations: count, distance: Some(missing) });
     }
     Err(OrbitError::not_converged(aim.method, aim.omega, returns, smallest))
 }
@@ -255,10 +255,10 @@ fn window(count: usize) -> Option<usize> {
 }
 
 /// Number of returns before the first check for progress; later checks follow whenever it
-/// doubles. The search fails after [`HOPELESS`] negative checks in a row. Beats of neighbouring
-/// modes rise and fall, but not over growing windows.
-const PATIENCE: usize = 1024;
-const HOPELESS: usize = 3;
+/// doubles. The search fails after [`FAILED_CHECKS`] negative checks in a row. Beats of
+/// neighbouring modes rise and fall, but not over growing windows.
+const FIRST_PROGRESS_CHECK: usize = 1024;
+const FAILED_CHECKS: usize = 3;
 /// Most periods of a repeating motion that the check detects, and the largest distance of two
 /// repetitions relative to the change of one return.
 const MOST_REPEATS: usize = 8;
@@ -287,7 +287,7 @@ const ROUNDING: f64 = 1e-14;
 /// Most Newton iterations. A search takes 2 to 4 with a warm start and 5 to 15 without.
 const ITERATIONS: usize = 60;
 /// Most phases of iterating the map before the search fails.
-const RESCUES: usize = 6;
+const DECAY_PHASES: usize = 6;
 /// Most halvings of a Newton step before a phase of iterating the map.
 const HALVINGS: i32 = 4;
 /// Number of returns in the first phase; each later phase is longer by half.
@@ -296,7 +296,7 @@ const RETURNS: usize = 40;
 const LARGEST: f64 = 1e10;
 /// An initial guess larger than rest by this factor (10^3 times the static response) may be a
 /// resonance that friction suppresses.
-const FAR: f64 = 1e6;
+const RESONANT_GUESS: f64 = 1e6;
 
 /// Returns true if the state of an undamped resonance is so large that the work of the loads is
 /// lost in rounding.
@@ -314,18 +314,18 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: ClosingTargets)
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
     let mut state = start.to_vec();
-    for rescue in 0..=RESCUES {
-        let end = descended(map, &state, aim, LargeIncrease::Shortens, &mut iterations)?;
+    for rescue in 0..=DECAY_PHASES {
+        let end = newton_with_line_search(map, &state, aim, LargeIncrease::Shortens, &mut iterations)?;
         if end.residual <= aim.residual {
-            return nearer(map, end, aim);
+            return polish(map, end, aim);
         }
         smallest = smallest.min(end.residual);
-        if rescue == RESCUES || iterations >= ITERATIONS {
+        if rescue == DECAY_PHASES || iterations >= ITERATIONS {
             break;
         }
         state = end.state;
         for _ in 0..returns {
-            map.returned(&mut state, None).map_err(broke)?;
+            map.apply(&mut state, None).map_err(broke)?;
             state.iter_mut().for_each(|z| *z *= aim.sign);
             if state.iter().any(|z| !z.is_finite()) {
                 return Err(broke(IntegrationError::Unbounded { time: f64::INFINITY, place: None }));
@@ -341,7 +341,7 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: ClosingTargets)
 ///
 /// Near a resonance the residual is a small fraction of that distance, and the result would
 /// depend on the path of the iteration.
-fn nearer(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
+fn polish(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
     if closed.residual <= ROUNDING || aim.distance == f64::INFINITY {
         return Ok(closed);
     }
@@ -361,7 +361,7 @@ fn nearer(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> 
                 derivative,
                 residual,
                 iterations: closed.iterations + 1,
-                missing: None,
+                distance: None,
             });
         }
     }
@@ -375,7 +375,7 @@ fn nearer(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> 
 /// Largest factor by which one full step may increase the residual. Beyond a kink the next step
 /// mostly converges, where shortened steps would creep up to the kink. Where shortened steps
 /// succeed, the full steps increase the residual less than twofold.
-const WILD: f64 = 3.0;
+const LARGEST_INCREASE: f64 = 3.0;
 
 /// Range of the residual ratio of a full step near a double root: 1/4 where the distance
 /// halves, 1/3 where the period begins in slip.
@@ -383,15 +383,15 @@ const WILD: f64 = 3.0;
 /// Such a root is the edge of a continuum of stick offsets. A motion that creeps towards it
 /// slips by the square of its distance. The residual reaches rounding when only half of the
 /// digits are correct, and the remaining slip fails the energy balance.
-const HALVES: std::ops::Range<f64> = 0.2..0.4;
+const DOUBLE_ROOT_RATIO: std::ops::Range<f64> = 0.2..0.4;
 /// Number of full steps taken at once after two such steps in a row: two lead to the root, the
 /// rest into the range where the contact sticks. The return from there is at rest.
-const ONTO: f64 = 2.125;
+const DOUBLE_ROOT_STEP: f64 = 2.125;
 /// Largest ratio of the residuals after and before this step. A stuck contact leaves no
 /// residual; a contact that slips on the other side leaves some thousandths.
-const MOSTLY: f64 = 1e-3;
+const DOUBLE_ROOT_DECREASE: f64 = 1e-3;
 
-/// Reaction to a full step that increases the residual by more than [`WILD`].
+/// Reaction to a full step that increases the residual by more than [`LARGEST_INCREASE`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LargeIncrease {
     /// The solver shortens the step.
@@ -405,8 +405,8 @@ pub(crate) enum LargeIncrease {
 ///
 /// It stops when the orbit is closed, when no step reduces the residual enough, when a step
 /// goes too far for `beyond`, or after [`ITERATIONS`]. One full step may increase the residual
-/// by [`WILD`].
-pub(crate) fn descended(
+/// by [`LARGEST_INCREASE`].
+pub(crate) fn newton_with_line_search(
     map: &mut dyn ReturnMap,
     start: &[f64],
     aim: ClosingTargets,
@@ -436,12 +436,15 @@ pub(crate) fn descended(
         let mut accepted = false;
         if residual > aim.residual && *iterations < ITERATIONS {
             let step = newton_step(&derivative, &gap, aim.sign, map.weights());
-            let onto = shares.iter().all(|share| HALVES.contains(share)).then_some((ONTO, MOSTLY));
+            let onto = shares
+                .iter()
+                .all(|share| DOUBLE_ROOT_RATIO.contains(share))
+                .then_some((DOUBLE_ROOT_STEP, DOUBLE_ROOT_DECREASE));
             let shorter = (0..=HALVINGS).map(|halvings| (0.5f64.powi(halvings), DECREASE));
             for (fraction, enough) in onto.into_iter().chain(shorter) {
                 let mut trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
                 if fraction > 1.0 {
-                    if map.returned(&mut trial, None).is_err() {
+                    if map.apply(&mut trial, None).is_err() {
                         continue;
                     }
                     trial.iter_mut().for_each(|z| *z *= aim.sign);
@@ -450,7 +453,7 @@ pub(crate) fn descended(
                 if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
                     let after = norm(map.weights(), trial_gap.as_slice());
                     let less = after <= enough * before;
-                    if less || (bold && fraction == 1.0 && after <= WILD * before) {
+                    if less || (bold && fraction == 1.0 && after <= LARGEST_INCREASE * before) {
                         if !less {
                             (bold, left) = (false, Some((state, before, gap, derivative)));
                         } else if left.as_ref().is_some_and(|(_, least, ..)| after <= *least) {
@@ -461,7 +464,7 @@ pub(crate) fn descended(
                         accepted = true;
                         break;
                     }
-                    if beyond == LargeIncrease::Ends && fraction <= 1.0 && after > WILD * before {
+                    if beyond == LargeIncrease::Ends && fraction <= 1.0 && after > LARGEST_INCREASE * before {
                         break;
                     }
                 }
@@ -477,7 +480,7 @@ pub(crate) fn descended(
                 (state, gap, derivative) = (from, its_gap, its_derivative);
                 continue;
             }
-            return Ok(ClosedState { state, gap, derivative, residual, iterations: *iterations, missing: None });
+            return Ok(ClosedState { state, gap, derivative, residual, iterations: *iterations, distance: None });
         }
     }
 }
@@ -490,7 +493,7 @@ fn evaluate(
     derivative: &mut DMatrix<f64>,
 ) -> Result<DVector<f64>, IntegrationError> {
     let mut end = state.to_vec();
-    map.returned(&mut end, Some(derivative))?;
+    map.apply(&mut end, Some(derivative))?;
     if end.iter().any(|z| !z.is_finite()) {
         return Err(IntegrationError::Unbounded { time: f64::INFINITY, place: None });
     }

@@ -33,12 +33,12 @@ const WINDOW: usize = 33;
 const REPEATS: usize = 8;
 /// Relative distance, in amplitudes, below which two returns count as equal. It covers the end
 /// of a transient and the error of the steps.
-const SAME: f64 = 2e-3;
+const EQUAL_DISTANCE: f64 = 2e-3;
 /// Largest ratio of the distances between returns, half a window apart, of a settling motion.
 /// Beats exceed it now and then; the test applies it twice to make errors rare.
-const CALMS: f64 = 0.9;
+const SETTLING_RATIO: f64 = 0.9;
 /// Displacement over the window, in amplitudes, above which a place drifts.
-const MOVED: f64 = 2.0;
+const DRIFT_DISTANCE: f64 = 2.0;
 /// Instants of the last period at which the contacts are sampled.
 const INSTANTS: usize = 128;
 
@@ -48,7 +48,7 @@ type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
 /// Classifies the motion from a state and returns it with its last period and its last state.
 ///
 /// Returns `None` if no integration in equal steps takes the system, or if it breaks down.
-pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option<Followed> {
+pub(crate) fn classify_motion(system: &System, omega: f64, mut start: Vec<f64>) -> Option<Followed> {
     if system.dofs() > LARGEST
         || system.joints().len() > JOINTS
         || IntegratorKind::of(system, None) != IntegratorKind::Incremental
@@ -65,12 +65,12 @@ pub(crate) fn course(system: &System, omega: f64, mut start: Vec<f64>) -> Option
         flow.set_scaled_drive(system, omega, share);
         flow.run(&mut state, period, None).ok()?;
     }
-    flow.set_drive(system, omega);
+    flow.set_excitation(system, omega);
     let mut returns = VecDeque::with_capacity(WINDOW);
     let (mut count, mut next) = (0, PERIODS);
     loop {
         count += 1;
-        flow.keep(count == next);
+        flow.set_recording(count == next);
         flow.run(&mut state, period, None).ok()?;
         if returns.len() == WINDOW {
             returns.pop_front();
@@ -108,10 +108,12 @@ fn classified(
         each.fold(0.0, f64::max)
     };
     let apart = |p: usize| apart_at(last, p);
-    if let Some(periods) = (1..=REPEATS).find(|p| apart(*p) <= SAME * swing) {
+    if let Some(periods) = (1..=REPEATS).find(|p| apart(*p) <= EQUAL_DISTANCE * swing) {
         return if periods == 1 { ObservedMotion::Settles } else { ObservedMotion::Repeats { periods } };
     }
-    if apart(1) <= CALMS * apart_at(last / 2, 1) && apart_at(last / 2, 1) <= CALMS * apart_at(REPEATS + 1, 1) {
+    if apart(1) <= SETTLING_RATIO * apart_at(last / 2, 1)
+        && apart_at(last / 2, 1) <= SETTLING_RATIO * apart_at(REPEATS + 1, 1)
+    {
         return ObservedMotion::Settling { periods };
     }
     let open = |j: usize| {
@@ -131,7 +133,7 @@ fn classified(
         (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, place)
     });
     let farthest = farthest.fold((0.0, ""), |a, (way, place)| if way > a.0 { (way, place.as_str()) } else { a });
-    if farthest.0 > MOVED * swing {
+    if farthest.0 > DRIFT_DISTANCE * swing {
         let (way, place) = (farthest.0, farthest.1.to_owned());
         return ObservedMotion::Drifts { place, drift: way, periods: last, joint, open_fraction: share };
     }
@@ -169,9 +171,9 @@ mod tests {
     /// the excess load.
     #[test]
     fn a_block_stays_slides_or_leaves() {
-        assert_eq!(course(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
+        assert_eq!(classify_motion(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
-            let (course, ..) = course(&block(load), OMEGA, Vec::new()).unwrap();
+            let (course, ..) = classify_motion(&block(load), OMEGA, Vec::new()).unwrap();
             let ObservedMotion::Drifts { ref place, drift, periods, open_fraction, .. } = course else {
                 panic!("{course}")
             };
@@ -189,7 +191,7 @@ mod tests {
     fn what_repeats_is_told_from_what_does_not() {
         let system = block([0.0, 10.0]);
         let returns = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
-        let path = course(&system, OMEGA, Vec::new()).unwrap().1;
+        let path = classify_motion(&system, OMEGA, Vec::new()).unwrap().1;
         let samples = [path.sample(0.0)];
         let third = classified(&system, OMEGA, (PERIODS, &returns(&|k| (k % 3) as f64)), &samples);
         assert_eq!(third, ObservedMotion::Repeats { periods: 3 });

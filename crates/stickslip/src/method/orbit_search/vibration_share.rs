@@ -14,7 +14,7 @@ use crate::orbit::{Evidence, Path, Symmetry};
 const INSTANTS: usize = 32;
 /// A search is repeated if it assumed a fraction larger than the actual one by more than this
 /// factor.
-const NEARLY: f64 = 2.0;
+const FRACTION_FACTOR: f64 = 2.0;
 /// Smallest fraction. It leaves the vibration at least the nine digits that its search needs,
 /// of the sixteen of the state.
 const LEAST: f64 = 1e-6;
@@ -24,7 +24,7 @@ pub(crate) const SMALL: f64 = 1e-3;
 /// Returns the size of the vibration over the size of the state `start`, in the energy norm
 /// with `weights` (displacements, velocities, states of the joints). Sizes below `rest` (√J)
 /// count as `rest`.
-pub(crate) fn share(
+pub(crate) fn fraction(
     path: &dyn Path,
     (symmetry, period): (Symmetry, f64),
     start: &[f64],
@@ -54,8 +54,8 @@ pub(crate) fn share(
 ///
 /// # Errors
 /// Fails if the vibration has too few digits of its state.
-pub(crate) fn next(taken: f64, found: f64) -> Result<Option<f64>, IntegrationError> {
-    match taken <= NEARLY * found {
+pub(crate) fn next_fraction(taken: f64, found: f64) -> Result<Option<f64>, IntegrationError> {
+    match taken <= FRACTION_FACTOR * found {
         true => Ok(None),
         false if found < LEAST => Err(IntegrationError::Offset { share: found }),
         false => Ok(Some(found)),
@@ -63,7 +63,7 @@ pub(crate) fn next(taken: f64, found: f64) -> Result<Option<f64>, IntegrationErr
 }
 
 /// Converts evidence relative to the state into evidence relative to the vibration.
-pub(crate) fn relate(evidence: &mut Evidence, share: f64) {
+pub(crate) fn rescale_evidence(evidence: &mut Evidence, share: f64) {
     evidence.residual /= share;
     for relative in [&mut evidence.error_estimate, &mut evidence.return_defect] {
         *relative = relative.map(|of_state| of_state / share);

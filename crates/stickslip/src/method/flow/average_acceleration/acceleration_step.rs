@@ -84,12 +84,12 @@ pub(super) struct AccelerationStep {
 const ITERATIONS: usize = 60;
 /// Number of iterations after which the Newton step is halved, which ends a cycle between two
 /// sides of a kink.
-const PATIENCE: usize = 20;
+const FULL_STEPS: usize = 20;
 /// Correction relative to the velocity scale that ends the iteration: it is at the level of
 /// rounding.
 const SMALL: f64 = 1e-13;
 /// Relative correction that is accepted if rounding prevents further convergence.
-const ENOUGH: f64 = 1e-9;
+const ACCEPTED_CORRECTION: f64 = 1e-9;
 
 impl AccelerationStep {
     pub fn new(assembly: &Assembly) -> Self {
@@ -121,7 +121,7 @@ impl AccelerationStep {
             let internal = joint.internal();
             let at = LawInstant { motion: self.to[q], z: &state[2 * n + internal.start..2 * n + internal.end] };
             let law = &mut self.laws[q];
-            law.rest(&joint.law, at);
+            law.evaluate(&joint.law, at);
             joint.axes().zip(&law.force).for_each(|(axis, force)| self.force[axis] = *force);
         }
     }
@@ -172,9 +172,9 @@ impl AccelerationStep {
             if !self.residual.iter().all(|r| r.is_finite()) {
                 return false;
             }
-            let share = if iteration < PATIENCE { 1.0 } else { 0.5 };
+            let share = if iteration < FULL_STEPS { 1.0 } else { 0.5 };
             self.unknown.iter_mut().zip(&self.residual).for_each(|(w, step)| *w -= share * step);
-            converged = size <= SMALL || (size <= ENOUGH && size >= previous);
+            converged = size <= SMALL || (size <= ACCEPTED_CORRECTION && size >= previous);
             previous = size;
         }
         if !converged {
@@ -233,7 +233,7 @@ impl AccelerationStep {
                 for (row, gain) in gains.iter().enumerate() {
                     self.residual[row] -= gain * law.force[d];
                     for (e, other) in joint.axes().enumerate() {
-                        matrix[row * j + other] -= gain * joint.by_end(law.force_slope(d), e, h);
+                        matrix[row * j + other] -= gain * joint.derivative_by_end_velocity(law.force_slope(d), e, h);
                     }
                 }
             }

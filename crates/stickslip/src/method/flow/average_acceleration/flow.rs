@@ -18,18 +18,18 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// Initial number of steps of an interval.
-pub(crate) const FIRST: usize = 256;
+pub(crate) const INITIAL_STEPS: usize = 256;
 /// Largest number of steps of an interval. Linear motion then has an error below 1e-9, and a
 /// run takes about 0.1 s for one joint.
-pub(crate) const MOST: usize = 1 << 16;
+pub(crate) const MAX_STEPS: usize = 1 << 16;
 /// Relative error of an interval of a transient: the change of the extrapolated limit from two
 /// step sizes when both are halved.
 const TOLERANCE: f64 = 1e-6;
 /// Fraction of the tolerance below which the next interval tries half as many steps. Halving
 /// the steps reduces the error to a sixteenth without kinks, and to a quarter with kinks.
-const EASY: f64 = 0.05;
+const COARSENING_FRACTION: f64 = 0.05;
 /// Smallest number of steps of an interval of a transient.
-const FIRST_FOLLOWED: usize = 64;
+const MIN_STEPS: usize = 64;
 
 /// Reason for rejecting a law without a smooth approximation.
 const DROPS: &str =
@@ -83,7 +83,7 @@ impl AverageAccelerationFlow {
         })?;
         Ok(AverageAccelerationFlow {
             drive: HarmonicExcitation::default(),
-            count: FIRST,
+            count: INITIAL_STEPS,
             share: 1.0,
             keep: false,
             steps: StepRecord::new(vec![(1.0, 1.0)], &assembly),
@@ -122,7 +122,7 @@ impl AverageAccelerationFlow {
     }
 
     /// Runs from `state` and returns the end state with the record of the run.
-    fn tried(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, StepRecord), IntegrationError> {
+    fn trial(&mut self, state: &[f64], duration: f64) -> Result<(Vec<f64>, StepRecord), IntegrationError> {
         let mut end = state.to_vec();
         self.run(&mut end, duration, None)?;
         let empty = StepRecord::new(self.steps.nodes.clone(), &self.assembly);
@@ -132,7 +132,7 @@ impl AverageAccelerationFlow {
     fn keep_instant(&mut self, state: &[f64], time: f64) {
         let force = self.step.force.as_slice();
         self.drive.load(time, &mut self.load);
-        let acceleration = self.steps.keep_instant(state, force);
+        let acceleration = self.steps.push_instant(state, force);
         self.assembly.accelerate(state, &mut self.load, force, acceleration);
     }
 
@@ -145,7 +145,7 @@ impl AverageAccelerationFlow {
         let contact = laws.map(|(joint, law)| law.contact(&joint.law, &velocity[joint.axes()]));
         let (x, rest) = state.split_at(n);
         self.steps.spans.push((time, h));
-        self.steps.keep_node([x, &rest[..n]], [&velocity, self.step.force.as_slice()], contact);
+        self.steps.push_node([x, &rest[..n]], [&velocity, self.step.force.as_slice()], contact);
         self.keep_instant(state, time + h);
     }
 
@@ -160,7 +160,7 @@ impl Flow for AverageAccelerationFlow {
         self.assembly.states()
     }
 
-    fn set_drive(&mut self, system: &System, omega: f64) {
+    fn set_excitation(&mut self, system: &System, omega: f64) {
         self.drive = self.assembly.drive(system, omega);
     }
 
@@ -172,7 +172,7 @@ impl Flow for AverageAccelerationFlow {
         self.assembly.energy_scale(&self.drive)
     }
 
-    fn set_share(&mut self, share: f64) {
+    fn set_step_fraction(&mut self, share: f64) {
         self.share = share;
     }
 
@@ -193,7 +193,7 @@ impl Flow for AverageAccelerationFlow {
         let mut carried =
             sensitivity.as_deref().map(|sensitivity| Sensitivity::new(&self.assembly, &self.step.laws, sensitivity));
         // a preloaded joint can start the motion of a system at rest without loads
-        let pushed = NEAR_REST * duration * self.assembly.pushed(self.step.force.as_slice());
+        let pushed = NEAR_REST * duration * self.assembly.largest_acceleration(self.step.force.as_slice());
         let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
         if self.keep {
             self.keep_instant(state, 0.0);
@@ -202,7 +202,7 @@ impl Flow for AverageAccelerationFlow {
             let time = i as f64 * h;
             if !self.step.advance(&self.assembly, &eliminated, &self.drive, (time, state), scale) {
                 return Err(match self.step.without_number(&self.assembly) {
-                    Some(joint) => joint.no_number(time),
+                    Some(joint) => joint.not_finite_error(time),
                     None => IntegrationError::Stalled { time, step: h },
                 });
             }
@@ -223,12 +223,14 @@ impl Flow for AverageAccelerationFlow {
         Ok(())
     }
 
-    fn follow(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
+    fn run_accurately(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
         let (weights, rest) = (self.weights(), NEAR_REST * self.energy_scale());
         let mut coarse = loop {
-            match self.tried(state, duration) {
+            match self.trial(state, duration) {
                 // steps that are too large for the states of a law are halved
-                Err(IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. }) if self.count < MOST => {
+                Err(IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. })
+                    if self.count < MAX_STEPS =>
+                {
                     self.count *= 2
                 }
                 found => break found?,
@@ -237,7 +239,7 @@ impl Flow for AverageAccelerationFlow {
         let mut before: Option<Vec<f64>> = None;
         loop {
             self.count *= 2;
-            let fine = self.tried(state, duration)?;
+            let fine = self.trial(state, duration)?;
             let mut end = coarse.0;
             extrapolate(&mut end, &fine.0);
             if let Some(before) = before {
@@ -249,10 +251,11 @@ impl Flow for AverageAccelerationFlow {
                     self.steps = coarse.1.extrapolated(&fine.1);
                     // the next interval begins with the same number of steps, or with half of
                     // it
-                    self.count = (self.count / if error < EASY * TOLERANCE { 8 } else { 4 }).max(FIRST_FOLLOWED);
+                    self.count =
+                        (self.count / if error < COARSENING_FRACTION * TOLERANCE { 8 } else { 4 }).max(MIN_STEPS);
                     return Ok(());
                 }
-                if self.count >= MOST {
+                if self.count >= MAX_STEPS {
                     return Err(IntegrationError::Unresolved {
                         steps: self.count,
                         estimate: error,
@@ -264,13 +267,13 @@ impl Flow for AverageAccelerationFlow {
         }
     }
 
-    fn strengthen(&mut self, joints: &[usize], factor: f64) {
+    fn scale_limits(&mut self, joints: &[usize], factor: f64) {
         let mut springs = self.springs();
         springs.iter_mut().filter(|spring| joints.contains(&spring.joint)).for_each(|spring| spring.limit *= factor);
         self.limit(&springs);
     }
 
-    fn keep(&mut self, keep: bool) {
+    fn set_recording(&mut self, keep: bool) {
         self.keep = keep;
     }
 

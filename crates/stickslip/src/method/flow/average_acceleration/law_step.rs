@@ -59,7 +59,7 @@ pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
 ///
 /// A law that depends on the path alone takes one step; a law with a rate view takes many small
 /// ones. The states are unchanged if a step has no solution.
-pub(crate) fn moved(
+pub(crate) fn states_after_motion(
     law: &SharedLaw,
     (directions, state_scale): (usize, f64),
     (from, states): ([f64; MAX_DIRECTIONS], &[f64]),
@@ -143,11 +143,11 @@ pub(super) struct LawIntegrator {
 const ITERATIONS: usize = 60;
 /// Largest change of a state per iteration, in units of its scale. Without this limit, a law
 /// that is exponential in its states would diverge.
-const STRIDE: f64 = 2.0;
+const MAX_STATE_CHANGE: f64 = 2.0;
 /// Relative change of the states that ends the iteration.
 const SMALL: f64 = 1e-13;
 /// Relative change that is accepted if rounding prevents further convergence.
-const ENOUGH: f64 = 1e-9;
+const ACCEPTED_CHANGE: f64 = 1e-9;
 
 impl LawIntegrator {
     /// Creates it for a law with [`states`].
@@ -211,7 +211,7 @@ impl LawIntegrator {
 
     /// Evaluates the force of a state, as a step of zero length. The derivatives with respect
     /// to the motion are stored at u₁ and u₁'.
-    pub fn rest(&mut self, law: &SharedLaw, at: LawInstant) {
+    pub fn evaluate(&mut self, law: &SharedLaw, at: LawInstant) {
         if self.view == View::Rate {
             self.slopes.fill(0.0);
             let (directions, states, width) = (self.directions, self.states, self.arguments());
@@ -246,7 +246,7 @@ impl LawIntegrator {
         self.slopes.fill(0.0);
         match self.view {
             View::Pieces => {
-                self.slide(from, to);
+                self.evaluate_pieces(from, to);
                 true
             }
             View::Step => {
@@ -308,7 +308,7 @@ impl LawIntegrator {
     }
 
     /// Evaluates stops and ideal sliders in series with springs, whose forces are the states.
-    fn slide(&mut self, from: LawInstant, to: &RelativeMotion<f64>) {
+    fn evaluate_pieces(&mut self, from: LawInstant, to: &RelativeMotion<f64>) {
         let (states, width) = (self.states, self.arguments());
         let (u0, u1) = (from.motion.displacement[0], to.displacement[0]);
         let (z, after) = (2, 2 + states); // arguments: u₀, u₀', z₀, u₁, u₁'
@@ -369,14 +369,14 @@ impl LawIntegrator {
             }
             self.lu.solve(&mut self.change);
             let size = self.change.iter().fold(0.0f64, |size, c| size.max(c.abs() / self.state_scale));
-            let share = if size > STRIDE { STRIDE / size } else { 1.0 };
+            let share = if size > MAX_STATE_CHANGE { MAX_STATE_CHANGE / size } else { 1.0 };
             self.state.iter_mut().zip(&self.change).for_each(|(z, change)| *z += share * change);
             if !self.state.iter().all(|z| z.is_finite()) {
                 self.state.copy_from_slice(from.z);
                 return false;
             }
             let largest = self.state.iter().fold(self.state_scale, |size, z| size.max(z.abs())) / self.state_scale;
-            found = size <= SMALL * largest || (size <= ENOUGH && size >= previous);
+            found = size <= SMALL * largest || (size <= ACCEPTED_CHANGE && size >= previous);
             previous = size;
         }
         if !found {

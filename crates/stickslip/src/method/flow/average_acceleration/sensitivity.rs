@@ -54,7 +54,7 @@ impl Sensitivity {
             for (d, axis) in joint.axes().enumerate() {
                 let out = &mut carried.force.as_mut_slice()[axis * columns..(axis + 1) * columns];
                 // start and end of a step of zero length coincide
-                known(out, law.force_slope(d), (joint, axes), (&carried.along, &carried.state, 2 * n), 0.0);
+                add_known_terms(out, law.force_slope(d), (joint, axes), (&carried.along, &carried.state, 2 * n), 0.0);
                 let (after, width) = (2 * joint.directions + joint.states, joint.directions);
                 for (e, other) in joint.axes().enumerate() {
                     add(out, law.force_slope(d)[after + width + e], row(&carried.along, axes + other, columns));
@@ -89,7 +89,7 @@ impl Sensitivity {
         for (joint, law) in assembly.joints.iter().zip(laws) {
             for (d, axis) in joint.axes().enumerate() {
                 let out = &mut self.direct[axis * columns..(axis + 1) * columns];
-                known(out, law.force_slope(d), (joint, axes), (&self.along, &self.state, 2 * n), h);
+                add_known_terms(out, law.force_slope(d), (joint, axes), (&self.along, &self.state, 2 * n), h);
             }
         }
         for (axis, out) in self.unknown.chunks_exact_mut(columns).enumerate() {
@@ -107,15 +107,19 @@ impl Sensitivity {
         for (joint, law) in assembly.joints.iter().zip(laws) {
             for (s, own) in joint.internal().enumerate() {
                 let (slope, out) = (law.state_slope(s), &mut self.internal[own * columns..(own + 1) * columns]);
-                known(out, slope, (joint, axes), (&self.along, &self.state, 2 * n), h);
+                add_known_terms(out, slope, (joint, axes), (&self.along, &self.state, 2 * n), h);
                 for (e, axis) in joint.axes().enumerate() {
-                    add(out, joint.by_end(slope, e, h), row(&self.unknown, axis, columns));
+                    add(out, joint.derivative_by_end_velocity(slope, e, h), row(&self.unknown, axis, columns));
                 }
             }
             for (d, axis) in joint.axes().enumerate() {
                 let out = &mut self.force.as_mut_slice()[axis * columns..(axis + 1) * columns];
                 for (e, other) in joint.axes().enumerate() {
-                    add(out, joint.by_end(law.force_slope(d), e, h), row(&self.unknown, other, columns));
+                    add(
+                        out,
+                        joint.derivative_by_end_velocity(law.force_slope(d), e, h),
+                        row(&self.unknown, other, columns),
+                    );
                 }
             }
         }
@@ -155,7 +159,7 @@ fn row(rows: &[f64], index: usize, columns: usize) -> &[f64] {
 ///
 /// These are the motion along the `axes` and the states of the law. `first` is the column of
 /// the first law state in the derivatives of the state.
-fn known(
+fn add_known_terms(
     out: &mut [f64],
     slope: &[f64],
     (joint, axes): (&IndexedLaw, usize),

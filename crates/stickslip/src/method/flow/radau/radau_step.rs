@@ -191,7 +191,7 @@ fn subtract(matrix: &mut [f64], columns: usize, column: usize, gains: &[f64], by
 }
 
 /// Returns the index of a stage's internal state among the unknowns.
-fn at_state(assembly: &Assembly, stage: usize, s: usize) -> usize {
+fn state_index(assembly: &Assembly, stage: usize, s: usize) -> usize {
     STAGES * assembly.axes.len() + stage * assembly.internal + s
 }
 
@@ -202,7 +202,7 @@ impl RadauStep {
             unknown: vec![0.0; unknowns],
             held: vec![false; j],
             force: DVector::zeros(STAGES * j),
-            points: (0..STAGES).flat_map(|_| points(assembly)).collect(),
+            points: (0..STAGES).flat_map(|_| evaluation_points(assembly)).collect(),
             linear: DVector::zeros(2 * assembly.n),
             stages: DVector::zeros(2 * STAGES * assembly.n),
             free: DVector::zeros(STAGES * j),
@@ -219,8 +219,8 @@ impl RadauStep {
 
     /// Solves the step from `state`, with `self.unknown` as the initial guess.
     ///
-    /// `derivatives` requests the factors at the solution for [`RadauStep::carry`]. Returns false if
-    /// the iteration does not converge.
+    /// `derivatives` requests the factors at the solution for [`RadauStep::carry`]. Returns false
+    /// if the iteration does not converge.
     pub fn solve(
         &mut self,
         assembly: &Assembly,
@@ -284,7 +284,7 @@ impl RadauStep {
     }
 
     /// Returns the joint whose law returned NaN in the last attempt.
-    pub fn without_number<'a>(&self, assembly: &'a Assembly) -> Option<&'a IndexedLaw> {
+    pub fn joint_with_nan<'a>(&self, assembly: &'a Assembly) -> Option<&'a IndexedLaw> {
         let broken = |point: &RatePoint| point.force.iter().chain(&point.rate).any(|value| value.is_nan());
         let joints = assembly.joints.iter().cycle();
         joints.zip(&self.points).find_map(|(joint, point)| broken(point).then_some(joint))
@@ -309,7 +309,7 @@ impl RadauStep {
                     motion.displacement[d] = u;
                     motion.velocity[d] = self.unknown[stage * j + axis];
                 }
-                let first = at_state(assembly, stage, joint.first_state);
+                let first = state_index(assembly, stage, joint.first_state);
                 let z = &self.unknown[first..first + joint.states];
                 let point = &mut self.points[stage * assembly.joints.len() + q];
                 if let Some(rate) = joint.law.rate() {
@@ -357,7 +357,7 @@ impl RadauStep {
             for (q, joint) in assembly.joints.iter().enumerate() {
                 let point = &self.points[stage * joints + q];
                 let directions = joint.directions;
-                let first = at_state(assembly, stage, joint.first_state);
+                let first = state_index(assembly, stage, joint.first_state);
                 for (d, axis) in joint.axes().enumerate() {
                     let column = stage * j + axis;
                     let gains = &g[column * STAGES * j..(column + 1) * STAGES * j];
@@ -385,7 +385,7 @@ impl RadauStep {
             let directions = joint.directions;
             for s in 0..joint.states {
                 for stage in 0..STAGES {
-                    let row = at_state(assembly, stage, joint.first_state + s);
+                    let row = state_index(assembly, stage, joint.first_state + s);
                     self.residual[row] = self.unknown[row] - state[2 * n + joint.first_state + s];
                     let entries = &mut jacobian[row * unknowns..(row + 1) * unknowns];
                     for k in 0..STAGES {
@@ -402,7 +402,7 @@ impl RadauStep {
                                 }
                             }
                         }
-                        let first = at_state(assembly, k, joint.first_state);
+                        let first = state_index(assembly, k, joint.first_state);
                         for t in 0..joint.states {
                             entries[first + t] -= weight * slope[2 * directions + t];
                         }
@@ -416,7 +416,7 @@ impl RadauStep {
     pub fn end(&self, assembly: &Assembly, eliminated: &RadauElimination, loads: &StageLoads, out: &mut [f64]) {
         let n = assembly.n;
         self.combine(&eliminated.end, loads, &mut out[..2 * n]);
-        let last = at_state(assembly, STAGES - 1, 0);
+        let last = state_index(assembly, STAGES - 1, 0);
         out[2 * n..].copy_from_slice(&self.unknown[last..last + assembly.internal]);
     }
 
@@ -456,21 +456,21 @@ impl RadauStep {
             memory.resize(rows * columns, 0.0);
         }
         add_rows(&eliminated.velocity_from_state, derivative, &mut self.right, columns);
-        self.answer_to_start(assembly, eliminated.length, derivative, columns);
+        self.forces_from_start(assembly, eliminated.length, derivative, columns);
         add_rows(&eliminated.velocity_from_force, &self.answer, &mut self.right, columns);
         self.lu.solve_rows(&mut self.right, columns);
-        self.answer_to_stages(assembly, eliminated.length, columns);
+        self.add_forces_from_stages(assembly, eliminated.length, columns);
         add_rows(&eliminated.end[0], derivative, &mut self.carried, columns);
         add_rows(&eliminated.end[2], &self.answer, &mut self.carried, columns);
         let (linear, inside) = derivative.split_at_mut(2 * n * columns);
         linear.copy_from_slice(&self.carried);
-        let last = at_state(assembly, STAGES - 1, 0) * columns;
+        let last = state_index(assembly, STAGES - 1, 0) * columns;
         inside.copy_from_slice(&self.right[last..last + internal * columns]);
     }
 
     /// Computes the effect of the displacements and internal states at the start of a step
     /// through the laws: forces in `answer`, internal states in `right`.
-    fn answer_to_start(&mut self, assembly: &Assembly, h: f64, start: &[f64], columns: usize) {
+    fn forces_from_start(&mut self, assembly: &Assembly, h: f64, start: &[f64], columns: usize) {
         let (n, j, joints) = (assembly.n, assembly.axes.len(), assembly.joints.len());
         for (q, joint) in assembly.joints.iter().enumerate() {
             for stage in 0..STAGES {
@@ -484,7 +484,7 @@ impl RadauStep {
                     }
                 }
                 for s in 0..joint.states {
-                    let at = at_state(assembly, stage, joint.first_state + s);
+                    let at = state_index(assembly, stage, joint.first_state + s);
                     let out = row_mut(&mut self.right, at, columns);
                     axpy(1.0, row(start, 2 * n + joint.first_state + s, columns), out);
                     for (e, moved) in joint.axes().enumerate() {
@@ -501,11 +501,11 @@ impl RadauStep {
     }
 
     /// Adds to `answer` the effect of the stages in `right` through the laws.
-    fn answer_to_stages(&mut self, assembly: &Assembly, h: f64, columns: usize) {
+    fn add_forces_from_stages(&mut self, assembly: &Assembly, h: f64, columns: usize) {
         let (j, joints) = (assembly.axes.len(), assembly.joints.len());
         for stage in 0..STAGES {
             for (q, joint) in assembly.joints.iter().enumerate() {
-                let first = at_state(assembly, stage, joint.first_state);
+                let first = state_index(assembly, stage, joint.first_state);
                 for (d, axis) in joint.axes().enumerate() {
                     let slope = self.points[stage * joints + q].force_slope(d);
                     let out = row_mut(&mut self.answer, stage * j + axis, columns);
@@ -543,7 +543,7 @@ impl RadauStep {
         self.combine(&eliminated.increments, loads, &mut out[..2 * n]);
         for s in 0..assembly.internal {
             let increments = ERROR_WEIGHTS.iter().enumerate().map(|(i, weight)| {
-                weight / eliminated.length * (self.unknown[at_state(assembly, i, s)] - state[2 * n + s])
+                weight / eliminated.length * (self.unknown[state_index(assembly, i, s)] - state[2 * n + s])
             });
             out[2 * n + s] = increments.sum();
         }
@@ -587,7 +587,7 @@ fn add_rows(matrix: &DMatrix<f64>, x: &[f64], out: &mut [f64], columns: usize) {
 }
 
 /// Creates one evaluation point per law.
-pub(crate) fn points(assembly: &Assembly) -> Vec<RatePoint> {
+pub(crate) fn evaluation_points(assembly: &Assembly) -> Vec<RatePoint> {
     assembly.joints.iter().map(|joint| RatePoint::new(joint.directions, joint.states)).collect()
 }
 

@@ -4,7 +4,7 @@
 //! Therefore all steps of one size share one elimination of the structure, and every run over
 //! the same interval ends exactly at its end.
 
-use super::radau_step::{RadauElimination, RadauStep, StageLoads, points};
+use super::radau_step::{RadauElimination, RadauStep, StageLoads, evaluation_points};
 use crate::law::{RatePoint, RelativeMotion};
 use crate::method::IntegrationError;
 use crate::method::flow::Flow;
@@ -21,8 +21,8 @@ use stickslip_numerics::radau::{BUTCHER_MATRIX, ERROR_WEIGHTS, ESTIMATE_ORDER, N
 /// The time interval has `2^LEVELS` ticks. The finest layers of the arctan law need about
 /// `2^20` steps per half period.
 const LEVELS: usize = 44;
-/// The largest step is the interval divided by `2^COARSEST`.
-const COARSEST: usize = 4;
+/// The largest step is the interval divided by `2^MIN_LEVEL`.
+const MIN_LEVEL: usize = 4;
 /// The first step of a run is the interval divided by `2^FIRST_LEVEL`. The step size control
 /// corrects it at once.
 const FIRST_LEVEL: usize = 12;
@@ -32,12 +32,12 @@ const STEP_LIMIT: usize = 200_000;
 /// Ratio of the velocity to the initial scale above which a motion without an acceptable step
 /// size counts as unbounded. Errors are relative to the initial scale and vanish in rounding at
 /// a ratio of 1e7. Contacts that are too stiff fail at ratios of a few.
-const ESCAPED: f64 = 1e5;
+const UNBOUNDED_RATIO: f64 = 1e5;
 /// Fraction of the tolerance for the error of the next step.
 const SAFETY: f64 = 0.8;
 /// Growth of the number of steps at which halved steps are replaced by newly chosen ones.
 /// Layers move and leave short steps behind.
-const GROWN: usize = 2;
+const RECHOICE_RATIO: usize = 2;
 
 /// The source of the step sizes of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub(crate) struct RadauFlow {
     accepted: usize,
     rejected: usize,
     again: bool,
-    stretch: f64,
+    interval: f64,
     eliminated: Vec<Option<RadauElimination>>,
     /// Extrapolation weights from the stages of one step to those of the next one, by the
     /// difference of their levels.
@@ -111,13 +111,13 @@ impl RadauFlow {
             accepted: 0,
             rejected: 0,
             again: false,
-            stretch: 0.0,
+            interval: 0.0,
             eliminated: vec![None; LEVELS + 1],
             onward: vec![None; 2 * LEVELS + 1],
             step: RadauStep::new(&assembly),
             loads: StageLoads::default(),
             level: FIRST_LEVEL,
-            laws: points(&assembly),
+            laws: evaluation_points(&assembly),
             slope: vec![0.0; states],
             next: vec![0.0; states],
             next_slope: vec![0.0; states],
@@ -166,8 +166,8 @@ impl RadauFlow {
             }
             return;
         };
-        let onward =
-            self.onward[LEVELS + self.level - level].get_or_insert_with(|| NODES.map(|c| onward(1.0 + c * h / length)));
+        let onward = self.onward[LEVELS + self.level - level]
+            .get_or_insert_with(|| NODES.map(|c| extrapolation_weights(1.0 + c * h / length)));
         for (i, weights) in onward.iter().enumerate() {
             for (offset, count) in [(0, j), (STAGES * j, internal)] {
                 for k in 0..count {
@@ -230,7 +230,7 @@ impl RadauFlow {
         let mut shifted = std::mem::take(&mut self.next);
         let laws = self.laws.clone();
         self.set_laws(&shifted, time);
-        slope(
+        time_derivative(
             &self.assembly,
             (&shifted, &mut self.load, &mut self.force),
             &self.laws,
@@ -288,7 +288,7 @@ impl RadauFlow {
     fn keep_instant(&mut self, state: &[f64], time: f64) {
         forces(&self.assembly, &self.laws, &mut self.force);
         self.drive.load(time, &mut self.load);
-        let acceleration = self.steps.keep_instant(state, &self.force);
+        let acceleration = self.steps.push_instant(state, &self.force);
         self.assembly.accelerate(state, &mut self.load, &self.force, acceleration);
     }
 
@@ -304,7 +304,7 @@ impl RadauFlow {
             let joints = self.assembly.joints.iter();
             let contact = joints.map(|joint| joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]));
             let of = i * n..(i + 1) * n;
-            self.steps.keep_node([&x[of.clone()], &v[of]], [velocity, force], contact);
+            self.steps.push_node([&x[of.clone()], &v[of]], [velocity, force], contact);
         }
     }
 
@@ -321,11 +321,11 @@ impl RadauFlow {
     fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> IntegrationError {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
-        if fastest > ESCAPED * speed {
+        if fastest > UNBOUNDED_RATIO * speed {
             return IntegrationError::Unbounded { time, place: self.assembly.farthest(state) };
         }
-        match self.step.without_number(&self.assembly) {
-            Some(joint) => joint.no_number(time),
+        match self.step.joint_with_nan(&self.assembly) {
+            Some(joint) => joint.not_finite_error(time),
             None => IntegrationError::Stalled { time, step },
         }
     }
@@ -373,7 +373,7 @@ impl RadauFlow {
 
 /// Returns the weights of the stages in the collocation polynomial of a step at `s`, where `s`
 /// is relative to the step size.
-pub(in crate::method) fn onward(s: f64) -> [f64; STAGES] {
+pub(in crate::method) fn extrapolation_weights(s: f64) -> [f64; STAGES] {
     std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - NODES[r]) / (NODES[q] - NODES[r])).product())
 }
 
@@ -385,7 +385,7 @@ fn forces(assembly: &Assembly, laws: &[RatePoint], force: &mut [f64]) {
 }
 
 /// Computes the time derivative of a state for evaluated laws.
-pub(in crate::method) fn slope(
+pub(in crate::method) fn time_derivative(
     assembly: &Assembly,
     (state, load, force): (&[f64], &mut [f64], &mut [f64]),
     laws: &[RatePoint],
@@ -410,7 +410,7 @@ impl Flow for RadauFlow {
         self.assembly.states()
     }
 
-    fn set_drive(&mut self, system: &System, omega: f64) {
+    fn set_excitation(&mut self, system: &System, omega: f64) {
         self.drive = self.assembly.drive(system, omega);
     }
 
@@ -432,8 +432,8 @@ impl Flow for RadauFlow {
         duration: f64,
         sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), IntegrationError> {
-        if self.stretch != duration {
-            self.stretch = duration;
+        if self.interval != duration {
+            self.interval = duration;
             self.eliminated.fill(None);
             self.onward.fill(None);
         }
@@ -447,7 +447,7 @@ impl Flow for RadauFlow {
         // same level, for equal bits
         self.level = FIRST_LEVEL;
         let lengths = match self.lengths {
-            StepSizes::Halved if self.mesh.len() > GROWN * self.chosen => StepSizes::Chosen,
+            StepSizes::Halved if self.mesh.len() > RECHOICE_RATIO * self.chosen => StepSizes::Chosen,
             _ if self.mesh.is_empty() => StepSizes::Chosen,
             lengths => lengths,
         };
@@ -456,7 +456,14 @@ impl Flow for RadauFlow {
         }
         let joints = self.assembly.joints.len();
         self.set_laws(state, 0.0);
-        slope(&self.assembly, (state, &mut self.load, &mut self.force), &self.laws, &self.drive, 0.0, &mut self.slope);
+        time_derivative(
+            &self.assembly,
+            (state, &mut self.load, &mut self.force),
+            &self.laws,
+            &self.drive,
+            0.0,
+            &mut self.slope,
+        );
         if self.keep {
             self.keep_instant(state, 0.0);
         }
@@ -503,7 +510,7 @@ impl Flow for RadauFlow {
             self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
             if lengths != StepSizes::Repeated {
                 let work = (self.next.as_slice(), self.load.as_mut_slice(), self.force.as_mut_slice());
-                slope(&self.assembly, work, &self.laws, &self.drive, time + h, &mut self.next_slope);
+                time_derivative(&self.assembly, work, &self.laws, &self.drive, time + h, &mut self.next_slope);
                 std::mem::swap(&mut self.slope, &mut self.next_slope);
             }
             state.copy_from_slice(&self.next);
@@ -521,7 +528,7 @@ impl Flow for RadauFlow {
             position += ticks;
             // double the step only if it starts at a multiple of its size and its expected
             // error passes
-            if self.level > COARSEST
+            if self.level > MIN_LEVEL
                 && position.is_multiple_of(1u64 << (LEVELS - self.level + 1))
                 && error * 2f64.powi(ESTIMATE_ORDER) < SAFETY
             {
@@ -540,7 +547,7 @@ impl Flow for RadauFlow {
         Ok(())
     }
 
-    fn keep(&mut self, keep: bool) {
+    fn set_recording(&mut self, keep: bool) {
         self.keep = keep;
     }
 

@@ -8,7 +8,7 @@ use stickslip_numerics::dual::Real;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum FrictionMode {
     /// The joint sticks: its relative velocity is zero, and the force is the reaction.
-    Held,
+    Stick,
     /// The joint slips in the direction of this sign.
     Slip(f64),
 }
@@ -16,7 +16,7 @@ pub(super) enum FrictionMode {
 impl FrictionMode {
     pub fn contact(self) -> Contact {
         match self {
-            FrictionMode::Held => Contact::Stick,
+            FrictionMode::Stick => Contact::Stick,
             FrictionMode::Slip(sign) => Contact::slip(sign),
         }
     }
@@ -60,7 +60,7 @@ impl RateLaw for LawInMode {
     fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; MAX_DIRECTIONS] {
         let v = motion.velocity[0];
         let force = match self.mode {
-            FrictionMode::Held => v * self.unit,
+            FrictionMode::Stick => v * self.unit,
             FrictionMode::Slip(sign) => {
                 let (force, slope) = self.law.sliding().map_or((0.0, 0.0), |law| law.slip_force(v.re()));
                 ((v - v.re()) * slope + force) * sign

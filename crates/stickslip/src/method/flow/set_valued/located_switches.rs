@@ -11,13 +11,13 @@
 //! ticks.
 
 use super::friction_mode::{FrictionMode, in_mode};
-use super::transition::{decide, mobility, saltate, stop};
+use super::transition::{apply_saltation, contact_modes, delassus_matrix, remove_velocity};
 use crate::law::{RatePoint, RelativeMotion, SharedLaw};
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::Assembly;
 use crate::method::flow::excitation::HarmonicExcitation;
-use crate::method::flow::radau::radau_step::{RadauElimination, RadauStep, StageLoads, points};
-use crate::method::flow::radau::step_size_control::{onward, slope};
+use crate::method::flow::radau::radau_step::{RadauElimination, RadauStep, StageLoads, evaluation_points};
+use crate::method::flow::radau::step_size_control::{extrapolation_weights, time_derivative};
 use crate::method::flow::step_record::StepRecord;
 use crate::method::flow::trajectory::Trajectory;
 use crate::method::{IntegrationError, MethodError};
@@ -41,11 +41,11 @@ const SAFETY: f64 = 0.8;
 /// Relative velocities and forces that count as rounding.
 const ROUNDING: f64 = 1e-12;
 /// Fraction of the interval that counts as zero: a switch this close to the end is at the end.
-const LEFT: f64 = 16.0 * f64::EPSILON;
+const END_TOLERANCE: f64 = 16.0 * f64::EPSILON;
 /// Number of instants of a step at which switches are searched, including its end.
-const LOOKS: usize = 8;
+const SEARCH_INSTANTS: usize = 8;
 /// Largest number of Newton iterations for a switch; two are typical.
-const LOCATED: usize = 12;
+const MAX_LOCATION_STEPS: usize = 12;
 
 /// A joint with set-valued friction.
 struct FrictionJoint {
@@ -64,12 +64,12 @@ struct FrictionJoint {
 
 impl FrictionJoint {
     fn in_modes(law: &SharedLaw, unit: f64) -> [SharedLaw; 3] {
-        [FrictionMode::Held, FrictionMode::Slip(1.0), FrictionMode::Slip(-1.0)].map(|mode| in_mode(law, mode, unit))
+        [FrictionMode::Stick, FrictionMode::Slip(1.0), FrictionMode::Slip(-1.0)].map(|mode| in_mode(law, mode, unit))
     }
 
     fn now(&self) -> &SharedLaw {
         match self.mode {
-            FrictionMode::Held => &self.laws[0],
+            FrictionMode::Stick => &self.laws[0],
             FrictionMode::Slip(sign) => &self.laws[if sign > 0.0 { 1 } else { 2 }],
         }
     }
@@ -132,8 +132,15 @@ impl SetValuedFlow {
             let law = placed.law.clone();
             let limit = law.sliding()?.slip_force(0.0).0;
             let laws = FrictionJoint::in_modes(&law, 1.0);
-            let friction =
-                FrictionJoint { joint, axis: placed.first_axis, law, limit, mode: FrictionMode::Held, laws, unit: 1.0 };
+            let friction = FrictionJoint {
+                joint,
+                axis: placed.first_axis,
+                law,
+                limit,
+                mode: FrictionMode::Stick,
+                laws,
+                unit: 1.0,
+            };
             (limit > 0.0).then_some(friction)
         });
         let frictions = frictions.collect();
@@ -152,7 +159,7 @@ impl SetValuedFlow {
             loads: StageLoads::default(),
             level: FIRST_LEVEL,
             tried: 0,
-            laws: points(&plain),
+            laws: evaluation_points(&plain),
             slope: vec![0.0; states],
             next: vec![0.0; states],
             derivative: Vec::new(),
@@ -182,7 +189,7 @@ impl SetValuedFlow {
     }
 
     fn held(&self) -> impl Iterator<Item = &FrictionJoint> {
-        self.frictions.iter().filter(|friction| friction.mode == FrictionMode::Held)
+        self.frictions.iter().filter(|friction| friction.mode == FrictionMode::Stick)
     }
 
     /// Sets the law of every joint to that of its mode.
@@ -190,7 +197,7 @@ impl SetValuedFlow {
         self.step.held.fill(false);
         for friction in &self.frictions {
             self.assembly.joints[friction.joint].law = friction.now().clone();
-            self.step.held[friction.axis] = friction.mode == FrictionMode::Held;
+            self.step.held[friction.axis] = friction.mode == FrictionMode::Stick;
         }
     }
 
@@ -198,14 +205,16 @@ impl SetValuedFlow {
     /// joints carry the force that keeps them at rest. Returns false if these forces are not
     /// unique.
     fn set_slope(&mut self, state: &[f64], time: f64) -> bool {
-        self.answer(state, time);
+        self.evaluate_laws(state, time);
         let held: Vec<usize> = self.held().map(|friction| friction.axis).collect();
         if held.is_empty() {
             return true;
         }
         // accelerations without the forces of the stuck joints
         let free: Vec<f64> = held.iter().map(|&axis| self.acceleration(axis, time)).collect();
-        let Some(force) = mobility(&self.assembly, &held).lu().solve(&DVector::from_vec(free)) else { return false };
+        let Some(force) = delassus_matrix(&self.assembly, &held).lu().solve(&DVector::from_vec(free)) else {
+            return false;
+        };
         let each: Vec<(usize, f64)> = self.held().zip(force.iter()).map(|(own, f)| (own.joint, f / own.unit)).collect();
         for (joint, unknown) in each {
             let motion = RelativeMotion::along(0.0, unknown);
@@ -219,14 +228,14 @@ impl SetValuedFlow {
 
     /// Evaluates the laws at a state, with zero force for stuck joints, and the time
     /// derivative.
-    fn answer(&mut self, state: &[f64], time: f64) {
+    fn evaluate_laws(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (q, (joint, point)) in self.assembly.joints.iter().zip(&mut self.laws).enumerate() {
             let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
                 (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
             }
-            let holds = |friction: &FrictionJoint| friction.joint == q && friction.mode == FrictionMode::Held;
+            let holds = |friction: &FrictionJoint| friction.joint == q && friction.mode == FrictionMode::Stick;
             if self.frictions.iter().any(holds) {
                 motion = RelativeMotion::along(0.0, 0.0);
             }
@@ -241,7 +250,7 @@ impl SetValuedFlow {
     /// Computes the time derivative of a state under the present forces of the laws.
     fn set_motion(&mut self, state: &[f64], time: f64) {
         let work = (state, self.load.as_mut_slice(), self.force.as_mut_slice());
-        slope(&self.assembly, work, &self.laws, &self.drive, time, &mut self.slope);
+        time_derivative(&self.assembly, work, &self.laws, &self.drive, time, &mut self.slope);
     }
 
     /// Determines the modes at the start of a run: moving joints slip, and joints at rest are
@@ -259,19 +268,19 @@ impl SetValuedFlow {
                 resting.push(k);
             }
         }
-        self.rest(&resting, state, 0.0)
+        self.decide_at_rest(&resting, state, 0.0)
     }
 
     /// Decides on joints at rest. Sets the velocity of stuck ones exactly to zero.
-    fn rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), IntegrationError> {
+    fn decide_at_rest(&mut self, resting: &[usize], state: &mut [f64], time: f64) -> Result<(), IntegrationError> {
         if !resting.is_empty() {
             let axes: Vec<usize> = resting.iter().map(|&k| self.frictions[k].axis).collect();
             let limits: Vec<f64> = resting.iter().map(|&k| self.frictions[k].limit).collect();
-            resting.iter().for_each(|&k| self.frictions[k].mode = FrictionMode::Held);
+            resting.iter().for_each(|&k| self.frictions[k].mode = FrictionMode::Stick);
             self.enter_modes();
-            self.answer(state, time);
+            self.evaluate_laws(state, time);
             let free: Vec<f64> = axes.iter().map(|&axis| self.acceleration(axis, time)).collect();
-            let modes = decide(&mobility(&self.assembly, &axes), &free, &limits);
+            let modes = contact_modes(&delassus_matrix(&self.assembly, &axes), &free, &limits);
             let modes = modes.ok_or(IntegrationError::NoContactState { time })?;
             resting.iter().zip(modes).for_each(|(&k, mode)| self.frictions[k].mode = mode);
         }
@@ -279,7 +288,7 @@ impl SetValuedFlow {
         let held: Vec<usize> = self.held().map(|friction| friction.axis).collect();
         let imposed: Vec<f64> = held.iter().map(|&axis| self.drive.relative_at(axis, time).1).collect();
         let n = self.assembly.n;
-        let stopped = stop(&self.assembly, &held, &imposed, (&mut state[n..2 * n], 1));
+        let stopped = remove_velocity(&self.assembly, &held, &imposed, (&mut state[n..2 * n], 1));
         if stopped && self.set_slope(state, time) { Ok(()) } else { Err(self.redundant(time)) }
     }
 
@@ -293,7 +302,7 @@ impl SetValuedFlow {
         let n = self.assembly.n;
         let held: Vec<usize> = self.held().map(|friction| friction.axis).collect();
         let rows = &mut self.derivative[n * columns..2 * n * columns];
-        stop(&self.assembly, &held, &vec![0.0; held.len()], (rows, columns));
+        remove_velocity(&self.assembly, &held, &vec![0.0; held.len()], (rows, columns));
     }
 
     fn set_loads(&mut self, time: f64, h: f64) {
@@ -317,7 +326,7 @@ impl SetValuedFlow {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         if let Some(length) = last {
             for (i, c) in NODES.iter().enumerate() {
-                let weights = onward(1.0 + c * h / length);
+                let weights = extrapolation_weights(1.0 + c * h / length);
                 for (offset, count) in [(0, j), (STAGES * j, internal)] {
                     for k in 0..count {
                         let at = |stage: usize| offset + stage * count + k;
@@ -330,7 +339,7 @@ impl SetValuedFlow {
         let start: Vec<f64> = (0..j).map(|axis| self.velocity(axis, state, time)).collect();
         for i in 0..STAGES {
             self.step.unknown[i * j..(i + 1) * j].copy_from_slice(&start);
-            for friction in self.frictions.iter().filter(|friction| friction.mode == FrictionMode::Held) {
+            for friction in self.frictions.iter().filter(|friction| friction.mode == FrictionMode::Stick) {
                 self.step.unknown[i * j + friction.axis] = self.laws[friction.joint].force[0] / friction.unit;
             }
             let first = STAGES * j + i * internal;
@@ -400,7 +409,7 @@ impl SetValuedFlow {
         match friction.mode {
             FrictionMode::Slip(sign) => sign * now / scale,
             // the unit of the unknown is the limit divided by the velocity scale
-            FrictionMode::Held => 1.0 - (now * friction.unit / friction.limit).abs(),
+            FrictionMode::Stick => 1.0 - (now * friction.unit / friction.limit).abs(),
         }
     }
 
@@ -410,12 +419,12 @@ impl SetValuedFlow {
         for (k, friction) in self.frictions.iter().enumerate() {
             let start = match friction.mode {
                 FrictionMode::Slip(_) => self.velocity(friction.axis, state, time),
-                FrictionMode::Held => self.laws[friction.joint].force[0] / friction.unit,
+                FrictionMode::Stick => self.laws[friction.joint].force[0] / friction.unit,
             };
             let margin = |s: f64| self.margin(friction, start, s, scale);
             let mut before = 0.0;
-            for look in 1..=LOOKS {
-                let s = look as f64 / LOOKS as f64;
+            for look in 1..=SEARCH_INSTANTS {
+                let s = look as f64 / SEARCH_INSTANTS as f64;
                 if margin(s) >= -ROUNDING {
                     before = s;
                     continue;
@@ -451,12 +460,12 @@ impl SetValuedFlow {
                     (self.velocity(friction.axis, &next, time), self.acceleration(friction.axis, time));
                 Some((sign * velocity / scale, sign * rate / scale))
             }
-            FrictionMode::Held => {
+            FrictionMode::Stick => {
                 let force = self.laws[friction.joint].force[0];
                 let j = self.assembly.axes.len();
                 // the rate of the polynomial through the stages, at its end
                 let ends = [0.95, 1.0].map(|s| {
-                    let weights = onward(s);
+                    let weights = extrapolation_weights(s);
                     (0..STAGES).map(|q| weights[q] * self.step.unknown[q * j + friction.axis]).sum::<f64>()
                 });
                 let rate = (ends[1] - ends[0]) / (0.05 * h) * friction.unit;
@@ -475,7 +484,7 @@ impl SetValuedFlow {
         (scale, derivatives): (f64, bool),
     ) -> Option<RadauElimination> {
         let mut h = switch.at * longest;
-        for _ in 0..LOCATED {
+        for _ in 0..MAX_LOCATION_STEPS {
             let eliminated = RadauElimination::new(&self.assembly, h);
             // the initial guess needs the time derivative at the start of the step
             if !self.set_slope(state, begin.time)
@@ -507,7 +516,7 @@ impl SetValuedFlow {
         columns: usize,
     ) -> Result<(), IntegrationError> {
         let friction = &mut self.frictions[switch.friction];
-        if friction.mode == FrictionMode::Held {
+        if friction.mode == FrictionMode::Stick {
             // the force and all other quantities are continuous
             friction.mode = FrictionMode::Slip(self.laws[friction.joint].force[0].signum());
             self.enter_modes();
@@ -519,11 +528,12 @@ impl SetValuedFlow {
             stopped.push(k);
             let (axis, before) = (self.frictions[k].axis, self.slope.clone());
             let rate = self.acceleration(axis, time);
-            let resting: Vec<usize> =
-                (0..self.frictions.len()).filter(|&i| i == k || self.frictions[i].mode == FrictionMode::Held).collect();
-            self.rest(&resting, state, time)?;
+            let resting: Vec<usize> = (0..self.frictions.len())
+                .filter(|&i| i == k || self.frictions[i].mode == FrictionMode::Stick)
+                .collect();
+            self.decide_at_rest(&resting, state, time)?;
             if columns > 0 {
-                saltate(&self.assembly, (axis, rate), (&before, &self.slope), (&mut self.derivative, columns));
+                apply_saltation(&self.assembly, (axis, rate), (&before, &self.slope), (&mut self.derivative, columns));
             }
             // other joints that stop at the same instant, because their bodies move alike
             next = (0..self.frictions.len()).filter(|i| !stopped.contains(i)).find(|&i| {
@@ -544,7 +554,7 @@ impl SetValuedFlow {
         for (joint, point) in self.assembly.joints.iter().zip(&self.laws) {
             self.force[joint.axes()].copy_from_slice(&point.force[..joint.directions]);
         }
-        self.steps.keep_instant(state, &self.force).copy_from_slice(&self.slope[n..2 * n]);
+        self.steps.push_instant(state, &self.force).copy_from_slice(&self.slope[n..2 * n]);
     }
 
     fn keep_step(&mut self, eliminated: &RadauElimination, time: f64) {
@@ -565,7 +575,7 @@ impl SetValuedFlow {
             });
             let contact: Vec<_> = contact.collect();
             let of = i * n..(i + 1) * n;
-            self.steps.keep_node([&x[of.clone()], &v[of]], [&velocity, force], contact);
+            self.steps.push_node([&x[of.clone()], &v[of]], [&velocity, force], contact);
         }
     }
 
@@ -582,8 +592,8 @@ impl SetValuedFlow {
     }
 
     fn stalled(&self, (time, step): (f64, f64)) -> IntegrationError {
-        match self.step.without_number(&self.assembly) {
-            Some(joint) => joint.no_number(time),
+        match self.step.joint_with_nan(&self.assembly) {
+            Some(joint) => joint.not_finite_error(time),
             None => IntegrationError::Stalled { time, step },
         }
     }
@@ -595,7 +605,7 @@ impl SetValuedFlow {
         kept.unwrap_or_else(|| RadauElimination::new(&self.assembly, h))
     }
 
-    fn give_back(&mut self, begin: StepBegin, eliminated: RadauElimination, level: usize) {
+    fn store_elimination(&mut self, begin: StepBegin, eliminated: RadauElimination, level: usize) {
         if begin.tick.is_some() {
             self.eliminated[level] = Some(eliminated);
         }
@@ -623,13 +633,13 @@ impl SetValuedFlow {
             if error.is_nan() || error > 1.0 {
                 let halvings = (error / SAFETY).log2() / f64::from(ESTIMATE_ORDER);
                 self.level += if error.is_finite() { halvings.ceil().clamp(1.0, 4.0) as usize } else { 2 };
-                self.give_back(begin, eliminated, level);
+                self.store_elimination(begin, eliminated, level);
                 continue;
             }
             let Some(switch) = self.switch(state, begin.time, scale.1) else {
                 let time = begin.time + h;
                 self.accept(&eliminated, state, (begin.time, time), columns)?;
-                self.give_back(begin, eliminated, level);
+                self.store_elimination(begin, eliminated, level);
                 let aligned = end.is_multiple_of(1 << (LEVELS - self.level + 1).min(LEVELS));
                 if self.level > COARSEST && aligned && error * 2f64.powi(ESTIMATE_ORDER) < SAFETY {
                     self.level -= 1;
@@ -637,7 +647,7 @@ impl SetValuedFlow {
                 let tick = self.stretch / (1u64 << LEVELS) as f64;
                 return Ok((StepBegin { time: end as f64 * tick, tick: Some(end) }, Some(h), end == 1 << LEVELS));
             };
-            self.give_back(begin, eliminated, level);
+            self.store_elimination(begin, eliminated, level);
             let located = self.locate(switch, state, (begin, h), (scale.1, columns > 0));
             let Some(eliminated) = located else {
                 // a smaller step locates the switch better
@@ -650,7 +660,7 @@ impl SetValuedFlow {
             let time = begin.time + eliminated.length;
             self.accept(&eliminated, state, (begin.time, time), columns)?;
             self.switched(switch, state, (time, scale.1), columns)?;
-            let ends = time >= self.stretch * (1.0 - LEFT);
+            let ends = time >= self.stretch * (1.0 - END_TOLERANCE);
             return Ok((StepBegin { time, tick: None }, None, ends));
         }
     }
@@ -693,7 +703,7 @@ impl Flow for SetValuedFlow {
         self.assembly.states()
     }
 
-    fn set_drive(&mut self, system: &System, omega: f64) {
+    fn set_excitation(&mut self, system: &System, omega: f64) {
         self.drive = self.assembly.drive(system, omega);
     }
 
@@ -753,13 +763,13 @@ impl Flow for SetValuedFlow {
         Ok(())
     }
 
-    fn strengthen(&mut self, joints: &[usize], factor: f64) {
+    fn scale_limits(&mut self, joints: &[usize], factor: f64) {
         for friction in self.frictions.iter_mut().filter(|friction| joints.contains(&friction.joint)) {
             friction.limit *= factor;
         }
     }
 
-    fn keep(&mut self, keep: bool) {
+    fn set_recording(&mut self, keep: bool) {
         self.keep = keep;
     }
 

@@ -19,7 +19,7 @@ use crate::model::System;
 
 /// Returns whether this integration supports a system: all joints are smooth or have a smooth
 /// slip curve, and at least one has a slip curve.
-pub(crate) fn takes(system: &System) -> bool {
+pub(crate) fn supports(system: &System) -> bool {
     let slides = |law: &dyn Law| law.sliding().is_some() && law.force_scale() > 0.0;
     let joints = || system.joints().iter();
     // a joint between two moved places cannot stick

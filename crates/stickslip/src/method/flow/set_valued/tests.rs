@@ -108,7 +108,7 @@ fn pair(laws: [SharedLaw; 2], more: Option<SharedLaw>) -> System {
 /// Stick, slip and reversals agree with the event-driven closed forms, and so does the
 /// derivative of a period.
 #[test]
-fn constant_friction_moves_as_from_event_to_event() {
+fn constant_friction_agrees_with_event_driven() {
     let coulomb = |limit: f64| -> SharedLaw { Arc::new(Coulomb { limit }) };
     let laws = || [coulomb(0.9), coulomb(0.4)];
     let (exact, integrated) = (pair(laws(), None), pair(laws(), Some(nothing())));
@@ -131,11 +131,11 @@ fn constant_friction_moves_as_from_event_to_event() {
 /// The sensitivity of a run through stick and slip equals the effect of a small change of the
 /// initial state on the end state.
 #[test]
-fn derivatives_go_through_switches() {
+fn sensitivities_pass_switches() {
     let stribeck = |limit: f64| -> SharedLaw { Arc::new(Stribeck { limit, static_limit: 1.4 * limit, velocity: 0.2 }) };
     let system = pair([stribeck(0.7), stribeck(0.3)], Some(Arc::new(Cubic { stiffness: 0.8 })));
     let mut flow = SetValuedFlow::new(&system, 1e-11, "test").unwrap();
-    flow.set_drive(&system, 1.3);
+    flow.set_excitation(&system, 1.3);
     let start = [0.3, -0.2, 0.5, 0.1];
     let mut derivative = DMatrix::identity(4, 4);
     flow.run(&mut start.to_vec(), 6.0, Some(&mut derivative)).unwrap();

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
 
 /// Returns `Wᵀ M⁻¹ W` for some axes.
-pub(super) fn mobility(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
+pub(super) fn delassus_matrix(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(axes.len(), axes.len());
     for (b, &other) in axes.iter().enumerate() {
         let moved = &assembly.inverse_mass * assembly.directions.column(other);
@@ -30,12 +30,12 @@ pub(super) fn mobility(assembly: &Assembly, axes: &[usize]) -> DMatrix<f64> {
 /// Returns the modes of joints at rest. `free` are the relative accelerations without their
 /// forces, and `limits` the limits of these forces. Returns `None` if the problem has no
 /// solution.
-pub(super) fn decide(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> Option<Vec<FrictionMode>> {
+pub(super) fn contact_modes(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> Option<Vec<FrictionMode>> {
     let high = DVector::from_column_slice(limits);
     let free = DVector::from_column_slice(free);
     let force = complementarity::solve(mobility, &free, &-&high, &high)?;
     let mode = |(force, limit): (&f64, &f64)| {
-        if force.abs() < *limit { FrictionMode::Held } else { FrictionMode::Slip(force.signum()) }
+        if force.abs() < *limit { FrictionMode::Stick } else { FrictionMode::Slip(force.signum()) }
     };
     Some(force.iter().zip(limits).map(mode).collect())
 }
@@ -46,7 +46,7 @@ pub(super) fn decide(mobility: &DMatrix<f64>, free: &[f64], limits: &[f64]) -> O
 /// `velocity` contains `columns` vectors of length n, row by row. `imposed` are the imposed
 /// velocities of the axes; they are zero for sensitivities. Returns false if the axes are not
 /// independent.
-pub(super) fn stop(
+pub(super) fn remove_velocity(
     assembly: &Assembly,
     axes: &[usize],
     imposed: &[f64],
@@ -55,7 +55,7 @@ pub(super) fn stop(
     if axes.is_empty() {
         return true;
     }
-    let Some(inverse) = mobility(assembly, axes).try_inverse() else { return false };
+    let Some(inverse) = delassus_matrix(assembly, axes).try_inverse() else { return false };
     for column in 0..columns {
         let along = DVector::from_iterator(
             axes.len(),
@@ -78,7 +78,7 @@ pub(super) fn stop(
 /// Multiplies a sensitivity, stored row by row, by the saltation matrix of a switch. There the
 /// velocity along an axis passes zero at this `rate` (m/s²); `before` and `after` are the time
 /// derivatives of the state.
-pub(super) fn saltate(
+pub(super) fn apply_saltation(
     assembly: &Assembly,
     (axis, rate): (usize, f64),
     (before, after): (&[f64], &[f64]),
@@ -106,11 +106,12 @@ mod tests {
     fn faces_hold_what_their_limits_allow() {
         // joint 1: mass 1 to ground, joint 2: mass 2 to mass 1; both of 1 kg
         let mobility = DMatrix::from_row_slice(2, 2, &[1.0, -1.0, -1.0, 2.0]);
-        let modes =
-            |push: [f64; 2], limits: [f64; 2]| decide(&mobility, &[push[0], push[1] - push[0]], &limits).unwrap();
-        assert_eq!(modes([0.5, 0.3], [1.0, 1.0]), [FrictionMode::Held, FrictionMode::Held]);
-        assert_eq!(modes([0.0, 1.5], [1.0, 2.0]), [FrictionMode::Slip(1.0), FrictionMode::Held]);
-        assert_eq!(modes([0.0, 1.5], [2.0, 1.0]), [FrictionMode::Held, FrictionMode::Slip(1.0)]);
+        let modes = |push: [f64; 2], limits: [f64; 2]| {
+            contact_modes(&mobility, &[push[0], push[1] - push[0]], &limits).unwrap()
+        };
+        assert_eq!(modes([0.5, 0.3], [1.0, 1.0]), [FrictionMode::Stick, FrictionMode::Stick]);
+        assert_eq!(modes([0.0, 1.5], [1.0, 2.0]), [FrictionMode::Slip(1.0), FrictionMode::Stick]);
+        assert_eq!(modes([0.0, 1.5], [2.0, 1.0]), [FrictionMode::Stick, FrictionMode::Slip(1.0)]);
         assert_eq!(modes([0.0, -5.0], [0.5, 1.0]), [FrictionMode::Slip(-1.0), FrictionMode::Slip(-1.0)]);
     }
 }

@@ -27,16 +27,16 @@ impl HarmonicBalanceSolver {
             return None;
         }
         let found = self.recent.front().filter(|recent| recent.start == orbit.initial_state)?;
-        let (top, motion) = (found.top, found.motion.clone());
+        let (top, motion) = (found.highest_harmonic, found.solution.clone());
         let own = self.places(top, omega, &motion).ok()?;
         let states = self.ports.static_states();
         let mut spread: Option<f64> = None;
         for factor in HISTORIES {
-            self.ports.scale_static_forces(&states, factor);
-            let other = self.with_history(top, omega, &motion);
-            self.ports.scale_static_forces(&states, 1.0);
+            self.ports.scale_static_states(&states, factor);
+            let other = self.solve_with_history(top, omega, &motion);
+            self.ports.scale_static_states(&states, 1.0);
             if let Some(other) = other {
-                let apart = self.apart(top, &own, &other);
+                let apart = self.vibration_change(top, &own, &other);
                 spread = Some(spread.map_or(apart, |spread| spread.max(apart)));
             }
         }
@@ -45,16 +45,21 @@ impl HarmonicBalanceSolver {
 
     /// Returns the harmonics of all places in the orbit near a motion, with the static states
     /// that are set.
-    fn with_history(&mut self, top: usize, omega: f64, motion: &HarmonicSolution) -> Option<Vec<DVector<Complex64>>> {
+    fn solve_with_history(
+        &mut self,
+        top: usize,
+        omega: f64,
+        motion: &HarmonicSolution,
+    ) -> Option<Vec<DVector<Complex64>>> {
         let mut other = HarmonicSolution { iterations: 0, ..motion.clone() };
-        let level = self.levels.get_mut(&top)?;
-        level.polish(&self.ports, omega, &mut other, ITERATIONS).ok()?;
+        let level = self.discretizations.get_mut(&top)?;
+        level.newton_from(&self.ports, omega, &mut other, ITERATIONS).ok()?;
         self.places(top, omega, &other).ok()
     }
 
     /// Returns the largest change of a place's vibration, relative to the largest vibration.
-    fn apart(&self, top: usize, one: &[DVector<Complex64>], other: &[DVector<Complex64>]) -> f64 {
-        let harmonics = self.kept.up_to(top);
+    fn vibration_change(&self, top: usize, one: &[DVector<Complex64>], other: &[DVector<Complex64>]) -> f64 {
+        let harmonics = self.harmonic_set.up_to(top);
         let moving: Vec<usize> = (0..one.len()).filter(|k| harmonics[*k] > 0).collect();
         let vibration = |of: &dyn Fn(usize) -> Complex64| moving.iter().map(|k| of(*k).norm_sqr()).sum::<f64>().sqrt();
         let (mut apart, mut size) = (0.0f64, 0.0f64);

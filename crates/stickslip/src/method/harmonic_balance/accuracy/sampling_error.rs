@@ -5,20 +5,20 @@
 
 use crate::method::harmonic_balance::aft::{FrequencyTime, InitialState, Port, Ports};
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::globalization::homotopy::{GIVEN, SOLVED};
+use crate::method::harmonic_balance::globalization::homotopy::{GIVEN_EQUATIONS, RESIDUAL_TOLERANCE};
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 
 /// Ratio of the last step to the distance from the coarse solution at which the distance counts
 /// as known. A step leaves an error of a few hundredths of its length.
-const SHARE: f64 = 0.1;
+const STEP_RATIO: f64 = 0.1;
 /// The ratio for systems with many contacts, in which a second step costs as much as the first.
 /// One step is enough. Measured with 16 and 100 nodes: the distance is then known to 3 % at
 /// nearly all points of a curve, and to 10 % at every point.
-const SHARE_OF_COUPLED: f64 = 3.0;
+const STEP_RATIO_MANY_CONTACTS: f64 = 3.0;
 /// Largest number of steps.
 const MOST_STEPS: usize = 8;
 /// Largest ratio of a step to the previous one.
-const CLOSER: f64 = 0.3;
+const LARGEST_CONTRACTION: f64 = 0.3;
 
 impl Discretization {
     /// Returns the solution near `start` with twice the samples, accurate enough for its
@@ -27,7 +27,7 @@ impl Discretization {
     /// `states` are the periodic states of the shorter series, whose solution is `coarse`.
     /// Returns `None` if no law is integrated over the period, or if the solution was not
     /// found.
-    pub(crate) fn approach_by_twice_the_samples(
+    pub(crate) fn solve_twice_the_samples(
         &mut self,
         ports: &Ports,
         omega: f64,
@@ -35,23 +35,23 @@ impl Discretization {
         coarse: &HarmonicSolution,
         states: Option<&[InitialState]>,
     ) -> Option<HarmonicSolution> {
-        if !ports.iter().any(Port::marches) {
+        if !ports.iter().any(Port::has_memory_steps) {
             return None;
         }
-        self.begin_anew(ports);
+        self.begin_search(ports);
         if let Some(states) = states
-            && self.keeps_sketch()
-            && ports.iter().all(Port::steps)
+            && self.has_coarse_sampling()
+            && ports.iter().all(Port::uses_return_map)
         {
             // the coarse samples start from these states and find their periodic states
             self.states.clone_from_slice(states);
-            self.follow_slopes(ports, omega, &mut start.clone(), (GIVEN, true));
+            self.complete_derivatives(ports, omega, &mut start.clone(), (GIVEN_EQUATIONS, true));
         }
-        if let Some((motion, true)) = self.by_twice_the_samples(ports, omega, start, coarse) {
+        if let Some((motion, true)) = self.correct_twice_the_samples(ports, omega, start, coarse) {
             return Some(motion);
         }
-        let near = self.approach(ports, omega, start)?;
-        let (motion, found) = self.by_twice_the_samples(ports, omega, &near, coarse)?;
+        let near = self.solve_coarse(ports, omega, start)?;
+        let (motion, found) = self.correct_twice_the_samples(ports, omega, &near, coarse)?;
         found.then_some(motion)
     }
 
@@ -64,44 +64,44 @@ impl Discretization {
     ///
     /// The Jacobian is that of the last search, on all samples or on the coarse ones. A step
     /// leaves an error of a few hundredths of its length, and the next step shows it.
-    pub(crate) fn by_twice_the_samples(
+    pub(crate) fn correct_twice_the_samples(
         &mut self,
         ports: &Ports,
         omega: f64,
         near: &HarmonicSolution,
         coarse: &HarmonicSolution,
     ) -> Option<(HarmonicSolution, bool)> {
-        if !ports.iter().any(Port::marches) {
+        if !ports.iter().any(Port::has_memory_steps) {
             return None;
         }
         let mut motion = near.clone();
-        let length = self.length(&motion);
+        let length = self.motion_scale(&motion);
         if !self.linearised {
-            self.linearise_at(ports, omega, &mut motion, length);
+            self.compute_jacobians(ports, omega, &mut motion, length);
         }
-        let near = |residual, kept| StepStart { length, residual, sketched: true, kept };
+        let near = |residual, kept| StepStart { length, residual, coarse: true, same_derivatives: kept };
         let (mut last, mut found, mut left) = (f64::INFINITY, false, MOST_STEPS);
-        let share = if self.is_coupled() { SHARE_OF_COUPLED } else { SHARE };
+        let share = if self.uses_krylov() { STEP_RATIO_MANY_CONTACTS } else { STEP_RATIO };
         loop {
-            self.exchange_for_twice();
-            self.nearby = true;
-            let residual = self.evaluate(ports, omega, &mut motion, GIVEN, length, DerivativeScope::None);
-            self.nearby = false;
-            self.exchange_for_twice();
-            if residual <= SOLVED {
+            self.swap_double_samples();
+            self.reuses_states = true;
+            let residual = self.evaluate(ports, omega, &mut motion, GIVEN_EQUATIONS, length, DerivativeScope::None);
+            self.reuses_states = false;
+            self.swap_double_samples();
+            if residual <= RESIDUAL_TOLERANCE {
                 return Some((motion, true));
             }
-            if !self.newton_step(ports, omega, GIVEN, near(residual, last.is_finite())) {
+            if !self.newton_step(ports, omega, GIVEN_EQUATIONS, near(residual, last.is_finite())) {
                 return None;
             }
-            self.before.copy(&motion);
-            self.advance(ports, &mut motion, 1.0, length);
-            let step = self.apart(ports, &motion, &self.before, length);
-            found |= step <= share * self.apart(ports, &motion, coarse, length);
+            self.previous.copy_from(&motion);
+            self.apply_step(ports, &mut motion, 1.0, length);
+            let step = self.distance(ports, &motion, &self.previous, length);
+            found |= step <= share * self.distance(ports, &motion, coarse, length);
             left -= 1;
-            if found || left == 0 || step > CLOSER * last {
+            if found || left == 0 || step > LARGEST_CONTRACTION * last {
                 self.step_forces(ports, &mut motion, length);
-                self.follow(&mut motion, GIVEN);
+                self.structure_motion(&mut motion, GIVEN_EQUATIONS);
                 return Some((motion, found));
             }
             last = step;
@@ -109,29 +109,29 @@ impl Discretization {
     }
 
     /// Computes the Jacobians of all laws at a motion, from its periodic states.
-    fn linearise_at(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution, length: f64) {
-        self.evaluate(ports, omega, motion, GIVEN, length, DerivativeScope::Cheap);
-        self.follow_slopes(ports, omega, motion, (GIVEN, self.keeps_sketch()));
+    fn compute_jacobians(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution, length: f64) {
+        self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, DerivativeScope::Cheap);
+        self.complete_derivatives(ports, omega, motion, (GIVEN_EQUATIONS, self.has_coarse_sampling()));
     }
 
     /// Returns the distance between the unknowns of two solutions in their units, without
     /// means.
-    fn apart(&self, ports: &Ports, one: &HarmonicSolution, other: &HarmonicSolution, length: f64) -> f64 {
+    fn distance(&self, ports: &Ports, one: &HarmonicSolution, other: &HarmonicSolution, length: f64) -> f64 {
         let nh = self.harmonics().len();
         let moving = |at: &usize| self.harmonics()[at % nh] > 0;
         let squares = ports.iter().map(|port| {
             let (a, b) = if port.is_force() { (&one.force, &other.force) } else { (&one.c, &other.c) };
-            let range = (port.first * nh..(port.first + port.axes) * nh).filter(moving);
+            let range = (port.first_axis * nh..(port.first_axis + port.axes) * nh).filter(moving);
             range.map(|at| (a[at] - b[at]).norm_sqr()).sum::<f64>() / port.unit(length).powi(2)
         });
         squares.sum::<f64>().sqrt()
     }
 
     /// Exchanges the samples for twice as many, and back.
-    fn exchange_for_twice(&mut self) {
-        let (harmonics, samples) = (&self.alternation.harmonics, 2 * self.alternation.samples());
+    fn swap_double_samples(&mut self) {
+        let (harmonics, samples) = (&self.aft.harmonics, 2 * self.aft.samples());
         let twice = self.twice.get_or_insert_with(|| FrequencyTime::new(harmonics.clone(), samples));
-        std::mem::swap(&mut self.alternation, twice);
+        std::mem::swap(&mut self.aft, twice);
     }
 }
 
@@ -141,8 +141,10 @@ mod tests {
     use crate::method::Method;
     use crate::method::harmonic_balance::aft::Ports;
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
-    use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution, transfer};
-    use crate::method::harmonic_balance::options::{HarmonicBalance, LEFT, TOLERANCE, samples_for, samples_of_steps};
+    use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution, with_harmonics};
+    use crate::method::harmonic_balance::options::{
+        HarmonicBalance, SAMPLING_SHARE, TOLERANCE, samples_for, samples_of_steps,
+    };
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
     use crate::orbit::Orbit;
     use num_complex::Complex64;
@@ -195,7 +197,7 @@ mod tests {
     /// harmonics and samples. With many contacts the Jacobian is on coarse samples and one step
     /// suffices.
     #[test]
-    fn a_few_steps_know_the_distance() {
+    fn a_few_steps_find_the_sampling_error() {
         for (bodies, share) in [(3, 0.01), (22, 0.03)] {
             let system = row(bodies);
             let ports = Ports::new(&system).unwrap();
@@ -203,22 +205,22 @@ mod tests {
             let (few, many, omega) = (vec![1, 3, 5], vec![1, 3, 5, 7, 9, 11], 110.0);
             let level = |harmonics: &[usize], samples: usize| {
                 let mut level = Discretization::new(harmonics.to_vec(), samples, &ports, None);
-                level.drive(&system, &ports, &rest, omega).unwrap();
+                level.set_frequency(&system, &ports, &rest, omega).unwrap();
                 level
             };
             let solve = |mut level: Discretization| {
-                let start = level.begin(&system, &ports, None, omega);
+                let start = level.initial_guess(&system, &ports, None, omega);
                 level.solve(&ports, omega, start).unwrap()
             };
-            let coarse = transfer(&solve(level(&few, 1024)), &few, &many);
+            let coarse = with_harmonics(&solve(level(&few, 1024)), &few, &many);
             let whole = solve(level(&many, 2048));
             let mut near = level(&many, 1024);
-            assert_eq!(near.keeps_sketch(), bodies > 20);
-            let found = near.approach_by_twice_the_samples(&ports, omega, &coarse, &coarse, None).unwrap();
-            let apart = |a: &HarmonicSolution, b: &HarmonicSolution| near.apart(&ports, a, b, 1.0);
+            assert_eq!(near.has_coarse_sampling(), bodies > 20);
+            let found = near.solve_twice_the_samples(&ports, omega, &coarse, &coarse, None).unwrap();
+            let apart = |a: &HarmonicSolution, b: &HarmonicSolution| near.distance(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
             assert!(
-                distance > 1e-5 * apart(&whole, &HarmonicSolution::rest(whole.c.len())),
+                distance > 1e-5 * apart(&whole, &HarmonicSolution::zero(whole.c.len())),
                 "{distance:.1e} shows nothing"
             );
             assert!(error < share * distance, "{bodies} bodies: {error:.1e} of {distance:.1e}");
@@ -232,7 +234,7 @@ mod tests {
     /// The states of the shorter series and the correction of the previous point lead to the
     /// same distance.
     #[test]
-    fn a_neighbour_leaves_what_the_longer_series_adds() {
+    fn the_previous_correction_gives_the_same_distance() {
         let system = row(22);
         let ports = Ports::new(&system).unwrap();
         let rest = LinearDynamics::new(&system, &ports);
@@ -243,20 +245,19 @@ mod tests {
         let mut added = vec![Complex64::new(0.0, 0.0); ports.count() * many.len()];
         for omega in [110.0, 110.2] {
             for level in [&mut short, &mut long, &mut whole] {
-                level.drive(&system, &ports, &rest, omega).unwrap();
+                level.set_frequency(&system, &ports, &rest, omega).unwrap();
             }
             let solve = |level: &mut Discretization| {
-                let start = level.begin(&system, &ports, None, omega);
+                let start = level.initial_guess(&system, &ports, None, omega);
                 level.solve(&ports, omega, start).unwrap()
             };
-            let coarse = transfer(&solve(&mut short), &few, &many);
+            let coarse = with_harmonics(&solve(&mut short), &few, &many);
             let whole = solve(&mut whole);
             assert!(short.states.iter().any(|known| !known.state.is_empty()), "some slip");
             let mut start = coarse.clone();
             start.c.iter_mut().zip(&added).for_each(|(c, added)| *c += added);
-            let found =
-                long.approach_by_twice_the_samples(&ports, omega, &start, &coarse, Some(&short.states)).unwrap();
-            let apart = |a: &HarmonicSolution, b: &HarmonicSolution| long.apart(&ports, a, b, 1.0);
+            let found = long.solve_twice_the_samples(&ports, omega, &start, &coarse, Some(&short.states)).unwrap();
+            let apart = |a: &HarmonicSolution, b: &HarmonicSolution| long.distance(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
             assert!(error < 0.1 * distance, "{omega}: {error:.1e} of {distance:.1e}");
             added = found.c.iter().zip(&coarse.c).map(|(found, coarse)| found - coarse).collect();
@@ -282,7 +283,7 @@ mod tests {
     /// The error estimate contains the sampling error, measured with sixteen times the samples.
     /// The truncation error is negligible here.
     #[test]
-    fn the_estimate_has_the_error_of_the_samples() {
+    fn the_estimate_contains_the_sampling_error() {
         // the error of `valanis` depends on the position of a turning point between two
         // samples; 1024 and 4096 samples may share it
         for law in &laws()[..2] {
@@ -313,7 +314,7 @@ mod tests {
                 method.solver(&system).unwrap().orbit(TAU * 17.0, None).unwrap()
             };
             let error = distance(&orbit(None), &orbit(Some(16_384)));
-            assert!(error > 1e-7 && error < LEFT * tolerance, "{}: {error:.1e}", law.name());
+            assert!(error > 1e-7 && error < SAMPLING_SHARE * tolerance, "{}: {error:.1e}", law.name());
         }
     }
 

@@ -143,9 +143,10 @@ fn ports_of(law: &SharedLaw) -> Ports {
     Ports::new(&System::builder(structure.unwrap()).joint("j", law.clone(), axes).build().unwrap()).unwrap()
 }
 
-/// A law without a suitable view is refused. The error names the joint, the law and an alternative.
+/// A law without a suitable view is refused. The error names the joint, the law and an
+/// alternative.
 #[test]
-fn refusals_name_the_law_and_what_would_do() {
+fn refusals_name_law_and_alternative() {
     let jump = Arc::new(Stribeck { limit: 1.0, static_limit: 1.5, velocity: 0.0 });
     for (law, words) in
         [(jump as SharedLaw, "`event-driven`"), (Arc::new(Plane::Unknown), "none of the views prox, step and rate")]
@@ -188,9 +189,9 @@ fn derivatives_agree_with_differences() {
                 let mut force = vec![ZERO; count];
                 if port.is_force() {
                     // without motion the argument of the image is the force alone
-                    alternation.image(port, (omega, 1.0, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
+                    alternation.force_port_image(port, (omega, 1.0, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
                 } else {
-                    alternation.respond(port, (omega, 1.0), c, &mut force, tangent);
+                    alternation.motion_port_force(port, (omega, 1.0), c, &mut force, tangent);
                 }
                 force
             };
@@ -349,7 +350,7 @@ fn round_a_circle_the_loss_is_the_closed_form() {
         let mut alternation = FrequencyTime::new(vec![1], samples);
         let c = [Complex64::new(radius, 0.0), Complex64::new(0.0, -radius)];
         let mut force = [ZERO; 2];
-        alternation.respond(&ports[0], (1.0, 1.0), &c, &mut force, None);
+        alternation.motion_port_force(&ports[0], (1.0, 1.0), &c, &mut force, None);
         (0..2).map(|a| -PI * (force[a].conj() * c[a]).im).sum::<f64>()
     };
     let lead = (LIMIT / (STIFFNESS * radius)).asin();
@@ -414,8 +415,8 @@ fn banded_and_dense_agree_in_a_plane() {
     let solve = |banded: bool| {
         let sparse = banded.then(|| BandedForm::new(&system, &ports, &harmonics).unwrap());
         let mut level = Discretization::new(harmonics.clone(), 256, &ports, sparse);
-        level.drive(&system, &ports, &rest, omega).unwrap();
-        let start = level.begin(&system, &ports, None, omega);
+        level.set_frequency(&system, &ports, &rest, omega).unwrap();
+        let start = level.initial_guess(&system, &ports, None, omega);
         level.solve(&ports, omega, start).unwrap()
     };
     let (dense, banded) = (solve(false), solve(true));

@@ -19,7 +19,8 @@ pub(in super::super) struct Interval {
 /// The quantity on which the offset depends.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum OffsetSource {
-    /// None: the offset is constant, as for a slider that has not slipped since static equilibrium.
+    /// None: the offset is constant, as for a slider that has not slipped since static
+    /// equilibrium.
     Nothing,
     /// The motion at a phase, rad.
     At(f64),
@@ -28,7 +29,7 @@ pub(in super::super) enum OffsetSource {
 /// A turning point of the motion: phase (rad) and displacement (m).
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct TurningPoint {
-    pub(super) at: f64,
+    pub(super) phase: f64,
     pub(super) value: f64,
 }
 

@@ -1,7 +1,7 @@
 //! Alternating frequency-time (AFT): the signals of a port over a period, and
 //! helpers of all kernels.
 
-use super::workspace::REPEATS;
+use super::workspace::PERIODICITY_TOLERANCE;
 use super::{Port, StaticState};
 use crate::law::MAX_DIRECTIONS;
 use num_complex::Complex64;
@@ -13,13 +13,14 @@ pub(super) const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Signals, transforms and scratch memory for one list of harmonics and one number of samples.
 #[derive(Debug, Clone)]
 pub(in super::super) struct FrequencyTime {
-    /// Factor of the joints' [`StaticState`](super::StaticState): the share of the constant
+    /// Factor of the joints' [`StaticState`]: the share of the constant
     /// loads, divided by the factor of the slip limits.
     pub static_share: f64,
     /// Number of steps of laws with memory in the present search.
-    pub marched: usize,
-    /// Change of the states over a period, relative to their size, at which they count as periodic.
-    pub repeats: f64,
+    pub law_steps: usize,
+    /// Change of the states over a period, relative to their size, at which they count as
+    /// periodic.
+    pub periodicity_tolerance: f64,
     pub harmonics: Vec<usize>,
     pub fourier: FourierPlan,
     pairs: Vec<(usize, Complex64)>,
@@ -40,13 +41,14 @@ pub(in super::super) struct FrequencyTime {
     /// Internal states at t = 0 of the port evaluated last.
     pub state: Vec<f64>,
     /// States at the samples, for step laws.
-    pub(super) trail: Vec<f64>,
+    pub(super) states_at_samples: Vec<f64>,
     /// Known states with which the next port with memory begins. The evaluation consumes them.
-    pub begin: InitialState,
-    /// `(1 - Π)⁻¹` of the port with memory whose derivative was evaluated last, see [`InitialState`].
-    pub forgets: Vec<f64>,
+    pub known_state: InitialState,
+    /// `(1 - Π)⁻¹` of the port with memory whose derivative was evaluated last, see
+    /// [`InitialState`].
+    pub forgetting_inverse: Vec<f64>,
     /// `e^{2πji/N}` for every sample i.
-    pub(super) turns: Vec<Complex64>,
+    pub(super) rotations: Vec<Complex64>,
     pub(super) argument: Vec<Complex64>,
     pub(super) work: Vec<f64>,
     pub(super) slopes: Vec<Vec<f64>>,
@@ -58,7 +60,7 @@ pub(in super::super) struct FrequencyTime {
     pub(super) extremes: Vec<super::events::TurningPoint>,
     pub(super) branches: super::masing::MasingBranches,
     pub(super) grid: super::events::BracketingGrid,
-    pub(super) march: super::workspace::StepWorkspace,
+    pub(super) workspace: super::workspace::StepWorkspace,
 }
 
 /// Known states of a port with memory in a nearby motion.
@@ -68,21 +70,21 @@ pub(in super::super) struct InitialState {
     pub state: Vec<f64>,
     /// `(1 - Π)⁻¹`, row-major. `Π` is the derivative of the states after a period by the states
     /// before. Empty if it is unknown, or if some state is never forgotten.
-    pub forgets: Vec<f64>,
+    pub forgetting_inverse: Vec<f64>,
 }
 
 impl InitialState {
     /// Returns itself if the law forgets its initial states, else the default. A state that is
     /// never forgotten must begin in static equilibrium.
-    pub fn forgotten(&self) -> Self {
-        if self.forgets.is_empty() { InitialState::default() } else { self.clone() }
+    pub fn if_forgotten(&self) -> Self {
+        if self.forgetting_inverse.is_empty() { InitialState::default() } else { self.clone() }
     }
 }
 
 impl FrequencyTime {
     /// Returns the number of harmonics times the number of samples.
     pub fn resolution(&self) -> usize {
-        self.pairs.len() * self.turns.len()
+        self.pairs.len() * self.rotations.len()
     }
 
     pub fn new(harmonics: Vec<usize>, samples: usize) -> Self {
@@ -91,8 +93,8 @@ impl FrequencyTime {
         let top = harmonics.last().copied().unwrap_or(0);
         FrequencyTime {
             static_share: 1.0,
-            marched: 0,
-            repeats: REPEATS,
+            law_steps: 0,
+            periodicity_tolerance: PERIODICITY_TOLERANCE,
             fourier: FourierPlan::new(samples),
             pairs: harmonics.iter().map(|&h| (h, ZERO)).collect(),
             signal: zeros.clone(),
@@ -102,10 +104,10 @@ impl FrequencyTime {
             slips: vec![false; samples],
             by_frequency: None,
             state: Vec::new(),
-            trail: Vec::new(),
-            begin: InitialState::default(),
-            forgets: Vec::new(),
-            turns: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
+            states_at_samples: Vec::new(),
+            known_state: InitialState::default(),
+            forgetting_inverse: Vec::new(),
+            rotations: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
             argument: Vec::new(),
             work: zeros.clone(),
             moment: zeros,
@@ -117,7 +119,7 @@ impl FrequencyTime {
             extremes: Vec::new(),
             branches: super::masing::MasingBranches::default(),
             grid: super::events::BracketingGrid::new(top),
-            march: super::workspace::StepWorkspace::default(),
+            workspace: super::workspace::StepWorkspace::default(),
             harmonics,
         }
     }
@@ -164,7 +166,7 @@ impl FrequencyTime {
         let n = self.samples();
         let sums = self.fourier.transform(signal);
         for (to, &h) in to.iter_mut().zip(&self.harmonics) {
-            *to += sums[h] * share(h, n);
+            *to += sums[h] * amplitude_factor(h, n);
         }
     }
 
@@ -204,7 +206,7 @@ impl FrequencyTime {
         let nh = self.harmonics.len();
         for (i, &h) in self.harmonics.iter().enumerate() {
             for (l, &k) in self.harmonics.iter().enumerate() {
-                let (minus, plus) = pair(&self.spectra[0], h, k);
+                let (minus, plus) = spectrum_pair(&self.spectra[0], h, k);
                 let by = factor(k);
                 let (minus, plus) = (minus * by, plus * by.conj());
                 add_block(tangent, 2 * nh * axes, (a * nh + i, h), (b * nh + l, k), as_block(minus, plus));
@@ -222,7 +224,7 @@ impl FrequencyTime {
 }
 
 /// Returns the factor from a sum over `n` samples to the amplitude of harmonic `h`.
-pub(super) fn share(h: usize, n: usize) -> f64 {
+pub(super) fn amplitude_factor(h: usize, n: usize) -> f64 {
     if h == 0 { 1.0 / n as f64 } else { 2.0 / n as f64 }
 }
 
@@ -234,7 +236,7 @@ pub(super) fn as_block(minus: Complex64, plus: Complex64) -> [f64; 4] {
 
 /// Returns `G_{h-k}` and `G_{h+k}` of a real signal.
 #[inline]
-pub(super) fn pair(spectrum: &[Complex64], h: usize, k: usize) -> (Complex64, Complex64) {
+pub(super) fn spectrum_pair(spectrum: &[Complex64], h: usize, k: usize) -> (Complex64, Complex64) {
     (if h >= k { spectrum[h - k] } else { spectrum[k - h].conj() }, spectrum[h + k])
 }
 

@@ -66,9 +66,17 @@ impl PortBuilder {
     fn add(&mut self, j: usize, joint: &SystemJoint, kernel: Kernel, (series, scale, least_penalty): (f64, f64, f64)) {
         let (first, axes) = (self.ports.axes.len(), joint.axes().len());
         self.ports.axes.extend((0..axes).map(|a| (j, a)));
-        let members = vec![PortMember { joint: j, factor: 1.0, share: 1.0 }];
-        let mut port =
-            Port { members, first, axes, series, scale, least_penalty, static_state: StaticState::default(), kernel };
+        let members = vec![PortMember { joint: j, motion_ratio: 1.0, force_ratio: 1.0 }];
+        let mut port = Port {
+            members,
+            first_axis: first,
+            axes,
+            series_compliance: series,
+            scale,
+            least_penalty,
+            static_state: StaticState::default(),
+            kernel,
+        };
         port.static_state.states = vec![0.0; port.states()];
         self.ports.list.push(port);
     }
@@ -106,12 +114,12 @@ impl PortBuilder {
     fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, measures: (f64, f64, f64)) {
         let lines: Vec<CollinearAxis> = of.axes().iter().map(CollinearAxis::of).collect();
         let found = self.lines.iter().find_map(|(port, its)| {
-            let factor = along(&lines, its)?;
-            Some((*port, factor, times(&kernel, &self.ports.list[*port].kernel, factor)?))
+            let factor = motion_ratio(&lines, its)?;
+            Some((*port, factor, force_ratio(&kernel, &self.ports.list[*port].kernel, factor)?))
         });
         if let Some((port, factor, times)) = found {
             let share = factor.signum() * times;
-            self.ports.list[port].members.push(PortMember { joint, factor, share });
+            self.ports.list[port].members.push(PortMember { joint, motion_ratio: factor, force_ratio: share });
         } else {
             self.lines.push((self.ports.list.len(), lines));
             self.add(joint, of, kernel, measures);
@@ -122,15 +130,15 @@ impl PortBuilder {
     pub fn finish(mut self) -> Ports {
         for port in &mut self.ports.list {
             // equal virtual work; so far, shares refer to the force of the first joint
-            let sum: f64 = port.members.iter().map(|member| member.factor * member.share).sum();
-            port.members.iter_mut().for_each(|member| member.share /= sum);
+            let sum: f64 = port.members.iter().map(|member| member.motion_ratio * member.force_ratio).sum();
+            port.members.iter_mut().for_each(|member| member.force_ratio /= sum);
             match &mut port.kernel {
                 Kernel::Rigid(rigid) => rigid.limit *= sum,
                 Kernel::Prox(of) => of.times *= sum,
                 Kernel::Sliders(_) | Kernel::Masing(_) | Kernel::Step(_) | Kernel::Rate(_) => {}
             }
             port.scale *= sum;
-            port.series /= sum;
+            port.series_compliance /= sum;
             port.least_penalty *= sum;
         }
         self.ports
@@ -138,7 +146,7 @@ impl PortBuilder {
 }
 
 /// Returns the factor between all motions along some axes and those along others.
-fn along(lines: &[CollinearAxis], others: &[CollinearAxis]) -> Option<f64> {
+fn motion_ratio(lines: &[CollinearAxis], others: &[CollinearAxis]) -> Option<f64> {
     if lines.len() != others.len() {
         return None;
     }
@@ -149,7 +157,7 @@ fn along(lines: &[CollinearAxis], others: &[CollinearAxis]) -> Option<f64> {
 
 /// Returns the ratio of the force to that of `other`, for a motion that is `factor` times that
 /// of `other`. `None` if the ratio depends on the motion.
-fn times(kernel: &Kernel, other: &Kernel, factor: f64) -> Option<f64> {
+fn force_ratio(kernel: &Kernel, other: &Kernel, factor: f64) -> Option<f64> {
     match (kernel, other) {
         // rigid friction does not depend on the speed
         (Kernel::Rigid(rigid), Kernel::Rigid(other)) => Some(rigid.limit / other.limit),
@@ -182,7 +190,7 @@ mod tests {
         }
         let ports = Ports::new(&builder.build().unwrap()).unwrap();
         for port in ports.iter() {
-            let work: f64 = port.members.iter().map(|member| member.factor * member.share).sum();
+            let work: f64 = port.members.iter().map(|member| member.motion_ratio * member.force_ratio).sum();
             assert!((work - 1.0).abs() < 1e-15, "{port:?}");
         }
         ports.iter().map(|port| port.members.iter().map(|member| member.joint).collect()).collect()

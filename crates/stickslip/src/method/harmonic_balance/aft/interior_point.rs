@@ -11,9 +11,9 @@ use super::FrequencyTime;
 use num_complex::Complex64;
 
 /// Approximate initial force, relative to the limit, where `y` is largest.
-const BEGINS: f64 = 0.5;
+const INITIAL_FORCE_SHARE: f64 = 0.5;
 /// Longest step, as a share of the distance to the nearest bound.
-const INSIDE: f64 = 0.99;
+const STEP_TO_BOUNDARY: f64 = 0.99;
 
 /// The samples of one port.
 #[derive(Debug, Clone)]
@@ -30,28 +30,28 @@ pub(in super::super) struct InteriorPort {
 #[derive(Debug, Clone, Copy, Default)]
 struct BarrierSample {
     force: f64,
-    upper: f64,
-    lower: f64,
+    multiplier_upper: f64,
+    multiplier_lower: f64,
     /// `y`, and the derivative of `f` by it.
     argument: f64,
     slope: f64,
     /// Target values of the products.
-    aims: [f64; 2],
+    targets: [f64; 2],
     /// Steps of `f`, ξ and η.
     step: [f64; 3],
 }
 
 impl BarrierSample {
     /// Returns the distances of the force from its upper and its lower limit.
-    fn room(&self, limit: f64) -> [f64; 2] {
+    fn distances_to_limits(&self, limit: f64) -> [f64; 2] {
         [limit - self.force, limit + self.force]
     }
 
     /// Returns the term `lack` of the step of `f`, which is `slope (δy + lack)`
     /// after the elimination of ξ and η.
-    fn lack(&self, limit: f64) -> f64 {
-        let [above, below] = self.room(limit);
-        self.argument - self.force - self.aims[0] / above + self.aims[1] / below
+    fn reduced_residual(&self, limit: f64) -> f64 {
+        let [above, below] = self.distances_to_limits(limit);
+        self.argument - self.force - self.targets[0] / above + self.targets[1] / below
     }
 }
 
@@ -61,29 +61,31 @@ impl InteriorPort {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let largest = alternation.signal.iter().fold(limit, |most, y| most.max(y.abs()));
         let begin = |y: &f64| {
-            let force = BEGINS * limit * (y / (BEGINS * largest)).tanh();
+            let force = INITIAL_FORCE_SHARE * limit * (y / (INITIAL_FORCE_SHARE * largest)).tanh();
             let held = y - force;
             // ξ - η = y - f, ξ η = largest²
             let more = 0.5 * (held.abs() + held.hypot(2.0 * largest));
             let less = largest * (largest / more);
             let (upper, lower) = if held > 0.0 { (more, less) } else { (less, more) };
-            BarrierSample { force, upper, lower, ..BarrierSample::default() }
+            BarrierSample { force, multiplier_upper: upper, multiplier_lower: lower, ..BarrierSample::default() }
         };
         let samples = alternation.signal.iter().map(begin).collect();
         InteriorPort { limit, unit: limit * largest, samples }
     }
 
-    /// Returns the mean of the products after a share of the step, in units of [`InteriorPort::unit`].
+    /// Returns the mean of the products after a share of the step, in units of
+    /// [`InteriorPort::unit`].
     pub fn gap(&self, share: f64) -> f64 {
         let products = |s: &BarrierSample| {
             let [force, upper, lower] = s.step.map(|step| share * step);
-            (s.upper + upper) * (self.limit - s.force - force) + (s.lower + lower) * (self.limit + s.force + force)
+            (s.multiplier_upper + upper) * (self.limit - s.force - force)
+                + (s.multiplier_lower + lower) * (self.limit + s.force + force)
         };
         self.samples.iter().map(products).sum::<f64>() / (2.0 * self.samples.len() as f64 * self.unit)
     }
 
     /// Returns the mean of the present products, in units of the limit squared.
-    pub fn left(&self) -> f64 {
+    pub fn remaining_gap(&self) -> f64 {
         self.gap(0.0) * self.unit / (self.limit * self.limit)
     }
 
@@ -93,9 +95,9 @@ impl InteriorPort {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
         alternation.reserve_slopes(1);
         for (i, s) in self.samples.iter_mut().enumerate() {
-            let [above, below] = s.room(self.limit);
+            let [above, below] = s.distances_to_limits(self.limit);
             s.argument = alternation.signal[i];
-            s.slope = 1.0 / (1.0 + s.upper / above + s.lower / below);
+            s.slope = 1.0 / (1.0 + s.multiplier_upper / above + s.multiplier_lower / below);
             alternation.slopes[0][i] = s.slope;
         }
         tangent.fill(0.0);
@@ -107,12 +109,17 @@ impl InteriorPort {
     /// Sets the targets of the products to `gap`. With `corrected`, the targets include the
     /// second-order terms of the last step (Mehrotra's corrector). Writes the harmonics of the
     /// force after a step with an unchanged argument into `image`.
-    pub fn aim(&mut self, (gap, corrected): (f64, bool), alternation: &mut FrequencyTime, image: &mut [Complex64]) {
+    pub fn set_targets(
+        &mut self,
+        (gap, corrected): (f64, bool),
+        alternation: &mut FrequencyTime,
+        image: &mut [Complex64],
+    ) {
         let product = gap * self.unit;
         for (s, force) in self.samples.iter_mut().zip(&mut alternation.force[0]) {
             let [step, upper, lower] = if corrected { s.step } else { [0.0; 3] };
-            s.aims = [product + upper * step, product - lower * step];
-            *force = s.force + s.slope * s.lack(self.limit);
+            s.targets = [product + upper * step, product - lower * step];
+            *force = s.force + s.slope * s.reduced_residual(self.limit);
         }
         image.fill(Complex64::default());
         alternation.add_force(0, image);
@@ -122,28 +129,30 @@ impl InteriorPort {
     /// share of it, at most 1, that stays inside all bounds.
     pub fn step(&mut self, alternation: &mut FrequencyTime, y: &[Complex64]) -> f64 {
         alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
-        let mut most = 1.0 / INSIDE;
+        let mut most = 1.0 / STEP_TO_BOUNDARY;
         for (s, y) in self.samples.iter_mut().zip(&alternation.signal) {
-            let [above, below] = s.room(self.limit);
-            let force = s.slope * (y - s.argument + s.lack(self.limit));
-            let upper = (s.aims[0] + s.upper * force) / above - s.upper;
-            let lower = (s.aims[1] - s.lower * force) / below - s.lower;
+            let [above, below] = s.distances_to_limits(self.limit);
+            let force = s.slope * (y - s.argument + s.reduced_residual(self.limit));
+            let upper = (s.targets[0] + s.multiplier_upper * force) / above - s.multiplier_upper;
+            let lower = (s.targets[1] - s.multiplier_lower * force) / below - s.multiplier_lower;
             s.step = [force, upper, lower];
-            for (room, step) in [(above, -force), (below, force), (s.upper, upper), (s.lower, lower)] {
+            for (room, step) in
+                [(above, -force), (below, force), (s.multiplier_upper, upper), (s.multiplier_lower, lower)]
+            {
                 if step < 0.0 {
                     most = most.min(-room / step);
                 }
             }
         }
-        INSIDE * most
+        STEP_TO_BOUNDARY * most
     }
 
     /// Takes a share of the step.
     pub fn advance(&mut self, share: f64) {
         for s in &mut self.samples {
             s.force += share * s.step[0];
-            s.upper += share * s.step[1];
-            s.lower += share * s.step[2];
+            s.multiplier_upper += share * s.step[1];
+            s.multiplier_lower += share * s.step[2];
         }
     }
 }
@@ -161,10 +170,10 @@ mod tests {
             let mut alternation = FrequencyTime::new(vec![0], 16);
             let (argument, mut image, mut tangent) = ([Complex64::new(y, 0.0)], [Complex64::default()], [0.0; 4]);
             let mut barrier = InteriorPort::new(limit, &mut alternation, &argument);
-            while barrier.left() > 1e-10 {
+            while barrier.remaining_gap() > 1e-10 {
                 let gap = barrier.gap(0.0);
                 barrier.linearise(&mut alternation, &argument, &mut tangent);
-                barrier.aim((0.1 * gap, false), &mut alternation, &mut image);
+                barrier.set_targets((0.1 * gap, false), &mut alternation, &mut image);
                 let share = barrier.step(&mut alternation, &argument);
                 assert!(share > 0.0 && share <= 1.0);
                 barrier.advance(share);

@@ -8,16 +8,16 @@
 //! Turning points and the phases at which loops close are zeros of the series, found by Newton's
 //! method. The harmonics of the force are integrals over the branches, by Gauss quadrature on
 //! panels that are short enough for the highest harmonic. After a turning point at θ_r, the force
-//! of a law with a power-law distribution varies with a power of `(θ - θ_r)²`. The first panel of a
-//! branch is therefore integrated in the square root of that distance.
+//! of a law with a power-law distribution varies with a power of `(θ - θ_r)²`. The first panel of
+//! a branch is therefore integrated in the square root of that distance.
 //!
 //! The derivative is that of the branches: `δf = B' (δu - δu_r) + δf_r`. `f_r`
 //! depends on the return points that are still remembered.
 
 use super::StaticState;
 use super::events::{OffsetSource, TurningPoint};
-use super::frequency_time::{FrequencyTime, ZERO, add_block, as_block, pair};
-use super::series::{HarmonicSeries, turns};
+use super::frequency_time::{FrequencyTime, ZERO, add_block, as_block, spectrum_pair};
+use super::series::{HarmonicSeries, rotations};
 use super::sliders::{add_multiple, integrate_over};
 use crate::law::{Law, MasingView};
 use num_complex::Complex64;
@@ -42,7 +42,7 @@ struct MasingBranch {
     /// The direction of the motion, +1 or -1.
     sign: f64,
     /// True if it begins at a turning point.
-    turns: bool,
+    starts_at_turning_point: bool,
     /// The remembered points, the rest position of the law first.
     points: Range<usize>,
 }
@@ -91,7 +91,13 @@ impl MasingBranches {
     fn push(&mut self, (begin, end): (f64, f64), sign: f64, turns: bool) {
         let first = self.points.len();
         self.points.extend_from_slice(&self.memory);
-        self.list.push(MasingBranch { begin, end, sign, turns, points: first..self.points.len() });
+        self.list.push(MasingBranch {
+            begin,
+            end,
+            sign,
+            starts_at_turning_point: turns,
+            points: first..self.points.len(),
+        });
     }
 
     /// Returns the force at the end of the last leg between these points.
@@ -131,10 +137,10 @@ impl FrequencyTime {
         force: &mut [Complex64],
         tangent: Option<&mut [f64]>,
     ) {
-        self.find(c);
+        self.find_turning_points(c);
         let harmonics = std::mem::take(&mut self.harmonics);
         let mut branches = std::mem::take(&mut self.branches);
-        self.remember(law, rest, HarmonicSeries { harmonics: &harmonics, c }, &mut branches);
+        self.find_branches(law, rest, HarmonicSeries { harmonics: &harmonics, c }, &mut branches);
         self.add_branches(law, HarmonicSeries { harmonics: &harmonics, c }, &branches, (force, tangent));
         (self.branches, self.harmonics) = (branches, harmonics);
     }
@@ -142,11 +148,11 @@ impl FrequencyTime {
     /// Samples the force, and computes the legs at t = 0.
     pub(super) fn sample_masing(&mut self, law: &dyn Law, rest: &StaticState, c: &[Complex64]) {
         let (Some(curve), Some(step)) = (law.masing(), law.step()) else { return };
-        self.find(c);
+        self.find_turning_points(c);
         self.synthesise(c, |_| Complex64::new(1.0, 0.0));
         let harmonics = std::mem::take(&mut self.harmonics);
         let mut branches = std::mem::take(&mut self.branches);
-        self.remember(curve, rest, HarmonicSeries { harmonics: &harmonics, c }, &mut branches);
+        self.find_branches(curve, rest, HarmonicSeries { harmonics: &harmonics, c }, &mut branches);
         let n = self.samples();
         let sample = |phase: f64| (phase * n as f64 / TAU).ceil() as usize;
         let mut slopes = Vec::new();
@@ -173,7 +179,7 @@ impl FrequencyTime {
     /// Computes the branches of a period from the turning points found before.
     /// The motion first passes one period from static equilibrium; after it the
     /// law has forgotten all that it can forget.
-    fn remember(
+    fn find_branches(
         &self,
         law: &dyn MasingView,
         rest: &StaticState,
@@ -187,7 +193,7 @@ impl FrequencyTime {
         // static equilibrium is a return point if the motion reverses there
         let first = self.extremes.first().map_or(self.grid.value[0], |extreme| extreme.value);
         if (first - rest) * rest < 0.0 {
-            let end = TurningPoint { at: 0.0, value: rest };
+            let end = TurningPoint { phase: 0.0, value: rest };
             self.add_leg(law, series, branches, (None, end, OffsetSource::Nothing));
         }
         if count == 0 {
@@ -196,10 +202,10 @@ impl FrequencyTime {
             branches.push((0.0, TAU), sign, false);
         }
         for leg in 0..2 * count {
-            let phase = |leg: usize| self.extremes[leg % count].at + TAU * (leg / count) as f64;
-            let end = TurningPoint { at: phase(leg), value: self.extremes[leg % count].value };
+            let phase = |leg: usize| self.extremes[leg % count].phase + TAU * (leg / count) as f64;
+            let end = TurningPoint { phase: phase(leg), value: self.extremes[leg % count].value };
             let begin = if leg < count { None } else { Some(phase(leg - 1)) };
-            self.add_leg(law, series, branches, (begin, end, OffsetSource::At(end.at)));
+            self.add_leg(law, series, branches, (begin, end, OffsetSource::At(end.phase)));
         }
     }
 
@@ -218,9 +224,9 @@ impl FrequencyTime {
         // records a branch that ends where the motion passes `value`
         let mut until = |branches: &mut MasingBranches, value: Option<f64>| {
             let Some(from) = begin else { return };
-            let to = value.map_or(end.at, |value| {
+            let to = value.map_or(end.phase, |value| {
                 let inside = (end.value - value) * sign > 0.0;
-                if inside { self.passage(series, (from, end.at), value, sign) } else { end.at }
+                if inside { self.passage(series, (from, end.phase), value, sign) } else { end.phase }
             });
             branches.push((from, to), sign, turns);
             (begin, turns) = (Some(to), false);
@@ -265,7 +271,7 @@ impl FrequencyTime {
             own.fill(ZERO);
             of_branch.fill(ZERO);
             let mut add = |theta: f64, weight: f64| {
-                let (mut u, (mut turn, step)) = (0.0, turns(harmonics, theta));
+                let (mut u, (mut turn, step)) = (0.0, rotations(harmonics, theta));
                 for (c, z) in series.c.iter().zip(&mut self.row) {
                     *z = turn.conj();
                     u += c.re * turn.re - c.im * turn.im;
@@ -288,7 +294,7 @@ impl FrequencyTime {
                 let begin = branch.begin + k as f64 * length;
                 for (node, weight) in quadrature::GAUSS_8 {
                     let (s, weight) = (0.5 * (1.0 + node), 0.5 * length * weight);
-                    match k == 0 && branch.turns {
+                    match k == 0 && branch.starts_at_turning_point {
                         true => add(begin + length * s * s, 2.0 * s * weight),
                         false => add(begin + length * s, weight),
                     }
@@ -320,7 +326,7 @@ impl FrequencyTime {
         let Some(tangent) = tangent else { return };
         for (a, &h) in harmonics.iter().enumerate() {
             for (b, &k) in harmonics.iter().enumerate() {
-                let (minus, plus) = pair(&self.spectra[0], h, k);
+                let (minus, plus) = spectrum_pair(&self.spectra[0], h, k);
                 add_block(tangent, 2 * nh, (a, h), (b, k), as_block(minus, plus));
             }
         }
@@ -338,7 +344,7 @@ fn row<'a>(row: &mut [Complex64], harmonics: &[usize], points: impl IntoIterator
         match point.anchor {
             OffsetSource::Nothing => {}
             OffsetSource::At(phase) => {
-                let (mut turn, step) = turns(harmonics, phase);
+                let (mut turn, step) = rotations(harmonics, phase);
                 for value in row.iter_mut() {
                     *value += turn * factor;
                     turn *= step;

@@ -31,7 +31,7 @@ use grouping::PortBuilder;
 pub(super) use interior_point::InteriorPort;
 use prox::{RigidFriction, ScaledLaw};
 use sliders::ElasticPart;
-pub(super) use workspace::{REPEATS, at_once};
+pub(super) use workspace::{PERIODICITY_TOLERANCE, derivative_batch};
 
 use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
@@ -41,7 +41,7 @@ use num_complex::Complex64;
 
 /// Number of axes from which GMRES may replace elimination. With few axes and many harmonics,
 /// GMRES converges slowly and the matrix is small.
-pub(super) const MANY_DIRECTIONS: usize = 24;
+pub(super) const KRYLOV_AXES: usize = 24;
 
 /// The law of a port, by the view that is used.
 #[derive(Debug, Clone)]
@@ -67,9 +67,9 @@ enum Kernel {
 pub(super) struct PortMember {
     pub joint: usize,
     /// Motion of the joint divided by the motion of the port.
-    pub factor: f64,
+    pub motion_ratio: f64,
     /// Force of the joint divided by the force of the port.
-    pub share: f64,
+    pub force_ratio: f64,
 }
 
 /// Displacements and states of a joint in static equilibrium under the constant
@@ -90,12 +90,12 @@ pub(super) struct Port {
     /// The joints of the port. The port has the axes of the first one.
     pub members: Vec<PortMember>,
     /// Number of its first axis among the axes of all ports.
-    pub first: usize,
+    pub first_axis: usize,
     /// Number of axes.
     pub axes: usize,
     /// Compliance of the spring between the joint and this port, m/N; zero if
     /// the port has the joint's own motion.
-    pub series: f64,
+    pub series_compliance: f64,
     /// Size of its forces, N; infinite if they are unbounded. Finite for a force port.
     pub scale: f64,
     /// The penalty above which its resolvent is single-valued, N s/m.
@@ -118,12 +118,12 @@ impl Port {
 
     /// Tells whether the law is integrated through the period, step by step.
     /// Derivatives then cost many times as much as forces.
-    pub fn marches(&self) -> bool {
-        self.steps() || self.stateful().is_some()
+    pub fn has_memory_steps(&self) -> bool {
+        self.uses_return_map() || self.rate_law_with_states().is_some()
     }
 
     /// Tells whether the law is integrated by its return map.
-    pub fn steps(&self) -> bool {
+    pub fn uses_return_map(&self) -> bool {
         matches!(self.kernel, Kernel::Step(_))
     }
 
@@ -146,7 +146,7 @@ impl Port {
 
     /// Tells whether the kernel distinguishes slip from stick at every sample
     /// ([`FrequencyTime::slips`]).
-    pub fn tells_slip(&self) -> bool {
+    pub fn samples_slip(&self) -> bool {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().all(|part| matches!(part, ElasticPart::Slider { .. })),
             Kernel::Rigid(_) => true,
@@ -156,7 +156,7 @@ impl Port {
 
     /// Returns the numbers of its axes among the axes of all ports.
     pub fn range(&self) -> std::ops::Range<usize> {
-        self.first..self.first + self.axes
+        self.first_axis..self.first_axis + self.axes
     }
 
     /// Returns the entry of a joint, if the joint belongs to this port.
@@ -166,7 +166,7 @@ impl Port {
 
     /// Tells whether two ports have the same kind, axes and joints, whatever their parameters.
     pub fn is_like(&self, other: &Port) -> bool {
-        let kind = |port: &Port| (port.first, port.axes, std::mem::discriminant(&port.kernel));
+        let kind = |port: &Port| (port.first_axis, port.axes, std::mem::discriminant(&port.kernel));
         let alike = |(own, its): (&PortMember, &PortMember)| own.joint == its.joint;
         kind(self) == kind(other)
             && self.members.len() == other.members.len()
@@ -175,10 +175,10 @@ impl Port {
 
     /// Returns the complex stiffness of small motions about rest at a frequency
     /// (rad/s), axes × axes, N/m. For motion ports.
-    pub fn at_rest(&self, omega: f64) -> DMatrix<Complex64> {
+    pub fn small_motion_stiffness(&self, omega: f64) -> DMatrix<Complex64> {
         match &self.kernel {
             Kernel::Step(law) | Kernel::Rate(law) => {
-                crate::method::orbit_search::describing_guess::at_rest(&**law, omega)
+                crate::method::orbit_search::describing_guess::small_motion_stiffness(&**law, omega)
             }
             _ => DMatrix::from_diagonal_element(self.axes, self.axes, Complex64::new(self.stiffness(), 0.0)),
         }
@@ -189,15 +189,15 @@ impl Port {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(ElasticPart::stiffness).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => {
-                if self.series > 0.0 {
-                    1.0 / self.series
+                if self.series_compliance > 0.0 {
+                    1.0 / self.series_compliance
                 } else {
                     0.0
                 }
             }
             Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => {
                 // for a rate law, at 1 rad/s, where its states are assumed to follow
-                let at_rest = crate::method::orbit_search::describing_guess::at_rest(&**law, 1.0);
+                let at_rest = crate::method::orbit_search::describing_guess::small_motion_stiffness(&**law, 1.0);
                 (0..self.axes).map(|a| at_rest[(a, a)].norm()).fold(0.0, f64::max)
             }
         }
@@ -205,20 +205,22 @@ impl Port {
 
     /// Returns the stiffness along one axis while the faces are closed and stick, N/m. It is
     /// zero for a force port, whose force is an unknown.
-    pub fn closed(&self, axis: usize) -> f64 {
+    pub fn closed_stiffness(&self, axis: usize) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(ElasticPart::closed).sum(),
             Kernel::Rigid(_) | Kernel::Prox(_) => 0.0,
             Kernel::Masing(law) | Kernel::Step(law) | Kernel::Rate(law) => match law.closed_stiffness() {
                 Some(closed) => closed[axis],
-                None => crate::method::orbit_search::describing_guess::at_rest(&**law, 1.0)[(axis, axis)].re,
+                None => {
+                    crate::method::orbit_search::describing_guess::small_motion_stiffness(&**law, 1.0)[(axis, axis)].re
+                }
             },
         }
     }
 
     /// Returns the largest displacement at which its springs begin to slip, m;
     /// zero without springs.
-    pub fn reach(&self) -> f64 {
+    pub fn slip_displacement(&self) -> f64 {
         match &self.kernel {
             Kernel::Sliders(parts) => parts.iter().map(ElasticPart::reach).fold(0.0, f64::max),
             Kernel::Masing(law) => law.masing().map_or(0.0, MasingView::slip_displacement),
@@ -228,8 +230,8 @@ impl Port {
 
     /// Returns the displacement over which the states of a law cross their range, m. `None` for
     /// a law without followed states or with an unbounded force.
-    pub fn layer(&self) -> Option<f64> {
-        self.stateful().map(|_| self.scale / self.stiffness()).filter(|layer| layer.is_finite())
+    pub fn state_range_displacement(&self) -> Option<f64> {
+        self.rate_law_with_states().map(|_| self.scale / self.stiffness()).filter(|layer| layer.is_finite())
     }
 
     /// Returns the number of internal states of a motion port.
@@ -243,7 +245,7 @@ impl Port {
     }
 
     /// Returns the law if it is a rate law with internal states.
-    fn stateful(&self) -> Option<&SharedLaw> {
+    fn rate_law_with_states(&self) -> Option<&SharedLaw> {
         match &self.kernel {
             Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() > 0) => Some(law),
             _ => None,
@@ -251,7 +253,7 @@ impl Port {
     }
 
     /// Returns the law if its force is bounded, sampled, and decided by the velocity alone.
-    fn steep(&self) -> Option<&SharedLaw> {
+    fn velocity_law(&self) -> Option<&SharedLaw> {
         match &self.kernel {
             Kernel::Prox(times) => Some(&times.law),
             Kernel::Rate(law) if law.rate().is_some_and(|rate| rate.states() == 0) => {
@@ -295,10 +297,10 @@ impl Ports {
     /// # Errors
     /// Refuses a law without a view that harmonic balance can use.
     pub fn new(system: &System) -> Result<Self, MethodError> {
-        Ports::of(system.joints())
+        Ports::from_joints(system.joints())
     }
 
-    fn of(joints: &[SystemJoint]) -> Result<Self, MethodError> {
+    fn from_joints(joints: &[SystemJoint]) -> Result<Self, MethodError> {
         let mut gathered = PortBuilder::default();
         for (j, joint) in joints.iter().enumerate() {
             gathered.push(j, joint)?;
@@ -311,17 +313,17 @@ impl Ports {
     ///
     /// # Errors
     /// See [`Ports::new`].
-    pub fn of_sector(system: &System) -> Result<(Self, Option<Self>), MethodError> {
+    pub fn for_sector(system: &System) -> Result<(Self, Option<Self>), MethodError> {
         let Some(cyclic) = system.cyclic() else { return Ok((Ports::new(system)?, None)) };
         let joints = system.joints().len() / cyclic.sectors;
-        let first = Ports { wave: Some(cyclic), ..Ports::of(&system.joints()[..joints])? };
+        let first = Ports { wave: Some(cyclic), ..Ports::from_joints(&system.joints()[..joints])? };
         let mut all = Ports::default();
         for sector in 0..cyclic.sectors {
             let (before, axes) = (sector * joints, all.axes.len());
             all.axes.extend(first.axes.iter().map(|(joint, a)| (before + joint, *a)));
             all.list.extend(first.iter().map(|port| {
                 let members = port.members.iter().map(|member| PortMember { joint: before + member.joint, ..*member });
-                Port { members: members.collect(), first: axes + port.first, ..port.clone() }
+                Port { members: members.collect(), first_axis: axes + port.first_axis, ..port.clone() }
             }));
         }
         Ok((first, Some(all)))
@@ -334,7 +336,7 @@ impl Ports {
 
     /// Sets the states from which the history of every motion begins, one for each port. For a
     /// ring, `states` are those of the first sector.
-    pub fn begin_at(&mut self, states: &[StaticState]) {
+    pub fn set_static_states(&mut self, states: &[StaticState]) {
         let of_ports = self.list.iter().zip(states.iter().cycle());
         self.equilibrium = of_ports.flat_map(|(port, state)| state.displacement[..port.axes].to_vec()).collect();
         for (port, state) in self.list.iter_mut().zip(states.iter().cycle()).filter(|(port, _)| !port.is_force()) {
@@ -352,7 +354,7 @@ impl Ports {
 
     /// Sets the initial states of all ports to `factor` times those in
     /// `states`. Displacements stay.
-    pub fn scale_static_forces(&mut self, states: &[StaticState], factor: f64) {
+    pub fn scale_static_states(&mut self, states: &[StaticState], factor: f64) {
         for (port, state) in self.list.iter_mut().zip(states) {
             let own = &mut port.static_state.states;
             own.iter_mut().zip(&state.states).for_each(|(z, known)| *z = factor * known);
@@ -376,7 +378,7 @@ impl Ports {
     }
 
     /// Returns the joint of an axis (the first joint of its port), and the axis within the joint.
-    pub fn place(&self, number: usize) -> (usize, usize) {
+    pub fn joint_axis(&self, number: usize) -> (usize, usize) {
         self.axes[number]
     }
 
@@ -388,12 +390,12 @@ impl Ports {
     /// Tells whether any force is bounded, sampled, and decided by the velocity alone: friction
     /// that is steep, falls with velocity, or acts in a plane.
     pub fn has_steep(&self) -> bool {
-        self.list.iter().any(|port| port.steep().is_some())
+        self.list.iter().any(|port| port.velocity_law().is_some())
     }
 
     /// Tells whether such a force, or the force of a rate law with states, may fall with velocity.
     pub fn has_falling(&self) -> bool {
-        let laws = self.list.iter().filter_map(|port| port.steep().or_else(|| port.stateful()));
+        let laws = self.list.iter().filter_map(|port| port.velocity_law().or_else(|| port.rate_law_with_states()));
         laws.into_iter().any(|law| !law.is_incrementally_passive())
     }
 }
@@ -409,7 +411,7 @@ impl FrequencyTime {
     ///
     /// The law is evaluated at `1/share` of the motion, and its force is multiplied by `share`.
     /// A large share raises the slip limits: every joint sticks, as in a very small motion.
-    pub fn respond(
+    pub fn motion_port_force(
         &mut self,
         port: &Port,
         (omega, share): (f64, f64),
@@ -429,7 +431,7 @@ impl FrequencyTime {
             }
         }
         match &port.kernel {
-            Kernel::Sliders(parts) => self.slide(parts, &port.static_state, &motion, force, tangent),
+            Kernel::Sliders(parts) => self.slider_forces(parts, &port.static_state, &motion, force, tangent),
             Kernel::Masing(law) => {
                 if let Some(law) = law.masing() {
                     self.masing(law, &port.static_state, &motion, force, tangent);
@@ -455,8 +457,8 @@ impl FrequencyTime {
     /// Computes the image of the forces λ of a force port along a motion c: `P J(λ + ε c')`. If
     /// the motion is imposed (`penalty` infinite), the image is the law's force at that
     /// velocity, and λ does not change it. Writes the derivative of the image by `λ + ε c'`
-    /// into `tangent`. For `share`, see [`FrequencyTime::respond`].
-    pub fn image(
+    /// into `tangent`. For `share`, see [`FrequencyTime::motion_port_force`].
+    pub fn force_port_image(
         &mut self,
         port: &Port,
         (omega, penalty, share): (f64, f64, f64),
@@ -501,9 +503,9 @@ impl FrequencyTime {
         {
             self.step_by_step(step, port, c, &mut out, None);
         } else if port.is_force() {
-            self.image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
+            self.force_port_image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
         } else {
-            self.respond(port, (omega, 1.0), c, &mut out, None);
+            self.motion_port_force(port, (omega, 1.0), c, &mut out, None);
         }
     }
 }
@@ -513,7 +515,7 @@ const _: () = assert!(MAX_DIRECTIONS == 3, "signals of a port are kept for three
 
 /// Returns the start of every port's tangent, and the length of all. A port
 /// with d axes has a square of 2 d × harmonics rows.
-pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
+pub(super) fn tangent_ranges(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
     let mut length = 0;
     let starts = ports
         .iter()
@@ -527,6 +529,6 @@ pub(super) fn blocks(ports: &Ports, harmonics: usize) -> (Vec<usize>, usize) {
 }
 
 /// Returns the index range of the tangent of port number `p`.
-pub(super) fn block(blocks: &[usize], p: usize, port: &Port, harmonics: usize) -> std::ops::Range<usize> {
+pub(super) fn tangent_range(blocks: &[usize], p: usize, port: &Port, harmonics: usize) -> std::ops::Range<usize> {
     blocks[p]..blocks[p] + (2 * harmonics * port.axes).pow(2)
 }

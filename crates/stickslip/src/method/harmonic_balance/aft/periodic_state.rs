@@ -11,8 +11,8 @@
 //! directions, states and derivatives are those of a joint that moves straight from static
 //! equilibrium to the beginning of the period.
 
-use super::frequency_time::{FrequencyTime, share};
-use super::workspace::{REPEATS, StepWorkspace, at_once};
+use super::frequency_time::{FrequencyTime, amplitude_factor};
+use super::workspace::{PERIODICITY_TOLERANCE, StepWorkspace, derivative_batch};
 use crate::law::MAX_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -21,21 +21,21 @@ use std::ops::Range;
 use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::interrupt;
 
-/// Replaces [`REPEATS`] if the change over a period no longer decreases.
+/// Replaces [`PERIODICITY_TOLERANCE`] if the change over a period no longer decreases.
 const ROUNDED: f64 = 1e-9;
 /// Maximum number of periods with derivatives; hysteresis that slips forgets in a few.
 const PERIODS: usize = 60;
 /// Maximum number of initial periods without derivatives, and the ratio of successive changes
 /// above which they end. A period with derivatives costs as much as three without.
-const FORGETS: usize = 6;
-const SLOW: f64 = 0.03;
+const PLAIN_PERIODS: usize = 6;
+const SLOW_RATIO: f64 = 0.03;
 /// Ratio to the least change so far that a step of Broyden's method must reach.
 /// Two misses in a row end the iteration.
-const NEARER: f64 = 0.3;
+const BROYDEN_REDUCTION: f64 = 0.3;
 /// Singular values of `1 - Π` below this belong to states that are never forgotten.
-const NEUTRAL: f64 = 1e-9;
+const NEUTRAL_SINGULAR_VALUE: f64 = 1e-9;
 /// Number of harmonics up to which a matrix product transforms derivatives, instead of FFTs.
-const FEW: usize = 16;
+const MATRIX_HARMONICS: usize = 16;
 
 /// A law with memory as a sequence of steps.
 pub(super) trait StepSequence {
@@ -53,7 +53,7 @@ pub(super) trait StepSequence {
     /// Returns the factors `w` of the inputs `Re(U w)` along an axis, for the
     /// motion `Re(U e^{jhθ})` and a step that ends where `e^{jhθ}` equals `at`.
     /// `angle` is the length of a step.
-    fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
+    fn input_factors(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
     /// Returns these factors for the initial step.
     fn first_waves(&self, h: usize) -> [Complex64; 4];
     /// Takes all steps of a period: from sample 0 to sample 1, and at last from
@@ -63,19 +63,24 @@ pub(super) trait StepSequence {
     /// `rows`, [sample], receives the derivatives of the step that ends at the sample: those of
     /// the states after it, then those of the forces. Its columns are the inputs, the states
     /// before, and ω if that is known. Returns false if a step has no solution.
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
     /// Takes the initial step, straight from static equilibrium to sample 0.
     /// Returns false if it has no solution.
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
 }
 
 impl FrequencyTime {
     /// Computes the forces along the axes and their derivative. The forces are
     /// NaN if no periodic states are found.
-    pub(super) fn march(&mut self, march: &mut dyn StepSequence, force: &mut [Complex64], tangent: Option<&mut [f64]>) {
+    pub(super) fn periodic_response(
+        &mut self,
+        march: &mut dyn StepSequence,
+        force: &mut [Complex64],
+        tangent: Option<&mut [f64]>,
+    ) {
         let nh = self.harmonics.len();
-        let mut memory = std::mem::take(&mut self.march);
-        if let Some(product) = self.repeat(march, &mut memory, tangent.is_some()) {
+        let mut memory = std::mem::take(&mut self.workspace);
+        if let Some(product) = self.find_periodic_state(march, &mut memory, tangent.is_some()) {
             for a in 0..march.axes() {
                 self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
             }
@@ -88,13 +93,13 @@ impl FrequencyTime {
             self.state.clear();
             force.fill(Complex64::new(f64::NAN, 0.0));
         }
-        self.march = memory;
+        self.workspace = memory;
     }
 
     /// Finds periodic states, into `self.state`, and the forces. With `linear`,
     /// computes the derivatives of all steps and returns Π; otherwise returns
     /// an arbitrary matrix. `None` if no periodic states are found.
-    fn repeat(
+    fn find_periodic_state(
         &mut self,
         march: &mut dyn StepSequence,
         memory: &mut StepWorkspace,
@@ -102,41 +107,44 @@ impl FrequencyTime {
     ) -> Option<DMatrix<f64>> {
         let m = march.states();
         let scale = march.state_scale();
-        let known = std::mem::take(&mut self.begin);
+        let known = std::mem::take(&mut self.known_state);
         let mut z = DVector::zeros(m);
         let begun = m > 0 && known.state.len() == m;
         if begun {
             z.copy_from_slice(&known.state);
         } else {
             let mut force = [0.0; MAX_DIRECTIONS];
-            if !march.first(z.as_mut_slice(), &mut force, None) {
+            if !march.initial_step(z.as_mut_slice(), &mut force, None) {
                 return None;
             }
         }
-        if m > 0 && !linear && known.forgets.len() == m * m {
-            let inverse = DMatrix::from_row_slice(m, m, &known.forgets);
-            if self.repeat_nearby(march, &mut z, inverse)? {
+        if m > 0 && !linear && known.forgetting_inverse.len() == m * m {
+            let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
+            if self.broyden(march, &mut z, inverse)? {
                 return Some(DMatrix::zeros(m, m));
             }
-        } else if linear && self.repeats > REPEATS && known.forgets.len() == m * m {
+        } else if linear
+            && self.periodicity_tolerance > PERIODICITY_TOLERANCE
+            && known.forgetting_inverse.len() == m * m
+        {
             // known states from other samples: one period without derivatives brings them near
             // enough, at a third of the cost of one with derivatives
-            let inverse = DMatrix::from_row_slice(m, m, &known.forgets);
+            let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
             let change = self.period(march, &z, None)? - &z;
             z += inverse * change;
         } else if !begun {
             // a law that slips forgets its initial states in a few periods without derivatives
             let mut last = f64::INFINITY;
-            for _ in 0..FORGETS {
+            for _ in 0..PLAIN_PERIODS {
                 let after = self.period(march, &z, None)?;
                 let gap = (&after - &z).amax() / scale;
                 z = after;
-                if gap <= REPEATS && !linear {
+                if gap <= PERIODICITY_TOLERANCE && !linear {
                     self.state.clear();
                     self.state.extend(z.iter());
                     return Some(DMatrix::zeros(m, m));
                 }
-                if gap <= REPEATS || gap > SLOW * last {
+                if gap <= PERIODICITY_TOLERANCE || gap > SLOW_RATIO * last {
                     break;
                 }
                 last = gap;
@@ -146,7 +154,7 @@ impl FrequencyTime {
         for _ in 0..PERIODS {
             let (after, product) = self.linear_period(march, &z, memory)?;
             let gap = (&after - &z).amax() / scale;
-            if m == 0 || gap <= self.repeats || (gap <= ROUNDED && gap >= 0.5 * last) {
+            if m == 0 || gap <= self.periodicity_tolerance || (gap <= ROUNDED && gap >= 0.5 * last) {
                 self.state.clear();
                 self.state.extend(z.iter());
                 return Some(product);
@@ -169,7 +177,7 @@ impl FrequencyTime {
     ///
     /// Source: Broyden, "A class of methods for solving nonlinear simultaneous
     /// equations" (1965), his good method.
-    fn repeat_nearby(
+    fn broyden(
         &mut self,
         march: &mut dyn StepSequence,
         z: &mut DVector<f64>,
@@ -179,12 +187,12 @@ impl FrequencyTime {
         let mut change = self.period(march, z, None)? - &*z;
         let mut best = change.amax() / scale;
         let mut waited = 0;
-        while best > REPEATS {
+        while best > PERIODICITY_TOLERANCE {
             let step = &inverse * &change;
             *z += &step;
             let after = self.period(march, z, None)? - &*z;
             let gap = after.amax() / scale;
-            (best, waited) = if gap < NEARER * best { (gap, 0) } else { (best.min(gap), waited + 1) };
+            (best, waited) = if gap < BROYDEN_REDUCTION * best { (gap, 0) } else { (best.min(gap), waited + 1) };
             if waited > 1 || !gap.is_finite() {
                 return Some(false);
             }
@@ -216,8 +224,8 @@ impl FrequencyTime {
             rows.resize(n * size, 0.0);
         }
         let mut z = z.clone();
-        self.marched += n;
-        march.around(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
+        self.law_steps += n;
+        march.period(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
     }
 
     /// Integrates one period with derivatives. Returns the states after it and Π, and writes
@@ -231,7 +239,7 @@ impl FrequencyTime {
         let after = self.period(march, z, Some(&mut memory.rows))?;
         let n = self.samples();
         memory.by_state.resize(n * march.axes() * march.states(), 0.0);
-        Some((after, PeriodDerivatives::of(march, &memory.rows, n).product(&mut memory.by_state)))
+        Some((after, PeriodDerivatives::new(march, &memory.rows, n).product(&mut memory.by_state)))
     }
 
     /// Adds the derivative of the forces. Returns false if the first period has no solution.
@@ -246,11 +254,11 @@ impl FrequencyTime {
         let (m, d) = (march.states(), march.axes());
         let size = 2 * nh * d;
         let open = DMatrix::identity(m, m) - product;
-        let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL;
+        let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL_SINGULAR_VALUE;
         let inverse = pseudo_inverse(open);
-        self.forgets.clear();
+        self.forgetting_inverse.clear();
         if !neutral {
-            self.forgets.extend(inverse.transpose().iter());
+            self.forgetting_inverse.extend(inverse.transpose().iter());
         }
         // states that are never forgotten have the derivative of the first period
         let beginning = if neutral {
@@ -265,7 +273,7 @@ impl FrequencyTime {
             None
         };
         let wide = 2 * nh;
-        let few = nh <= FEW;
+        let few = nh <= MATRIX_HARMONICS;
         if few {
             self.fill_projection(&mut memory.projection);
             memory.of_states.resize(wide * d * m, 0.0);
@@ -274,22 +282,27 @@ impl FrequencyTime {
         }
         // a force that depends only on the end of the step has a slope at every sample
         let one = Complex64::new(1.0, 0.0);
-        let ends = |h: &usize| march.inputs() == 2 && march.waves(*h, TAU / n as f64, one)[1] == one;
+        let ends = |h: &usize| march.inputs() == 2 && march.input_factors(*h, TAU / n as f64, one)[1] == one;
         let by_ends = few && self.harmonics.iter().all(ends);
-        let own = if by_ends { d - PeriodDerivatives::of(march, &memory.rows, n).momentary() } else { d };
+        let own = if by_ends { d - PeriodDerivatives::new(march, &memory.rows, n).momentary() } else { d };
         for a in own..d {
             self.momentary_tangent(march, &memory.rows, a, tangent);
         }
         // few harmonics: all axes at once; a long series: one axis and a group
         // of harmonics at a time
-        let (together, count) = if few { (d, nh) } else { (1, at_once(d, n, nh).0) };
+        let (together, count) = if few { (d, nh) } else { (1, derivative_batch(d, n, nh).0) };
         let moved = if own == 0 { 0 } else { d };
         for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
             self.fill_waves(march, memory, range.clone());
             for first in (0..moved).step_by(together.max(1)) {
                 let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
                 let tall = together * wide_here;
-                self.follow(march, memory, steps, (DerivativeVariable::Solution { first }, together, wide_here, own));
+                self.differentiate_forces(
+                    march,
+                    memory,
+                    steps,
+                    (DerivativeVariable::Solution { first }, together, wide_here, own),
+                );
                 if few {
                     // [sample][axis][column] times the projection on the harmonics
                     memory.spectrum.resize(own * tall * wide, 0.0);
@@ -313,7 +326,7 @@ impl FrequencyTime {
                     }
                     let sums = self.fourier.transform(&mut memory.signal);
                     for (l, &to) in self.harmonics.iter().enumerate() {
-                        let value = sums[to] * share(to, n);
+                        let value = sums[to] * amplitude_factor(to, n);
                         let at = (a * wide + 2 * l) * size + first * wide + 2 * range.start + column;
                         tangent[at] += value.re;
                         if to > 0 {
@@ -324,7 +337,12 @@ impl FrequencyTime {
             }
         }
         if march.knows_frequency() {
-            self.follow(march, memory, (beginning.as_deref(), &inverse), (DerivativeVariable::Frequency, 1, 1, d));
+            self.differentiate_forces(
+                march,
+                memory,
+                (beginning.as_deref(), &inverse),
+                (DerivativeVariable::Frequency, 1, 1, d),
+            );
             memory.shift_columns(m, 1);
             memory.signal.resize(n, 0.0);
             for a in 0..d {
@@ -361,7 +379,7 @@ impl FrequencyTime {
         projection.clear();
         for i in 0..n {
             for &h in &self.harmonics {
-                let wave = self.turns[h * i % n] * share(h, n);
+                let wave = self.rotations[h * i % n] * amplitude_factor(h, n);
                 projection.extend([wave.re, if h == 0 { 0.0 } else { -wave.im }]);
             }
         }
@@ -372,13 +390,13 @@ impl FrequencyTime {
     fn fill_waves(
         &self,
         march: &dyn StepSequence,
-        StepWorkspace { waves, steps, .. }: &mut StepWorkspace,
+        StepWorkspace { input_factors: waves, steps, .. }: &mut StepWorkspace,
         range: Range<usize>,
     ) {
         let (n, kinds, harmonics) = (self.samples(), march.inputs(), &self.harmonics[range]);
         // all steps have these factors, rotated on the unit circle
         let one = Complex64::new(1.0, 0.0);
-        let each = harmonics.iter().map(|&h| march.waves(h, TAU / n as f64, one));
+        let each = harmonics.iter().map(|&h| march.input_factors(h, TAU / n as f64, one));
         let fixed: Vec<[Complex64; 4]> = each.chain(harmonics.iter().map(|&h| march.first_waves(h))).collect();
         if waves.len() == 2 * (n + 1) * kinds * harmonics.len() && *steps == fixed {
             return;
@@ -388,7 +406,7 @@ impl FrequencyTime {
         for _ in 0..n {
             for kind in 0..kinds {
                 for ((at, fixed), &h) in at.iter().zip(&fixed).zip(harmonics) {
-                    waves.extend(<[f64; 2]>::from(parts(fixed[kind] * self.turns[*at], h)));
+                    waves.extend(<[f64; 2]>::from(parts(fixed[kind] * self.rotations[*at], h)));
                 }
             }
             for (at, &h) in at.iter_mut().zip(harmonics) {
@@ -409,7 +427,7 @@ impl FrequencyTime {
     /// The columns are the parts of the harmonics of the motion along `count` axes, or the
     /// frequency. `beginning` contains the steps of the first period if some state is never
     /// forgotten; the states at t = 0 then change with the inputs.
-    fn follow(
+    fn differentiate_forces(
         &self,
         march: &dyn StepSequence,
         memory: &mut StepWorkspace,
@@ -423,7 +441,7 @@ impl FrequencyTime {
         let by = InputLayout { input, kinds: march.inputs(), axes: d, width, wide, tall: count * wide };
         let tall = by.tall;
         let (mut start, mut next) = (vec![0.0; m * tall], vec![0.0; m * tall]);
-        let table = &memory.waves;
+        let table = &memory.input_factors;
         let at = |i: usize| &table[i * by.kinds * wide..][..by.kinds * wide];
         let none = Vec::new();
         let waves = |i: usize| if matches!(input, DerivativeVariable::Frequency) { &none[..] } else { at(i) };
@@ -471,7 +489,7 @@ impl FrequencyTime {
         first.resize((m + d) * width(march), 0.0);
         let mut z = DVector::zeros(m);
         let mut force = [0.0; MAX_DIRECTIONS];
-        if !march.first(z.as_mut_slice(), &mut force, Some(first)) {
+        if !march.initial_step(z.as_mut_slice(), &mut force, Some(first)) {
             return None;
         }
         let forces = self.force.clone();
@@ -506,7 +524,7 @@ struct PeriodDerivatives<'a> {
 }
 
 impl<'a> PeriodDerivatives<'a> {
-    fn of(march: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
+    fn new(march: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
         let (states, axes) = (march.states(), march.axes());
         PeriodDerivatives { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
     }
@@ -529,14 +547,14 @@ impl<'a> PeriodDerivatives<'a> {
     fn product(&self, forces: &mut [f64]) -> DMatrix<f64> {
         match self.states {
             0 => DMatrix::zeros(0, 0),
-            1 => self.multiplied::<1>(forces),
-            2 => self.multiplied::<2>(forces),
-            _ => self.of_any(forces),
+            1 => self.product_static::<1>(forces),
+            2 => self.product_static::<2>(forces),
+            _ => self.product_dynamic(forces),
         }
     }
 
     /// Computes the product for a fixed number of states; most laws have one or two.
-    fn multiplied<const M: usize>(&self, forces: &mut [f64]) -> DMatrix<f64> {
+    fn product_static<const M: usize>(&self, forces: &mut [f64]) -> DMatrix<f64> {
         let mut product: [[f64; M]; M] = std::array::from_fn(|s| std::array::from_fn(|t| f64::from(u8::from(s == t))));
         for step in 1..=self.samples {
             let i = step % self.samples;
@@ -553,7 +571,7 @@ impl<'a> PeriodDerivatives<'a> {
         DMatrix::from_fn(M, M, |s, t| product[s][t])
     }
 
-    fn of_any(&self, forces: &mut [f64]) -> DMatrix<f64> {
+    fn product_dynamic(&self, forces: &mut [f64]) -> DMatrix<f64> {
         let m = self.states;
         let mut product = DMatrix::identity(m, m);
         for step in 1..=self.samples {
@@ -657,12 +675,13 @@ fn add(to: &mut [f64], weight: f64, values: &[f64]) {
     }
 }
 
-/// Returns the pseudo-inverse, with singular values below [`NEUTRAL`] taken as zero.
+/// Returns the pseudo-inverse, with singular values below [`NEUTRAL_SINGULAR_VALUE`] taken as
+/// zero.
 fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let m = matrix.nrows();
     if m == 0 {
         return matrix;
     }
     let svd = matrix.svd(true, true);
-    svd.pseudo_inverse(NEUTRAL).unwrap_or_else(|_| DMatrix::zeros(m, m))
+    svd.pseudo_inverse(NEUTRAL_SINGULAR_VALUE).unwrap_or_else(|_| DMatrix::zeros(m, m))
 }

@@ -14,7 +14,7 @@
 //! passes through zero, and the value in the middle of the sample is taken.
 
 use super::Port;
-use super::frequency_time::{FrequencyTime, add_block, as_block, pair, share};
+use super::frequency_time::{FrequencyTime, add_block, amplitude_factor, as_block, spectrum_pair};
 use crate::law::{MAX_DIRECTIONS, ProxView, SampleMeans, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -37,7 +37,7 @@ impl ProxView for RigidFriction {
         slope[0] = if y[0].abs() < self.limit { 1.0 } else { 0.0 };
     }
     fn resolvent_means(&self, y: f64, e: f64, _penalty: f64) -> SampleMeans {
-        let mean = saturation(y / self.limit, e / self.limit);
+        let mean = clamp_means(y / self.limit, e / self.limit);
         SampleMeans { zeroth: self.limit * mean.zeroth, first: self.limit * mean.first, ..mean }
     }
 }
@@ -107,9 +107,16 @@ impl FrequencyTime {
             let mean = port.is_rigid() || self.changes_by(y, 1.0 / port.scale);
             // in stick the map is the identity and the force must equal the signal: the effect
             // of the mean over a sample is undone first
-            return self.along(|y, e| prox.resolvent_means(y, e, penalty), (mean, mean), port.scale, y, image, tangent);
+            return self.apply_on_line(
+                |y, e| prox.resolvent_means(y, e, penalty),
+                (mean, mean),
+                port.scale,
+                y,
+                image,
+                tangent,
+            );
         }
-        self.turn(prox, port.axes, penalty, y, image, tangent);
+        self.apply_in_plane(prox, port.axes, penalty, y, image, tangent);
     }
 
     /// Adds the harmonics of the force at the velocities `v`, which the force does not change.
@@ -127,15 +134,22 @@ impl FrequencyTime {
         {
             let mean = self.changes_by(v, slope / port.scale);
             let law = |v, e| prox.mean_at_velocity(v, e).unwrap_or_default();
-            return self.along(law, (mean, false), port.scale, v, image, None);
+            return self.apply_on_line(law, (mean, false), port.scale, v, image, None);
         }
         // the force reaches the limit at the velocity `width`
         let penalty = port.scale / width;
         v.iter_mut().for_each(|v| *v *= penalty);
         if port.axes == 1 {
-            return self.along(|y, e| prox.resolvent_means(y, e, penalty), (true, true), port.scale, v, image, None);
+            return self.apply_on_line(
+                |y, e| prox.resolvent_means(y, e, penalty),
+                (true, true),
+                port.scale,
+                v,
+                image,
+                None,
+            );
         }
-        self.turn(prox, port.axes, penalty, v, image, None);
+        self.apply_in_plane(prox, port.axes, penalty, v, image, None);
     }
 
     /// Tells whether a signal times `scale` may change over a sample by [`SMOOTH`] or more.
@@ -147,7 +161,7 @@ impl FrequencyTime {
 
     /// Applies a map along one axis. `mean`: the mean over each sample is taken. `undo`: the
     /// signal is rescaled first, so that the mean of the identity is the identity.
-    fn along(
+    fn apply_on_line(
         &mut self,
         map: impl Fn(f64, f64) -> SampleMeans,
         (mean, undo): (bool, bool),
@@ -157,7 +171,7 @@ impl FrequencyTime {
         tangent: Option<&mut [f64]>,
     ) {
         let n = self.samples();
-        let widen = |h: usize| if undo { 1.0 / (1.0 + change(h, n).norm_sqr() / 3.0) } else { 1.0 };
+        let widen = |h: usize| if undo { 1.0 / (1.0 + half_sample_change(h, n).norm_sqr() / 3.0) } else { 1.0 };
         self.synthesise(y, |h| Complex64::new(widen(h), 0.0));
         self.reserve_slopes(3);
         for i in 0..n {
@@ -178,7 +192,7 @@ impl FrequencyTime {
             self.work.copy_from_slice(&self.moment);
             let sums = self.fourier.transform(&mut self.work);
             for (f, &h) in image.iter_mut().zip(&self.harmonics) {
-                *f += sums[h] * share(h, n) * change(h, n).conj();
+                *f += sums[h] * amplitude_factor(h, n) * half_sample_change(h, n).conj();
             }
         }
         let Some(tangent) = tangent else { return };
@@ -190,11 +204,11 @@ impl FrequencyTime {
         let size = 2 * self.harmonics.len();
         for (a, &h) in self.harmonics.iter().enumerate() {
             for (b, &k) in self.harmonics.iter().enumerate() {
-                let (mut minus, mut plus) = pair(&self.spectra[0], h, k);
+                let (mut minus, mut plus) = spectrum_pair(&self.spectra[0], h, k);
                 if mean {
-                    let (row, column) = (change(h, n).conj(), change(k, n));
-                    let (minus_1, plus_1) = pair(&self.spectra[1], h, k);
-                    let (minus_2, plus_2) = pair(&self.spectra[2], h, k);
+                    let (row, column) = (half_sample_change(h, n).conj(), half_sample_change(k, n));
+                    let (minus_1, plus_1) = spectrum_pair(&self.spectra[1], h, k);
+                    let (minus_2, plus_2) = spectrum_pair(&self.spectra[2], h, k);
                     minus += (row + column) * minus_1 + row * column * minus_2;
                     plus += (row + column.conj()) * plus_1 + row * column.conj() * plus_2;
                 }
@@ -204,7 +218,7 @@ impl FrequencyTime {
     }
 
     /// Applies a map along several axes.
-    fn turn(
+    fn apply_in_plane(
         &mut self,
         prox: &dyn ProxView,
         axes: usize,
@@ -243,13 +257,13 @@ impl FrequencyTime {
 }
 
 /// Returns half of the change of `e^{jhθ}` over a sample, relative to its middle.
-fn change(h: usize, n: usize) -> Complex64 {
+fn half_sample_change(h: usize, n: usize) -> Complex64 {
     Complex64::new(0.0, 0.5 * (h as f64 * TAU / n as f64).sin())
 }
 
 /// Returns the means of x clamped to [-1, 1].
 #[inline]
-fn saturation(y: f64, e: f64) -> SampleMeans {
+fn clamp_means(y: f64, e: f64) -> SampleMeans {
     let (at, reach) = (y.abs(), e.abs());
     if at >= 1.0 + reach {
         return SampleMeans { zeroth: y.signum(), ..SampleMeans::default() };

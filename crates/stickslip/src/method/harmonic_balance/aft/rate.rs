@@ -21,17 +21,17 @@ use std::f64::consts::TAU;
 const ITERATIONS: usize = 60;
 /// Longest change in an iteration, relative to the size of states. Some states
 /// are logarithms of the physical quantity.
-const LONGEST: f64 = 2.0;
+const LARGEST_CHANGE: f64 = 2.0;
 /// Change of the stages, relative to the size of states, at which a step is solved. Newton's
 /// method squares the error, so that the next change is rounding.
 const SOLVED: f64 = 1e-9;
 /// Coefficients of Radau IIA of order 3. Its stages lie at a third of the step and at its end.
 const RADAU: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 /// Share of the step after the first stage.
-const LEFT: f64 = 2.0 / 3.0;
+const FIRST_STAGE_REMAINDER: f64 = 2.0 / 3.0;
 /// Duration of the initial step from static equilibrium to the beginning of the
 /// period, as a share of the period.
-const LEAD: f64 = 0.25;
+const INITIAL_STEP_SHARE: f64 = 0.25;
 
 impl FrequencyTime {
     /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to
@@ -136,7 +136,7 @@ impl FrequencyTime {
             for (kind, stage) in stages.iter_mut().enumerate() {
                 let power =
                     |h: usize| if kind == 0 { Complex64::new(1.0, 0.0) } else { Complex64::new(0.0, h as f64 * omega) };
-                self.synthesise(c, |h| power(h) * Complex64::cis(-LEFT * angle * h as f64));
+                self.synthesise(c, |h| power(h) * Complex64::cis(-FIRST_STAGE_REMAINDER * angle * h as f64));
                 stage[a] = self.signal.clone();
             }
         }
@@ -148,7 +148,7 @@ impl FrequencyTime {
             axes,
             omega,
             length: angle / omega,
-            at: [&displacement, &velocity],
+            samples: [&displacement, &velocity],
             stages: &stages,
             rest,
             at_rest,
@@ -157,7 +157,7 @@ impl FrequencyTime {
             whole: Vec::new(),
             frequency: self.by_frequency.is_some(),
         };
-        self.march(&mut march, force, tangent);
+        self.periodic_response(&mut march, force, tangent);
         (self.displacement, self.velocity) = (displacement, velocity);
     }
 }
@@ -174,7 +174,7 @@ struct RateStepper<'a> {
     /// Time from sample to sample, s.
     length: f64,
     /// Displacements and velocities at the samples.
-    at: [&'a Signals; 2],
+    samples: [&'a Signals; 2],
     /// Displacements and velocities at the first stage of the step that ends at the sample.
     stages: &'a [Signals; 2],
     /// Displacements and states in static equilibrium, where the initial step begins.
@@ -364,8 +364,8 @@ fn newton_step(
     if !size.is_finite() {
         return None;
     }
-    if size > LONGEST * scale {
-        change *= LONGEST * scale / size;
+    if size > LARGEST_CHANGE * scale {
+        change *= LARGEST_CHANGE * scale / size;
     }
     Some((change, size, lu))
 }
@@ -386,23 +386,23 @@ impl StepSequence for RateStepper<'_> {
     fn knows_frequency(&self) -> bool {
         self.frequency
     }
-    fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4] {
+    fn input_factors(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4] {
         let turn = Complex64::new(0.0, h as f64 * self.omega);
-        let stage = at * Complex64::cis(-LEFT * angle * h as f64);
+        let stage = at * Complex64::cis(-FIRST_STAGE_REMAINDER * angle * h as f64);
         [stage, stage * turn, at, at * turn]
     }
     fn first_waves(&self, _h: usize) -> [Complex64; 4] {
-        let rate = self.omega / (TAU * LEAD);
-        [1.0 - LEFT, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
+        let rate = self.omega / (TAU * INITIAL_STEP_SHARE);
+        [1.0 - FIRST_STAGE_REMAINDER, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
-        let (n, m, d) = (self.at[0][0].len(), z.len(), self.axes);
+    fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
+        let (n, m, d) = (self.samples[0][0].len(), z.len(), self.axes);
         let size = (m + d) * (4 * d + m + usize::from(self.frequency));
         let read = |signals: [&Signals; 2], i: usize| RelativeMotion {
             displacement: std::array::from_fn(|a| if a < d { signals[0][a][i] } else { 0.0 }),
             velocity: std::array::from_fn(|a| if a < d { signals[1][a][i] } else { 0.0 }),
         };
-        let (at, [first, last]) = (self.at, self.stages);
+        let (at, [first, last]) = (self.samples, self.stages);
         let motions_of = |step: usize| [read([first, last], step % n), read(at, step % n)];
         if self.rate.is_batched() {
             let motions: Vec<_> = (1..=n).flat_map(motions_of).collect();
@@ -422,11 +422,13 @@ impl StepSequence for RateStepper<'_> {
         }
         true
     }
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
-        let duration = TAU * LEAD / self.omega;
-        let to: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| if a < self.axes { self.at[0][a][0] } else { 0.0 });
+    fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+        let duration = TAU * INITIAL_STEP_SHARE / self.omega;
+        let to: [f64; MAX_DIRECTIONS] =
+            std::array::from_fn(|a| if a < self.axes { self.samples[0][a][0] } else { 0.0 });
         let velocity = std::array::from_fn(|a| (to[a] - self.rest[a]) / duration);
-        let third = std::array::from_fn(|a| LEFT * self.rest[a] + (1.0 - LEFT) * to[a]);
+        let third =
+            std::array::from_fn(|a| FIRST_STAGE_REMAINDER * self.rest[a] + (1.0 - FIRST_STAGE_REMAINDER) * to[a]);
         let motions = [third, to].map(|displacement| RelativeMotion { displacement, velocity });
         let before = std::mem::take(&mut self.at_rest);
         let found = self.advance((duration, motions), &before, after, force, rows);

@@ -22,7 +22,7 @@ pub(super) struct HarmonicSeries<'a> {
 impl HarmonicSeries<'_> {
     /// Returns value, slope and curvature at a phase.
     pub(super) fn at(&self, theta: f64) -> (f64, f64, f64) {
-        let (mut turn, step) = turns(self.harmonics, theta);
+        let (mut turn, step) = rotations(self.harmonics, theta);
         let (mut value, mut slope, mut bend) = (0.0, 0.0, 0.0);
         for (&h, c) in self.harmonics.iter().zip(self.c) {
             let h = h as f64;
@@ -121,7 +121,7 @@ impl FrequencyTime {
 
 /// Returns `e^{jhθ}` of the first harmonic, and the factor from each harmonic to the next.
 #[inline]
-pub(super) fn turns(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
+pub(super) fn rotations(harmonics: &[usize], theta: f64) -> (Complex64, Complex64) {
     let first = harmonics[0];
     let gap = harmonics.get(1).map_or(0, |h| h - first);
     let step = Complex64::cis(gap as f64 * theta);

@@ -13,8 +13,8 @@
 
 use super::StaticState;
 use super::events::{BracketingGrid, Interval, OffsetSource, TurningPoint};
-use super::frequency_time::{FrequencyTime, ZERO, add_block, as_block, pair};
-use super::series::{HarmonicSeries, turns};
+use super::frequency_time::{FrequencyTime, ZERO, add_block, as_block, spectrum_pair};
+use super::series::{HarmonicSeries, rotations};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
@@ -59,7 +59,7 @@ impl ElasticPart {
 }
 
 /// Returns the force of each part's slider in static equilibrium, N; zero for a stop.
-fn held<'a>(parts: &'a [ElasticPart], rest: &'a StaticState) -> impl Iterator<Item = f64> + 'a {
+fn static_forces<'a>(parts: &'a [ElasticPart], rest: &'a StaticState) -> impl Iterator<Item = f64> + 'a {
     let mut states = rest.states.iter();
     parts.iter().map(move |part| match part {
         ElasticPart::Slider { .. } => states.next().copied().unwrap_or(0.0),
@@ -68,12 +68,12 @@ fn held<'a>(parts: &'a [ElasticPart], rest: &'a StaticState) -> impl Iterator<It
 }
 
 /// Newton step of an event, in grid steps, that counts as rounding.
-const PLACED: f64 = 1e-11;
+const EVENT_TOLERANCE: f64 = 1e-11;
 
 impl FrequencyTime {
     /// Adds the harmonics of the force of the parts in the motion `c` to
     /// `force`, and their derivative to `tangent`.
-    pub(super) fn slide(
+    pub(super) fn slider_forces(
         &mut self,
         parts: &[ElasticPart],
         rest: &StaticState,
@@ -81,10 +81,10 @@ impl FrequencyTime {
         force: &mut [Complex64],
         mut tangent: Option<&mut [f64]>,
     ) {
-        self.find(c);
+        self.find_turning_points(c);
         self.state.clear();
         let harmonics = std::mem::take(&mut self.harmonics);
-        for (part, hold) in parts.iter().zip(held(parts, rest)) {
+        for (part, hold) in parts.iter().zip(static_forces(parts, rest)) {
             self.history(part, [rest.displacement[0], hold], HarmonicSeries { harmonics: &harmonics, c });
             self.add_intervals(&harmonics, c, force, tangent.as_deref_mut());
         }
@@ -94,14 +94,14 @@ impl FrequencyTime {
     /// Samples the force and the slip of the parts. Writes the forces of the
     /// sliders at t = 0 into `self.state`.
     pub(super) fn sample_slides(&mut self, parts: &[ElasticPart], rest: &StaticState, c: &[Complex64]) {
-        self.find(c);
+        self.find_turning_points(c);
         self.synthesise(c, |_| Complex64::new(1.0, 0.0));
         self.state.clear();
         self.force[0].fill(0.0);
         self.slips.fill(false);
         let n = self.samples();
         let harmonics = std::mem::take(&mut self.harmonics);
-        for (part, hold) in parts.iter().zip(held(parts, rest)) {
+        for (part, hold) in parts.iter().zip(static_forces(parts, rest)) {
             self.history(part, [rest.displacement[0], hold], HarmonicSeries { harmonics: &harmonics, c });
             let before = self.force[0][0];
             for interval in &self.intervals {
@@ -125,7 +125,7 @@ impl FrequencyTime {
     }
 
     /// Samples the motion on the grid, and finds its turning points.
-    pub(super) fn find(&mut self, c: &[Complex64]) {
+    pub(super) fn find_turning_points(&mut self, c: &[Complex64]) {
         let BracketingGrid { fourier, pairs, value, slope } = &mut self.grid;
         pairs.clear();
         pairs.extend(self.harmonics.iter().copied().zip(c.iter().copied()));
@@ -140,11 +140,11 @@ impl FrequencyTime {
         self.extremes.clear();
         let extremes = &mut self.extremes;
         let mut add = |(low, high): (f64, f64), start: f64, sign: f64| {
-            let at = series.zero((low, high), start, sign, PLACED * angle, |series, theta| {
+            let at = series.zero((low, high), start, sign, EVENT_TOLERANCE * angle, |series, theta| {
                 let (_, slope, bend) = series.at(theta);
                 (slope, bend)
             });
-            extremes.push(TurningPoint { at, value: series.at(at).0 });
+            extremes.push(TurningPoint { phase: at, value: series.at(at).0 });
         };
         // upper bound of the change of the slope between two grid points
         let change: f64 = self.harmonics.iter().zip(c).map(|(&h, c)| (h * h) as f64 * c.l1_norm()).sum::<f64>() * angle;
@@ -215,7 +215,7 @@ impl FrequencyTime {
         }
         let mut slipped = None;
         for leg in 0..2 * count {
-            let TurningPoint { at, value } = self.extremes[leg % count];
+            let TurningPoint { phase: at, value } = self.extremes[leg % count];
             let trial = hold + kt * (value - from);
             if trial.abs() > limit {
                 (hold, from, anchor) = (limit.copysign(trial), value, OffsetSource::At(at));
@@ -230,7 +230,7 @@ impl FrequencyTime {
             return;
         };
         // one period from the end of that slip
-        let phase = |leg: usize, extremes: &[TurningPoint]| extremes[leg % count].at + TAU * (leg / count) as f64;
+        let phase = |leg: usize, extremes: &[TurningPoint]| extremes[leg % count].phase + TAU * (leg / count) as f64;
         let mut begin = phase(first, &self.extremes);
         for leg in first + 1..=first + count {
             let (before, end) = (phase(leg - 1, &self.extremes), phase(leg, &self.extremes));
@@ -262,10 +262,10 @@ impl FrequencyTime {
         let mut opened = None;
         for leg in 0..count {
             let (a, b) = (self.extremes[leg], self.extremes[(leg + 1) % count]);
-            let end = b.at + if leg + 1 == count { TAU } else { 0.0 };
+            let end = b.phase + if leg + 1 == count { TAU } else { 0.0 };
             // the first passage out of the gap, into contact
             if a.value <= gap && b.value > gap {
-                opened = Some((leg, self.passage(series, (a.at, end), gap, 1.0)));
+                opened = Some((leg, self.passage(series, (a.phase, end), gap, 1.0)));
                 break;
             }
         }
@@ -279,7 +279,7 @@ impl FrequencyTime {
         for leg in first + 1..=first + count {
             let (a, b) = (self.extremes[leg % count], self.extremes[(leg + 1) % count]);
             let turns = |leg: usize| TAU * (leg / count) as f64;
-            let (from, to) = (a.at + turns(leg), b.at + turns(leg + 1));
+            let (from, to) = (a.phase + turns(leg), b.phase + turns(leg + 1));
             if touching && b.value <= gap {
                 let end = self.passage(series, (from, to), gap, -1.0);
                 self.intervals.push(closed(begin, end));
@@ -306,10 +306,16 @@ impl FrequencyTime {
         let bounds = ((low as f64 * angle).max(before), (high as f64 * angle).min(after));
         let rise = u(high) - u(low);
         let share = if rise != 0.0 { (value - u(low)) / rise } else { 0.5 };
-        series.zero(bounds, (low as f64 + share.clamp(0.0, 1.0)) * angle, upwards, PLACED * angle, |series, theta| {
-            let (at, slope, _) = series.at(theta);
-            (at - value, slope)
-        })
+        series.zero(
+            bounds,
+            (low as f64 + share.clamp(0.0, 1.0)) * angle,
+            upwards,
+            EVENT_TOLERANCE * angle,
+            |series, theta| {
+                let (at, slope, _) = series.at(theta);
+                (at - value, slope)
+            },
+        )
     }
 
     /// Adds the harmonics of the force, and their derivative.
@@ -340,7 +346,7 @@ impl FrequencyTime {
             match interval.anchor {
                 OffsetSource::Nothing => continue,
                 OffsetSource::At(phase) => {
-                    let (mut turn, step) = turns(harmonics, phase);
+                    let (mut turn, step) = rotations(harmonics, phase);
                     for value in &mut self.row {
                         *value = turn * by;
                         turn *= step;
@@ -362,7 +368,7 @@ impl FrequencyTime {
         for (a, &h) in harmonics.iter().enumerate() {
             let mut sum = ZERO;
             for (b, &k) in harmonics.iter().enumerate() {
-                let (minus, plus) = pair(stiffness, h, k);
+                let (minus, plus) = spectrum_pair(stiffness, h, k);
                 sum += minus * c[b] + plus * c[b].conj();
                 if let Some(tangent) = tangent.as_deref_mut() {
                     add_block(tangent, size, (a, h), (b, k), as_block(minus, plus));

@@ -37,8 +37,8 @@ impl FrequencyTime {
             return self.step_by_step(step, port, c, force, tangent);
         }
         self.state.clear();
-        self.forgets.clear();
-        self.begin = InitialState::default();
+        self.forgetting_inverse.clear();
+        self.known_state = InitialState::default();
         let mut point = StepPoint::new(axes, step.states());
         step.advance_with_derivatives(axes, &rest, &mean, &states, &mut point);
         let mut tangent = tangent;
@@ -80,12 +80,12 @@ impl FrequencyTime {
         }
         let displacement = std::mem::take(&mut self.displacement);
         let point = StepPoint::new(axes, step.states());
-        let mut trail = std::mem::take(&mut self.trail);
+        let mut trail = std::mem::take(&mut self.states_at_samples);
         trail.clear();
         trail.resize(self.samples() * step.states(), f64::NAN);
-        let mut march = ReturnMapStepper { step, axes, at: &displacement, rest, states, point, trail };
-        self.march(&mut march, force, tangent);
-        self.trail = march.trail;
+        let mut march = ReturnMapStepper { step, axes, samples: &displacement, rest, states, point, trail };
+        self.periodic_response(&mut march, force, tangent);
+        self.states_at_samples = march.trail;
         self.displacement = displacement;
     }
 }
@@ -95,7 +95,7 @@ impl FrequencyTime {
 struct ReturnMapStepper<'a> {
     step: &'a dyn StepView,
     axes: usize,
-    at: &'a [Vec<f64>; MAX_DIRECTIONS],
+    samples: &'a [Vec<f64>; MAX_DIRECTIONS],
     /// Displacements and states in static equilibrium, where the initial step begins.
     rest: [f64; MAX_DIRECTIONS],
     states: Vec<f64>,
@@ -106,7 +106,7 @@ struct ReturnMapStepper<'a> {
 
 impl ReturnMapStepper<'_> {
     fn read(&self, i: usize) -> [f64; MAX_DIRECTIONS] {
-        std::array::from_fn(|a| if a < self.axes { self.at[a][i] } else { 0.0 })
+        std::array::from_fn(|a| if a < self.axes { self.samples[a][i] } else { 0.0 })
     }
 
     fn advance(
@@ -149,18 +149,18 @@ impl StepSequence for ReturnMapStepper<'_> {
     fn inputs(&self) -> usize {
         2
     }
-    fn waves(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4] {
+    fn input_factors(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4] {
         let zero = Complex64::new(0.0, 0.0);
         [at * Complex64::cis(-angle * h as f64), at, zero, zero]
     }
     fn first_waves(&self, _h: usize) -> [Complex64; 4] {
         [0.0, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
-    fn around(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
-        self.step.advance_cycle(self.axes, self.at, (&mut *z, &mut self.trail), force, rows);
+    fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+        self.step.advance_cycle(self.axes, self.samples, (&mut *z, &mut self.trail), force, rows);
         z.iter().all(|z| z.is_finite())
     }
-    fn first(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+    fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         let (from, to) = (self.rest, self.read(0));
         let before = std::mem::take(&mut self.states);
         let found = self.advance((&from, &to), &before, after, force, rows);
@@ -180,9 +180,9 @@ mod tests {
         let states = law.step().map_or(0, |step| step.states());
         Port {
             members: Vec::new(),
-            first: 0,
+            first_axis: 0,
             axes,
-            series: 0.0,
+            series_compliance: 0.0,
             scale: law.force_scale(),
             least_penalty: 0.0,
             static_state: StaticState { states: vec![0.0; states], ..StaticState::default() },
@@ -193,7 +193,7 @@ mod tests {
     /// For a motion that sticks, the shortcut agrees with the samples. A larger
     /// motion does not use the shortcut.
     #[test]
-    fn motions_that_hold_are_those_of_their_samples() {
+    fn sticking_shortcut_agrees_with_samples() {
         let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 2 };
         let line = FrictionContact { tangents: 1, ..contact };
         let plane = Jenkins2d { stiffness: 3.0, limit: 1.8 };
@@ -211,9 +211,9 @@ mod tests {
                 let size = 2 * nh * axes;
                 let mut found = [(); 2].map(|()| (vec![Complex64::new(0.0, 0.0); axes * nh], vec![0.0; size * size]));
                 let [(force, slopes), (sampled, sampled_slopes)] = &mut found;
-                alternation.marched = 0;
+                alternation.law_steps = 0;
                 alternation.step(law, port, &c, force, Some(slopes));
-                assert_eq!(alternation.marched, 0, "{law:?} was sampled");
+                assert_eq!(alternation.law_steps, 0, "{law:?} was sampled");
                 alternation.step_by_step(law, port, &c, sampled, Some(sampled_slopes));
                 assert!(force.iter().zip(&*sampled).all(|(a, b)| (a - b).norm() < 1e-12), "{force:?} {sampled:?}");
                 for (i, (a, b)) in slopes.iter().zip(&*sampled_slopes).enumerate() {
@@ -221,7 +221,7 @@ mod tests {
                 }
                 let far: Vec<Complex64> = c.iter().map(|c| c * 9.0).collect();
                 alternation.step(law, port, &far, force, None);
-                assert!(alternation.marched > 0, "{law:?} slips");
+                assert!(alternation.law_steps > 0, "{law:?} slips");
             }
         }
     }
@@ -242,14 +242,17 @@ mod tests {
         let mut slopes = vec![0.0; (6 * nh).pow(2)];
         let port = port(contact, 3);
         alternation.step(&contact, &port, &at(0.0), &mut none.clone(), Some(&mut slopes));
-        let known = InitialState { state: alternation.state.clone(), forgets: alternation.forgets.clone() };
-        assert!(known.forgets.len() == 4, "a contact that slips forgets");
+        let known = InitialState {
+            state: alternation.state.clone(),
+            forgetting_inverse: alternation.forgetting_inverse.clone(),
+        };
+        assert!(known.forgetting_inverse.len() == 4, "a contact that slips forgets");
         for change in [1e-6, 1e-2, 0.3] {
             let mut run = |begin: InitialState| {
                 let mut force = none.clone();
-                (alternation.begin, alternation.marched) = (begin, 0);
+                (alternation.known_state, alternation.law_steps) = (begin, 0);
                 alternation.step(&contact, &port, &at(change), &mut force, None);
-                (force, alternation.marched)
+                (force, alternation.law_steps)
             };
             let (from_rest, many) = run(InitialState::default());
             let (nearby, few) = run(known.clone());

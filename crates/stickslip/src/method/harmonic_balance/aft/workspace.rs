@@ -4,18 +4,18 @@ use num_complex::Complex64;
 
 /// Change of the states over a period, relative to their size, at which they
 /// count as periodic: the rounding of a thousand steps.
-pub(in super::super) const REPEATS: f64 = 1e-12;
+pub(in super::super) const PERIODICITY_TOLERANCE: f64 = 1e-12;
 
 /// Memory for derivatives by the harmonics of a motion, bytes. Those of a long
 /// series are computed in groups of harmonics.
-const AT_ONCE: f64 = 2.5e8;
+const DERIVATIVE_BYTES: f64 = 2.5e8;
 
 /// Returns the number of harmonics by which the forces at all samples are
 /// differentiated at once, and the memory for that, bytes.
-pub(in super::super) fn at_once(axes: usize, samples: usize, harmonics: usize) -> (usize, f64) {
+pub(in super::super) fn derivative_batch(axes: usize, samples: usize, harmonics: usize) -> (usize, f64) {
     // forces at all samples by both parts of one harmonic
     let each = 8.0 * 2.0 * (axes * axes) as f64 * samples as f64;
-    let count = harmonics.min((AT_ONCE / each) as usize).max(1);
+    let count = harmonics.min((DERIVATIVE_BYTES / each) as usize).max(1);
     (count, each * count as f64)
 }
 
@@ -29,8 +29,8 @@ pub(in super::super) struct StepWorkspace {
     /// Derivatives of the forces by the states at t = 0, per sample.
     pub(super) by_state: Vec<f64>,
     /// Derivatives of the inputs by the harmonics of a motion.
-    pub(super) waves: Vec<f64>,
-    /// Factors of the steps for which `waves` was computed.
+    pub(super) input_factors: Vec<f64>,
+    /// Factors of the steps for which `input_factors` was computed.
     pub(super) steps: Vec<[Complex64; 4]>,
     /// Derivatives of the forces by the inputs: [sample][axis][column].
     pub(super) columns: Vec<f64>,

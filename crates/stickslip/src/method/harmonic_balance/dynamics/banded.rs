@@ -8,24 +8,24 @@
 //! `(1 - T) δλ + ε T D Wᵀ y = r`, with the time derivative `D`.
 
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::equations::regularization::HOLD;
+use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
 
 /// Number of degrees of freedom from which the banded form is considered.
-const LARGE: usize = 16;
+const BANDED_DOFS: usize = 16;
 /// Number of degrees of freedom from which a search begins without friction. Describing
 /// functions would solve the whole structure with dense matrices.
-pub(crate) const GUESSED: usize = 40;
+pub(crate) const DESCRIBING_DOFS: usize = 40;
 
 /// Parameters of the linearised equations, in addition to the tangents.
 pub(crate) struct StepParameters<'a> {
     /// Penalty ε per port, N s/m.
     pub penalty: &'a [f64],
     /// Parameters of the homotopy.
-    pub ease: Homotopy,
+    pub homotopy: Homotopy,
 }
 
 /// The banded form of a system at one excitation frequency.
@@ -47,9 +47,9 @@ pub(crate) struct BandedForm {
     omega: f64,
     /// Z per harmonic, factored.
     factors: Vec<BandedMatrix>,
-    tangent: BandedMatrix,
+    step_factor: BandedMatrix,
     /// The structure at a real rate.
-    smooth: BandedMatrix,
+    real_rate_factor: BandedMatrix,
     right: Vec<f64>,
     whole: Vec<f64>,
 }
@@ -60,7 +60,7 @@ impl BandedForm {
     /// faster: they are few, or they couple many places.
     pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
-        if n < LARGE || ports.wave().is_some() || ports.iter().any(|port| port.series > 0.0) {
+        if n < BANDED_DOFS || ports.wave().is_some() || ports.iter().any(|port| port.series_compliance > 0.0) {
             return None;
         }
         if system.structure().damped_modes().is_some() {
@@ -110,8 +110,8 @@ impl BandedForm {
             harmonics: harmonics.iter().map(|h| *h as f64).collect(),
             omega: 0.0,
             factors: vec![BandedMatrix::new(factor.0, factor.1); nh],
-            smooth: BandedMatrix::new(whole, band),
-            tangent: BandedMatrix::new(tangent.0, tangent.1),
+            real_rate_factor: BandedMatrix::new(whole, band),
+            step_factor: BandedMatrix::new(tangent.0, tangent.1),
             right: vec![0.0; 2 * whole],
             whole: vec![0.0; 2 * whole * nh],
         })
@@ -136,7 +136,7 @@ impl BandedForm {
     }
 
     /// Sets the stiffness of closed contacts, for the mean.
-    pub fn close(&mut self, springs: &[f64]) {
+    pub fn set_closed_contacts(&mut self, springs: &[f64]) {
         self.springs.clear();
         self.springs.extend(springs);
     }
@@ -155,7 +155,7 @@ impl BandedForm {
     ///
     /// # Errors
     /// Returns the frequency, rad/s, of a harmonic at which it is singular.
-    pub fn drive(&mut self, omega: f64) -> Result<(), f64> {
+    pub fn factor_dynamic_stiffness(&mut self, omega: f64) -> Result<(), f64> {
         self.omega = omega;
         let closed = self.closed();
         for (k, factor) in self.factors.iter_mut().enumerate() {
@@ -202,7 +202,12 @@ impl BandedForm {
 
     /// Computes the motion along the axes at harmonic number `k` under the
     /// forces `force(q)` along them, into `out`.
-    pub fn receive(&mut self, k: usize, force: impl Fn(usize) -> Complex64, mut out: impl FnMut(usize, Complex64)) {
+    pub fn response_along_axes(
+        &mut self,
+        k: usize,
+        force: impl Fn(usize) -> Complex64,
+        mut out: impl FnMut(usize, Complex64),
+    ) {
         self.right.fill(0.0);
         for (q, ends) in self.ends.iter().enumerate() {
             let f = force(q);
@@ -224,16 +229,16 @@ impl BandedForm {
 
     /// Returns the receptances of the axes at the real rate `s`, 1/s, which is
     /// free of resonances, m/N.
-    pub fn own_at(&mut self, s: f64) -> Vec<f64> {
-        self.smooth.clear();
+    pub fn direct_receptances(&mut self, s: f64) -> Vec<f64> {
+        self.real_rate_factor.clear();
         for &(i, l, [mass, damping, stiffness]) in &self.entries {
             let value = stiffness + s * damping + s * s * mass;
-            self.smooth.add(self.position[i], self.position[l], value);
+            self.real_rate_factor.add(self.position[i], self.position[l], value);
         }
         for &force in self.forces.iter().flatten() {
-            self.smooth.add(self.position[force], self.position[force], 1.0);
+            self.real_rate_factor.add(self.position[force], self.position[force], 1.0);
         }
-        if !self.smooth.factor() {
+        if !self.real_rate_factor.factor() {
             return vec![0.0; self.ends.len()];
         }
         let mut right = vec![0.0; self.position.len()];
@@ -242,7 +247,7 @@ impl BandedForm {
             .map(|ends| {
                 right.fill(0.0);
                 ends.iter().for_each(|&(i, w)| right[self.position[i]] += w);
-                self.smooth.solve(&mut right);
+                self.real_rate_factor.solve(&mut right);
                 ends.iter().map(|&(i, w)| w * right[self.position[i]]).sum()
             })
             .collect()
@@ -253,30 +258,30 @@ impl BandedForm {
     pub fn linearise(&mut self, ports: &Ports, along: &StepParameters, tangents: &[f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
-        let (blocks, _) = crate::method::harmonic_balance::aft::blocks(ports, nh);
-        self.tangent.clear();
+        let (blocks, _) = crate::method::harmonic_balance::aft::tangent_ranges(ports, nh);
+        self.step_factor.clear();
         for &(i, l, entry) in &self.entries {
             for k in 0..nh {
                 let rate = self.harmonics[k] * self.omega;
                 let (row, column) = (self.position[i] * size + 2 * k, self.position[l] * size + 2 * k);
                 let z = dynamic(entry, rate, self.omega);
-                self.tangent.add(row, column, z.re);
-                self.tangent.add(row, column + 1, -z.im);
-                self.tangent.add(row + 1, column, z.im);
-                self.tangent.add(row + 1, column + 1, z.re);
+                self.step_factor.add(row, column, z.re);
+                self.step_factor.add(row, column + 1, -z.im);
+                self.step_factor.add(row + 1, column, z.im);
+                self.step_factor.add(row + 1, column + 1, z.re);
             }
         }
         for (row, column, stiffness) in self.closed() {
             // for the mean, which is the first harmonic
-            self.tangent.add(row * size, column * size, stiffness);
-            self.tangent.add(row * size + 1, column * size + 1, stiffness);
+            self.step_factor.add(row * size, column * size, stiffness);
+            self.step_factor.add(row * size + 1, column * size + 1, stiffness);
         }
         for (p, port) in ports.iter().enumerate() {
-            let tangent = &tangents[crate::method::harmonic_balance::aft::block(&blocks, p, port, nh)];
+            let tangent = &tangents[crate::method::harmonic_balance::aft::tangent_range(&blocks, p, port, nh)];
             let wide = size * port.axes;
             let penalty = along.penalty[p];
             for (a, row) in tangent.chunks_exact(wide).enumerate() {
-                let own = port.first + a / size;
+                let own = port.first_axis + a / size;
                 let Some(force) = self.forces[own] else {
                     for &(i, w) in &self.ends[own] {
                         let at = self.position[i] * size + a % size;
@@ -284,7 +289,7 @@ impl BandedForm {
                             for &(l, v) in &self.ends[other] {
                                 let column = self.position[l] * size;
                                 for (b, value) in row.iter().enumerate() {
-                                    self.tangent.add(at, column + b, w * v * value);
+                                    self.step_factor.add(at, column + b, w * v * value);
                                 }
                             }
                         }
@@ -292,15 +297,15 @@ impl BandedForm {
                     continue;
                 };
                 let at = self.position[force] * size + a % size;
-                self.tangent.add(at, at, 1.0 + along.ease.stay(self.harmonics[a % size / 2] as usize));
+                self.step_factor.add(at, at, 1.0 + along.homotopy.diagonal_term(self.harmonics[a % size / 2] as usize));
                 for &(i, w) in &self.ends[own] {
-                    self.tangent.add(self.position[i] * size + a % size, at, -w);
+                    self.step_factor.add(self.position[i] * size + a % size, at, -w);
                 }
                 for (other, row) in port.range().zip(row.chunks_exact(size)) {
                     let Some(force) = self.forces[other] else { continue };
                     let base = self.position[force] * size;
                     for (b, value) in row.iter().enumerate() {
-                        self.tangent.add(at, base + b, -value);
+                        self.step_factor.add(at, base + b, -value);
                     }
                     if penalty.is_infinite() {
                         continue;
@@ -310,14 +315,14 @@ impl BandedForm {
                         for (k, &h) in self.harmonics.iter().enumerate() {
                             // ε T jhΩ
                             let rate = penalty * h * self.omega * w;
-                            self.tangent.add(at, column + 2 * k, row[2 * k + 1] * rate);
-                            self.tangent.add(at, column + 2 * k + 1, -row[2 * k] * rate);
+                            self.step_factor.add(at, column + 2 * k, row[2 * k + 1] * rate);
+                            self.step_factor.add(at, column + 2 * k + 1, -row[2 * k] * rate);
                         }
                     }
                 }
             }
         }
-        self.tangent.factor()
+        self.step_factor.factor()
     }
 
     /// Returns the number of places.
@@ -364,7 +369,7 @@ impl BandedForm {
 
     /// Replaces forces along the axes, [axis][unknown], by the motions along
     /// them, with the equations factored last.
-    pub fn receive_all(&mut self, forces: &mut [f64]) {
+    pub fn solve_along_axes(&mut self, forces: &mut [f64]) {
         let size = self.unknowns();
         self.whole.fill(0.0);
         for (ends, forces) in self.ends.iter().zip(forces.chunks_exact(size)) {
@@ -373,7 +378,7 @@ impl BandedForm {
                 self.whole[at..at + size].iter_mut().zip(forces).for_each(|(sum, f)| *sum += w * f);
             }
         }
-        self.tangent.solve(&mut self.whole);
+        self.step_factor.solve(&mut self.whole);
         for (ends, motion) in self.ends.iter().zip(forces.chunks_exact_mut(size)) {
             motion.fill(0.0);
             for &(i, w) in ends {
@@ -388,14 +393,14 @@ impl BandedForm {
     pub fn step(&mut self, ports: &Ports, tangents: &[f64], residual: &mut [f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
-        let (blocks, _) = crate::method::harmonic_balance::aft::blocks(ports, nh);
+        let (blocks, _) = crate::method::harmonic_balance::aft::tangent_ranges(ports, nh);
         self.whole.fill(0.0);
         for (p, port) in ports.iter().enumerate() {
-            let tangent = &tangents[crate::method::harmonic_balance::aft::block(&blocks, p, port, nh)];
+            let tangent = &tangents[crate::method::harmonic_balance::aft::tangent_range(&blocks, p, port, nh)];
             let wide = size * port.axes;
-            let r = &residual[port.first * size..port.first * size + wide];
+            let r = &residual[port.first_axis * size..port.first_axis * size + wide];
             for (a, row) in tangent.chunks_exact(wide).enumerate() {
-                let own = port.first + a / size;
+                let own = port.first_axis + a / size;
                 if let Some(force) = self.forces[own] {
                     self.whole[self.position[force] * size + a % size] = r[a];
                     continue;
@@ -406,7 +411,7 @@ impl BandedForm {
                 }
             }
         }
-        self.tangent.solve(&mut self.whole);
+        self.step_factor.solve(&mut self.whole);
         for (q, ends) in self.ends.iter().enumerate() {
             for a in 0..size {
                 match self.forces[q] {
@@ -427,7 +432,7 @@ impl BandedForm {
 /// stiffness, at a harmonic's rate (rad/s).
 fn dynamic([mass, damping, stiffness]: [f64; 3], rate: f64, omega: f64) -> Complex64 {
     // a direction without support has the soft spring of the dense form for its mean
-    let hold = if rate == 0.0 { (HOLD * omega).powi(2) } else { 0.0 };
+    let hold = if rate == 0.0 { (REGULARIZING_FREQUENCY * omega).powi(2) } else { 0.0 };
     Complex64::new(stiffness - rate * rate * mass + hold * mass, rate * damping)
 }
 

@@ -2,10 +2,10 @@
 //! contacts.
 //!
 //! The static receptance of an unsupported structure is that of the regularizing springs
-//! ([`HOLD`]), ten orders of magnitude above the compliance of contacts. Mean positions would
-//! be small differences of large numbers, and residuals their rounding. For the mean, the
-//! contact stiffness `k` of sticking joints with closed faces is added to the structure and
-//! subtracted from the forces:
+//! ([`REGULARIZING_FREQUENCY`]), ten orders of magnitude above the compliance of contacts. Mean
+//! positions would be small differences of large numbers, and residuals their rounding. For the
+//! mean, the contact stiffness `k` of sticking joints with closed faces is added to the structure
+//! and subtracted from the forces:
 //!
 //! `(K + W k Wᵀ) x = F - W (f - k u)`, `u = Wᵀ x`.
 //!
@@ -15,7 +15,7 @@
 
 use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::equations::regularization::HOLD;
+use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -24,32 +24,38 @@ use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_block
 
 /// Receptance of the structure, relative to the compliance of a closed contact, up to which the
 /// structure is well supported. Two digits are lost at this value.
-const SOFT: f64 = 1e2;
-/// Ratio of the receptances at the frequency and at twice the frequency above which [`HOLD`]
-/// alone supports a direction. Its springs are four times as stiff at twice the frequency.
-const FREE: f64 = 2.0;
+const WELL_SUPPORTED: f64 = 1e2;
+/// Ratio of the receptances at the frequency and at twice the frequency above which
+/// [`REGULARIZING_FREQUENCY`] alone supports a direction. Its springs are four times as stiff at
+/// twice the frequency.
+const UNSUPPORTED_RATIO: f64 = 2.0;
 
 /// Returns the stiffness of closed contacts along the axes, N/m.
-pub(crate) fn springs(ports: &Ports) -> Vec<f64> {
-    let all = ports.iter().flat_map(|port| (0..port.axes).map(|axis| port.closed(axis)));
+pub(crate) fn closed_stiffness(ports: &Ports) -> Vec<f64> {
+    let all = ports.iter().flat_map(|port| (0..port.axes).map(|axis| port.closed_stiffness(axis)));
     all.map(|k| if k.is_finite() && k > 0.0 { k } else { 0.0 }).collect()
 }
 
 /// Returns true if contacts with these stiffnesses support a direction that nothing else
 /// supports.
 ///
-/// `own` returns the static receptance of each axis alone, with [`HOLD`] of a frequency.
-pub(crate) fn hold(springs: &[f64], own: impl Fn(f64) -> Result<Vec<f64>, UndampedResonance>, omega: f64) -> bool {
+/// `own` returns the static receptance of each axis alone, with [`REGULARIZING_FREQUENCY`] of a
+/// frequency.
+pub(crate) fn need_contact_support(
+    springs: &[f64],
+    own: impl Fn(f64) -> Result<Vec<f64>, UndampedResonance>,
+    omega: f64,
+) -> bool {
     if springs.iter().all(|k| *k == 0.0) {
         return false;
     }
     let Ok(once) = own(omega) else { return false };
-    if springs.iter().zip(&once).all(|(k, own)| k * own <= SOFT) {
+    if springs.iter().zip(&once).all(|(k, own)| k * own <= WELL_SUPPORTED) {
         return false;
     }
     let Ok(stiffer) = own(2.0 * omega) else { return false };
-    let free = once.iter().zip(&stiffer).map(|(once, stiffer)| *once > FREE * stiffer);
-    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > SOFT)
+    let free = once.iter().zip(&stiffer).map(|(once, stiffer)| *once > UNSUPPORTED_RATIO * stiffer);
+    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > WELL_SUPPORTED)
 }
 
 /// Structure in uncoupled modes, which the closed contacts couple.
@@ -64,7 +70,7 @@ pub(crate) struct ClosedModes {
 impl ClosedModes {
     /// Makes the modal stiffness of a structure with these springs along the axes, N/m.
     pub fn new(springs: &[f64], structure: &Arc<UncoupledDynamics>) -> Self {
-        let (p, n) = (structure.axes, structure.own().len());
+        let (p, n) = (structure.axes, structure.modal_coefficients().len());
         let weighted: Vec<f64> =
             structure.at.chunks_exact(p.max(1)).flat_map(|at| at.iter().zip(springs).map(|(a, k)| a * k)).collect();
         let mut coupling = vec![0.0; n * n];
@@ -89,10 +95,10 @@ impl ClosedModes {
         {
             return Ok(factor.clone());
         }
-        let n = self.structure.own().len();
+        let n = self.structure.modal_coefficients().len();
         let mut matrix = self.coupling.clone();
-        for (m, [mass, _, stiffness]) in self.structure.own().iter().enumerate() {
-            matrix[m * n + m] += stiffness + (HOLD * omega).powi(2) * mass;
+        for (m, [mass, _, stiffness]) in self.structure.modal_coefficients().iter().enumerate() {
+            matrix[m * n + m] += stiffness + (REGULARIZING_FREQUENCY * omega).powi(2) * mass;
         }
         let factor = Arc::new(DenseLu::new(matrix, n).map_err(|_| UndampedResonance)?);
         *kept = Some((omega, factor.clone()));
@@ -103,15 +109,15 @@ impl ClosedModes {
     pub fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, UndampedResonance> {
         let factor = self.factor(omega)?;
         // a mean has no imaginary part
-        let mut modal = self.structure.onto_modes(&force.map(|f| f.re));
+        let mut modal = self.structure.modal_forces(&force.map(|f| f.re));
         factor.solve(modal.as_mut_slice());
-        Ok(self.structure.of_modes(&modal).map(|x| Complex64::new(x, 0.0)))
+        Ok(self.structure.physical_displacements(&modal).map(|x| Complex64::new(x, 0.0)))
     }
 
     /// Returns the displacements along the axes under unit forces along them, m/N.
     pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         let factor = self.factor(omega)?;
-        let (p, n) = (self.structure.axes, self.structure.own().len());
+        let (p, n) = (self.structure.axes, self.structure.modal_coefficients().len());
         let at = &self.structure.at;
         let mut moved: Vec<f64> = (0..p).flat_map(|q| (0..n).map(move |m| at[m * p + q])).collect();
         factor.solve(&mut moved);
@@ -173,7 +179,7 @@ mod tests {
     /// While the contact sticks, a free block is an oscillator on its springs: `F/|kt - m Ω²|`,
     /// below and above its resonance. The normal force equals the applied force to rounding.
     #[test]
-    fn a_free_block_on_a_contact_that_sticks() {
+    fn a_stuck_free_block_is_a_linear_oscillator() {
         for (pressed, ratio) in [(10.0, 0.01), (10.0, 0.6), (10.0, 1.7), (10.0, 20.0), (25.0, 0.6), (4.0, 0.6)] {
             let omega = ratio * (TANGENTIAL / 0.7).sqrt();
             let found = orbit(&block([0.0, pressed], 0.3), 3, omega).unwrap();
@@ -186,9 +192,9 @@ mod tests {
         }
     }
 
-    /// Friction carries a constant load `Q` along the face below the limit. The mean is `Q/kt`, and
-    /// the vibration about it is the same as without the load: `F/|kt - m Ω²| cos Ωt`. The load
-    /// may reach the limit together with the vibration.
+    /// Friction carries a constant load `Q` along the face below the limit. The mean is `Q/kt`,
+    /// and the vibration about it is the same as without the load: `F/|kt - m Ω²| cos Ωt`. The
+    /// load may reach the limit together with the vibration.
     #[test]
     fn friction_carries_a_constant_load() {
         let (pressed, limit) = (10.0, 5.0);
@@ -258,7 +264,7 @@ mod tests {
     /// A load that lifts the block, or drags it by more than the friction limit, has no
     /// equilibrium.
     #[test]
-    fn loads_that_no_contact_carries_are_refused() {
+    fn unsupported_loads_drift() {
         for constant in [[0.0, -1.0], [6.0, 10.0]] {
             let error = orbit(&block(constant, 0.3), 3, 200.0).unwrap_err();
             assert_eq!(error.status(), "drifts", "{constant:?}: {error}");
@@ -374,7 +380,7 @@ mod tests {
 
     /// Free chains along (x, z) on contacts, with every form of the receptance.
     #[test]
-    fn chains_stand_on_their_contacts() {
+    fn free_chains_on_closed_contacts() {
         for (masses, every, damping, banded) in
             [(4, 1, 0.0, false), (4, 1, 20.0, false), (30, 1, 20.0, true), (110, 36, 20.0, false)]
         {
@@ -400,7 +406,7 @@ mod tests {
     /// A free bar in its modes `cos πmξ` along (x, z), also with a number of contacts for which
     /// receptances are not formed.
     #[test]
-    fn modes_stand_on_their_contacts() {
+    fn free_modes_on_closed_contacts() {
         let modes = 30;
         for contacts in [8, 80] {
             let n = 2 * modes;
@@ -427,7 +433,7 @@ mod tests {
 
     /// One sector of a free ring.
     #[test]
-    fn rings_stand_on_their_contacts() {
+    fn free_rings_on_closed_contacts() {
         let (sectors, order) = (7, 2);
         let n = 2 * sectors;
         let mut stiffness = DMatrix::zeros(n, n);

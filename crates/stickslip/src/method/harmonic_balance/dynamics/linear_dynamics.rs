@@ -11,11 +11,11 @@
 //! Displacements and forces are still those of the whole ring.
 
 use super::closed_contacts;
-use super::modal_sum::{ComplexModes, fractions, free_fraction};
+use super::modal_sum::{ComplexModes, partial_fractions, rigid_body_fraction};
 use super::travelling_wave::{FactoredStiffness, TravellingWaves};
 use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
-use crate::method::harmonic_balance::aft::{MANY_DIRECTIONS, Ports};
-use crate::method::harmonic_balance::equations::regularization::soft_spring;
+use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Ports};
+use crate::method::harmonic_balance::equations::regularization::regularizing_stiffness;
 use crate::model::System;
 use crate::structure::{DynamicStiffness, Matrices, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -31,15 +31,15 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 pub(crate) const CACHED: usize = 128;
 /// Share of the largest static receptance below which springs hold a direction. The largest is
 /// that of a soft spring, if one holds a direction alone.
-const HELD: f64 = 1e-5;
+const HELD_RECEPTANCE: f64 = 1e-5;
 
 /// Number of degrees of freedom beyond which modes of full matrices are not computed: at 200
 /// they take a second, with the third power.
-const MODES: usize = 200;
+const MODAL_DOFS: usize = 200;
 
 /// Number of axes from which receptances of a structure in modes are not
 /// formed: products with either take equally long.
-const MANY: usize = 150;
+const MODAL_AXES: usize = 150;
 /// Number of right sides that a factor solves at once.
 const AT_ONCE: usize = 64;
 
@@ -59,15 +59,16 @@ pub(crate) struct LinearDynamics {
     /// excitation frequency, by rate.
     factors: RefCell<Vec<FactoredStiffness>>,
     /// Receptances at the last frequency. A longer series requests those of a shorter one again.
-    known: RefCell<ReceptanceCache>,
-    /// Displacements of all places under unit forces along the axes at that frequency, by rate. For
-    /// a large structure they take less memory than its factors, and save a second factorization.
-    moved: RefCell<Vec<UnitResponses>>,
+    receptances: RefCell<ReceptanceCache>,
+    /// Displacements of all places under unit forces along the axes at that frequency, by rate.
+    /// For a large structure they take less memory than its factors, and save a second
+    /// factorization.
+    unit_responses: RefCell<Vec<UnitResponses>>,
     structure: Structure,
     /// Directions of the axes: rows in ascending order, with their weights.
     directions: Vec<Vec<(usize, f64)>>,
     /// Travelling waves of a ring.
-    waves: Option<TravellingWaves>,
+    travelling_waves: Option<TravellingWaves>,
     /// Stiffness of closed contacts along the axes, N/m.
     springs: Vec<f64>,
     /// The structure with these springs, if they alone hold some motion of it.
@@ -77,11 +78,11 @@ pub(crate) struct LinearDynamics {
 /// Memory limit of kept factors, bytes. Measured: 1.7 GB for each harmonic of a block of 60,000
 /// degrees of freedom, 11.5 GB in all with five harmonics and an estimate of their error. A
 /// discarded factor is computed again when needed.
-const KEPT: usize = 2_000_000_000;
+const FACTOR_BYTES: usize = 2_000_000_000;
 
 /// Memory limit of kept motions under unit forces, bytes. Measured: 54 MB for each harmonic of
 /// a blade of 69,930 rows with 16 contacts of three directions, whose factors take 1.3 GB.
-const KEPT_MOVED: usize = 1_000_000_000;
+const RESPONSE_BYTES: usize = 1_000_000_000;
 
 /// Motions of all places at a rate (1/s) and an excitation frequency (rad/s): n
 /// × q, one column for a unit force along each axis.
@@ -115,7 +116,7 @@ enum ClosedForm {
 
 impl ClosedContacts {
     /// Returns the factored stiffness between modes, if the structure is in modes.
-    pub fn of_the_modes(&self, omega: f64) -> Option<Result<Arc<DenseLu<f64>>, UndampedResonance>> {
+    pub fn modal_factor(&self, omega: f64) -> Option<Result<Arc<DenseLu<f64>>, UndampedResonance>> {
         match &self.form {
             ClosedForm::Rows(_) => None,
             ClosedForm::Modes(modes) => Some(modes.factor(omega)),
@@ -153,28 +154,34 @@ impl LinearDynamics {
         LinearDynamics {
             n,
             modal: if factored || !alone { None } else { ComplexModes::new(system, &columns(n, &directions)) },
-            uncoupled: if alone && (factored || (directions.len() >= MANY_DIRECTIONS && is_modal(system.structure()))) {
+            uncoupled: if alone && (factored || (directions.len() >= KRYLOV_AXES && is_modal(system.structure()))) {
                 UncoupledDynamics::new(system.structure(), &directions).map(Arc::new)
             } else {
                 None
             },
             factored,
             factors: RefCell::default(),
-            known: RefCell::default(),
-            moved: RefCell::default(),
+            receptances: RefCell::default(),
+            unit_responses: RefCell::default(),
             structure: system.structure().clone(),
-            springs: closed_contacts::springs(ports),
+            springs: closed_contacts::closed_stiffness(ports),
             closed: OnceCell::new(),
             directions,
-            waves,
+            travelling_waves: waves,
         }
     }
 
     /// Returns the structure at rest with its contacts closed, if these alone hold some motion
     /// of it. Decided once, at the first frequency.
     pub fn closed(&self, omega: f64) -> Option<&ClosedContacts> {
-        let own = |omega: f64| self.own_at_rest(omega);
-        let find = || if closed_contacts::hold(&self.springs, own, omega) { self.with_closed_contacts() } else { None };
+        let own = |omega: f64| self.static_receptances(omega);
+        let find = || {
+            if closed_contacts::need_contact_support(&self.springs, own, omega) {
+                self.with_closed_contacts()
+            } else {
+                None
+            }
+        };
         self.closed.get_or_init(find).as_ref()
     }
 
@@ -191,7 +198,7 @@ impl LinearDynamics {
             .map(|(sector, rows, k)| (rows.iter().map(|&(i, w)| ((i + sector * size) % self.n, w)).collect(), k))
             .collect();
         let structure = self.structure.with_springs(&around)?;
-        let waves = match &self.waves {
+        let waves = match &self.travelling_waves {
             Some(waves) => Some(TravellingWaves::new(&structure, waves.cyclic)?),
             None => None,
         };
@@ -201,11 +208,11 @@ impl LinearDynamics {
             uncoupled: None,
             factored: true,
             factors: RefCell::default(),
-            known: RefCell::default(),
-            moved: RefCell::default(),
+            receptances: RefCell::default(),
+            unit_responses: RefCell::default(),
             structure,
             directions: self.directions.clone(),
-            waves,
+            travelling_waves: waves,
             springs: Vec::new(),
             closed: OnceCell::from(None),
         };
@@ -214,17 +221,17 @@ impl LinearDynamics {
 
     /// Returns the displacement along each axis at rest under a constant unit
     /// force along it alone, m/N.
-    fn own_at_rest(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+    fn static_receptances(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
         if let Some(uncoupled) = &self.uncoupled {
-            let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
+            let own = uncoupled.diagonal_receptance(&uncoupled.modal_receptances(ZERO, omega)?);
             return Ok(own.iter().map(|r| r.norm()).collect());
         }
-        let receptance = match &self.waves {
+        let receptance = match &self.travelling_waves {
             Some(waves) => waves.receptance(0, (ZERO, omega), &self.directions)?,
             None => {
                 // not from modes: for damped free motions, their rounding acts as a stiffness
                 let mut own = vec![0.0; self.directions.len()];
-                self.each_moved(ZERO, omega, |q, moved| {
+                self.for_each_unit_response(ZERO, omega, |q, moved| {
                     own[q] = self.directions[q].iter().map(|&(i, w)| moved[i] * w).sum::<Complex64>().norm();
                 })?;
                 return Ok(own);
@@ -233,15 +240,16 @@ impl LinearDynamics {
         Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
     }
 
-    /// Returns the number of sectors of a ring and the size of one; (1, 0) for any other structure.
+    /// Returns the number of sectors of a ring and the size of one; (1, 0) for any other
+    /// structure.
     fn sectors(&self) -> (usize, usize) {
-        self.waves.as_ref().map_or((1, 0), |waves| (waves.cyclic.sectors, waves.sector.dofs()))
+        self.travelling_waves.as_ref().map_or((1, 0), |waves| (waves.cyclic.sectors, waves.sector.dofs()))
     }
 
     /// Returns the modes that replace receptances, if these would be large
     /// matrices and all ports need only their products.
     pub fn modes_for(&self, ports: &Ports) -> Option<&Arc<UncoupledDynamics>> {
-        self.uncoupled.as_ref().filter(|_| ports.count() >= MANY && !ports.has_forces())
+        self.uncoupled.as_ref().filter(|_| ports.count() >= MODAL_AXES && !ports.has_forces())
     }
 
     /// Returns the structure with closed contacts if the harmonic is the mean,
@@ -251,22 +259,23 @@ impl LinearDynamics {
     }
 
     /// Returns the displacements along the axes under unit forces along them, at `s = jhΩ`, q × q,
-    /// m/N. The mean has closed contacts if these alone hold the structure, see [`LinearDynamics::closed`].
+    /// m/N. The mean has closed contacts if these alone hold the structure, see
+    /// [`LinearDynamics::closed`].
     ///
     /// # Errors
     /// An undamped resonance.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         if self.directions.len() > CACHED {
-            return self.receptance_anew(harmonic, omega);
+            return self.compute_receptance(harmonic, omega);
         }
-        let mut known = self.known.borrow_mut();
+        let mut known = self.receptances.borrow_mut();
         if known.omega != omega {
             *known = ReceptanceCache { omega, receptances: BTreeMap::new() };
         }
         if let Some(receptance) = known.receptances.get(&harmonic) {
             return Ok(receptance.clone());
         }
-        let receptance = self.receptance_anew(harmonic, omega)?;
+        let receptance = self.compute_receptance(harmonic, omega)?;
         known.receptances.insert(harmonic, receptance.clone());
         Ok(receptance)
     }
@@ -274,15 +283,15 @@ impl LinearDynamics {
     /// Returns the memory of the kept receptances, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
-        self.known.borrow().receptances.values().map(|matrix| size_of_val(matrix.as_slice())).sum()
+        self.receptances.borrow().receptances.values().map(|matrix| size_of_val(matrix.as_slice())).sum()
     }
 
-    fn receptance_anew(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
+    fn compute_receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         if let Some(closed) = self.closed_at(harmonic, omega) {
             return closed.receptance(omega);
         }
         let s = Complex64::new(0.0, harmonic as f64 * omega);
-        match &self.waves {
+        match &self.travelling_waves {
             Some(waves) => waves.receptance(waves.cyclic.diameter(harmonic), (s, omega), &self.directions),
             None => self.receptance_at(s, omega),
         }
@@ -293,9 +302,9 @@ impl LinearDynamics {
     ///
     /// # Errors
     /// A structure that is singular at that rate.
-    pub fn own_at(&self, rate: f64, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
-        match &self.waves {
-            Some(waves) => waves.own((rate, omega), &self.directions),
+    pub fn direct_receptances(&self, rate: f64, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+        match &self.travelling_waves {
+            Some(waves) => waves.diagonal_receptance((rate, omega), &self.directions),
             None => {
                 let receptance = self.receptance_at(Complex64::new(rate, 0.0), omega)?;
                 Ok((0..self.directions.len()).map(|q| receptance[(q, q)].norm()).collect())
@@ -310,7 +319,7 @@ impl LinearDynamics {
         }
         if self.factored {
             let mut receptance = DMatrix::from_element(q, q, ZERO);
-            self.each_moved(s, omega, |b, moved| {
+            self.for_each_unit_response(s, omega, |b, moved| {
                 for (a, rows) in self.directions.iter().enumerate() {
                     receptance[(a, b)] = rows.iter().map(|&(i, w)| moved[i] * w).sum();
                 }
@@ -324,19 +333,19 @@ impl LinearDynamics {
         };
         let mut sum = DMatrix::from_element(q, q, ZERO);
         for (m, &lambda) in modal.lambda.iter().enumerate() {
-            let (up, down) = fractions(s, lambda, omega);
+            let (up, down) = partial_fractions(s, lambda, omega);
             for b in 0..q {
                 for a in 0..q {
-                    let product = modal.shape_at[(a, m)] * modal.left_at[(m, b)];
+                    let product = modal.shape_along[(a, m)] * modal.left_along[(m, b)];
                     sum[(a, b)] += (product * up + product.conj() * down) * 0.5;
                 }
             }
         }
-        let free = free_fraction(s, omega);
-        for r in 0..modal.free_at.nrows() {
+        let free = rigid_body_fraction(s, omega);
+        for r in 0..modal.free_along.nrows() {
             for b in 0..q {
                 for a in 0..q {
-                    sum[(a, b)] += modal.free_at[(r, a)] * modal.free_at[(r, b)] * free;
+                    sum[(a, b)] += modal.free_along[(r, a)] * modal.free_along[(r, b)] * free;
                 }
             }
         }
@@ -361,7 +370,7 @@ impl LinearDynamics {
         if let Some(uncoupled) = &self.uncoupled {
             return uncoupled.respond(s, omega, force);
         }
-        if let Some(waves) = &self.waves {
+        if let Some(waves) = &self.travelling_waves {
             return waves.respond(waves.cyclic.diameter(harmonic), (s, omega), force);
         }
         if self.factored {
@@ -374,7 +383,7 @@ impl LinearDynamics {
         };
         let mut x = DVector::from_element(self.n, ZERO);
         for (m, &lambda) in modal.lambda.iter().enumerate() {
-            let (up, down) = fractions(s, lambda, omega);
+            let (up, down) = partial_fractions(s, lambda, omega);
             let (mut one, mut two) = (ZERO, ZERO);
             for i in 0..self.n {
                 one += modal.left[(m, i)] * force[i];
@@ -385,7 +394,7 @@ impl LinearDynamics {
                 x[i] += modal.shape[(i, m)] * one + modal.shape[(i, m)].conj() * two;
             }
         }
-        let free = free_fraction(s, omega);
+        let free = rigid_body_fraction(s, omega);
         for r in 0..modal.free.ncols() {
             let push: Complex64 = (0..self.n).map(|i| force[i] * modal.free[(i, r)]).sum::<Complex64>() * free;
             for i in 0..self.n {
@@ -408,22 +417,22 @@ impl LinearDynamics {
         let s = Complex64::new(0.0, harmonic as f64 * omega);
         // at rest, sum the forces first: the large motions of a free body must
         // not cancel each other
-        let known = if harmonic > 0 { self.known(s, omega) } else { None };
+        let known = if harmonic > 0 { self.kept_unit_responses(s, omega) } else { None };
         match known {
             Some(moved) => Ok(&*moved * DVector::from_fn(self.directions.len(), |q, _| along(q))),
-            None => self.respond(harmonic, omega, &self.spread(harmonic, along)),
+            None => self.respond(harmonic, omega, &self.force_on_places(harmonic, along)),
         }
     }
 
     /// Returns the motions under unit forces, if they are kept.
-    fn known(&self, s: Complex64, omega: f64) -> Option<Arc<DMatrix<Complex64>>> {
-        let moved = self.moved.borrow();
+    fn kept_unit_responses(&self, s: Complex64, omega: f64) -> Option<Arc<DMatrix<Complex64>>> {
+        let moved = self.unit_responses.borrow();
         moved.iter().find(|kept| kept.omega == omega && kept.rate == s).map(|kept| kept.columns.clone())
     }
 
     /// Passes the motion of a large structure under a unit force along each
     /// axis to `take`. Keeps the motions if memory allows.
-    fn each_moved(
+    fn for_each_unit_response(
         &self,
         s: Complex64,
         omega: f64,
@@ -432,7 +441,7 @@ impl LinearDynamics {
         let mut hand = |from: usize, columns: &DMatrix<Complex64>| {
             (0..columns.ncols()).for_each(|b| take(from + b, &columns.as_slice()[b * self.n..(b + 1) * self.n]));
         };
-        if let Some(columns) = self.known(s, omega) {
+        if let Some(columns) = self.kept_unit_responses(s, omega) {
             hand(0, &columns);
             return Ok(());
         }
@@ -442,10 +451,10 @@ impl LinearDynamics {
             factor.solve(columns.as_mut_slice());
             columns
         };
-        let mut kept = self.moved.borrow_mut();
+        let mut kept = self.unit_responses.borrow_mut();
         kept.retain(|kept| kept.omega == omega);
         let bytes = size_of::<Complex64>() * self.n * self.directions.len();
-        if (kept.len() + 1) * bytes <= KEPT_MOVED {
+        if (kept.len() + 1) * bytes <= RESPONSE_BYTES {
             let columns = Arc::new(solved(&self.directions));
             hand(0, &columns);
             kept.push(UnitResponses { rate: s, omega, columns });
@@ -463,18 +472,18 @@ impl LinearDynamics {
     ///
     /// # Errors
     /// A structure that is singular at rest.
-    pub fn settle(
+    pub fn correct_mean(
         &self,
         omega: f64,
         x: &mut DVector<Complex64>,
         along: impl Fn(usize) -> f64,
     ) -> Result<(), UndampedResonance> {
         let q = self.directions.len();
-        let unheld = free_fraction(ZERO, omega).re / self.structure.largest()[0];
+        let unheld = rigid_body_fraction(ZERO, omega).re / self.structure.largest()[0];
         if let Some(uncoupled) = &self.uncoupled {
             // at rest no place moves more than the place under the force
-            let own = uncoupled.own_receptance(&uncoupled.gains(ZERO, omega)?);
-            if own.iter().all(|r| r.norm() < HELD * unheld) {
+            let own = uncoupled.diagonal_receptance(&uncoupled.modal_receptances(ZERO, omega)?);
+            if own.iter().all(|r| r.norm() < HELD_RECEPTANCE * unheld) {
                 return Ok(());
             }
         }
@@ -482,11 +491,11 @@ impl LinearDynamics {
             DVector::from_fn(q, |a, _| along(a) - self.directions[a].iter().map(|&(i, w)| w * x[i].re).sum::<f64>());
         let receptance = self.receptance(0, omega)?.map(|r| r.re);
         let largest = receptance.amax();
-        if largest == 0.0 || largest < HELD * unheld {
+        if largest == 0.0 || largest < HELD_RECEPTANCE * unheld {
             return Ok(()); // springs hold all that moves, or nothing moves
         }
         // only along directions that nothing else holds
-        let Ok(inverse) = receptance.pseudo_inverse(HELD * largest) else { return Ok(()) };
+        let Ok(inverse) = receptance.pseudo_inverse(HELD_RECEPTANCE * largest) else { return Ok(()) };
         let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
         *x += self.respond_along(0, omega, |a| force[a])?;
         Ok(())
@@ -507,11 +516,11 @@ impl LinearDynamics {
     }
 
     /// Returns `W f`: the forces on all places from forces along the axes, at a harmonic.
-    pub fn spread(&self, harmonic: usize, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
+    pub fn force_on_places(&self, harmonic: usize, along: impl Fn(usize) -> Complex64) -> DVector<Complex64> {
         let mut force = DVector::from_element(self.n, ZERO);
         let (sectors, size) = self.sectors();
         for sector in 0..sectors {
-            let lead = self.waves.as_ref().map(|waves| waves.cyclic.phase_factor(harmonic, sector));
+            let lead = self.travelling_waves.as_ref().map(|waves| waves.cyclic.phase_factor(harmonic, sector));
             for (q, rows) in self.directions.iter().enumerate() {
                 let f = lead.map_or_else(|| along(q), |lead| along(q) * lead);
                 rows.iter().for_each(|&(i, w)| force[(i + sector * size) % self.n] += f * w);
@@ -536,13 +545,13 @@ impl LinearDynamics {
         }
         let factor = self
             .structure
-            .shifted_dynamic_stiffness(s, soft_spring(s, omega))
+            .shifted_dynamic_stiffness(s, regularizing_stiffness(s, omega))
             .map(Arc::new)
             .map_err(|_| UndampedResonance);
         let bytes =
             |factor: &Result<Arc<DynamicStiffness>, UndampedResonance>| factor.as_ref().map_or(0, |f| f.bytes());
         while !factors.is_empty()
-            && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > KEPT
+            && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > FACTOR_BYTES
         {
             factors.remove(0);
         }
@@ -553,7 +562,7 @@ impl LinearDynamics {
 
 /// Tells whether the dynamic stiffness is factored at every frequency.
 fn is_factored(structure: &Structure) -> bool {
-    structure.is_sparse() || structure.dofs() > MODES
+    structure.is_sparse() || structure.dofs() > MODAL_DOFS
 }
 
 /// Tells whether the coordinates are real modes, as in a reduced model.
@@ -635,7 +644,7 @@ mod tests {
                 let expected = exact(i as f64, at[0]) * pull[0] + exact(i as f64, at[1]) * pull[1];
                 assert!((pulled[i - 1] - expected).norm() < 1e-9 * exact(at[0], at[0]).norm());
             }
-            assert!(rest.known(s, omega).is_some());
+            assert!(rest.kept_unit_responses(s, omega).is_some());
         }
     }
 
@@ -643,7 +652,7 @@ mod tests {
     /// oscillators are driven at their natural frequency, uncoupled and
     /// coupled. With coupling it is the frequency of a rigid motion on springs.
     #[test]
-    fn a_resonance_without_damping_is_no_answer() {
+    fn an_undamped_resonance_is_reported() {
         for (n, coupling) in [(60, 0.0), (60, 3.0), (230, 0.0)] {
             let name = |i: usize| format!("m{i}");
             let mut model = Model::default();
@@ -668,7 +677,7 @@ mod tests {
 
     /// The memory of a factor is predicted exactly.
     #[test]
-    fn factors_take_the_memory_that_is_said() {
+    fn factor_memory_is_predicted() {
         let system = chain(300, 400.0, 0.5);
         let factor = system.structure().dynamic_stiffness(Complex64::new(0.0, 1.03)).unwrap();
         assert_eq!(crate::method::harmonic_balance::factor_bytes(&system), factor.bytes());

@@ -1,6 +1,6 @@
 //! Modes of a small structure: its response at every frequency is a sum over them.
 
-use crate::method::harmonic_balance::equations::regularization::HOLD;
+use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::model::System;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -16,11 +16,11 @@ pub(crate) struct ComplexModes {
     pub shape: DMatrix<Complex64>,
     pub left: DMatrix<Complex64>,
     /// Their components along the axes: q × modes, and modes × q.
-    pub shape_at: DMatrix<Complex64>,
-    pub left_at: DMatrix<Complex64>,
+    pub shape_along: DMatrix<Complex64>,
+    pub left_along: DMatrix<Complex64>,
     /// Free directions, n × r, and their components along the axes, r × q.
     pub free: DMatrix<f64>,
-    pub free_at: DMatrix<f64>,
+    pub free_along: DMatrix<f64>,
 }
 
 impl ComplexModes {
@@ -43,9 +43,9 @@ impl ComplexModes {
         let free = back * modes.free;
         let along = complex(direction);
         Some(ComplexModes {
-            shape_at: along.transpose() * &shape,
-            left_at: &left * along,
-            free_at: free.transpose() * direction,
+            shape_along: along.transpose() * &shape,
+            left_along: &left * along,
+            free_along: free.transpose() * direction,
             lambda: modes.lambda,
             shape,
             left,
@@ -55,13 +55,13 @@ impl ComplexModes {
 }
 
 /// Returns `1/(s - λ)` and `1/(s - λ*)`, limited near a pole.
-pub(crate) fn fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
-    let hold = HOLD * HOLD * omega;
+pub(crate) fn partial_fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
+    let hold = REGULARIZING_FREQUENCY * REGULARIZING_FREQUENCY * omega;
     let one = |d: Complex64| if d.norm() < hold { Complex64::new(1.0 / hold, 0.0) } else { 1.0 / d };
     (one(s - lambda), one(s - lambda.conj()))
 }
 
 /// Returns `1/s²`; at rest, the value with the soft spring.
-pub(crate) fn free_fraction(s: Complex64, omega: f64) -> Complex64 {
-    if s == ZERO { Complex64::new((HOLD * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
+pub(crate) fn rigid_body_fraction(s: Complex64, omega: f64) -> Complex64 {
+    if s == ZERO { Complex64::new((REGULARIZING_FREQUENCY * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
 }

@@ -27,7 +27,7 @@ pub(crate) enum Receptance {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ReceptanceMatrices {
     pub matrices: Vec<DMatrix<Complex64>>,
-    pairs: Vec<ComplexGemv>,
+    gemv_copies: Vec<ComplexGemv>,
     /// Forces and motions of one harmonic, and scratch memory of its product.
     force: Vec<Complex64>,
     memory: Vec<f64>,
@@ -38,14 +38,14 @@ impl ReceptanceMatrices {
         let few = |matrix: &&DMatrix<Complex64>| (BLOCKED..=CACHED).contains(&matrix.nrows());
         let pairs =
             matrices.iter().filter(few).map(|matrix| ComplexGemv::new(matrix.as_slice(), matrix.nrows())).collect();
-        ReceptanceMatrices { matrices, pairs, ..ReceptanceMatrices::default() }
+        ReceptanceMatrices { matrices, gemv_copies: pairs, ..ReceptanceMatrices::default() }
     }
 
     /// Returns the memory of the matrices and of their copies, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.matrices.iter().map(|matrix| size_of_val(matrix.as_slice())).sum::<usize>()
-            + self.pairs.iter().map(ComplexGemv::bytes).sum::<usize>()
+            + self.gemv_copies.iter().map(ComplexGemv::bytes).sum::<usize>()
     }
 
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
@@ -55,7 +55,7 @@ impl ReceptanceMatrices {
         let (forces, sum) = self.force.split_at_mut(axes);
         for (k, matrix) in self.matrices.iter().enumerate() {
             forces.iter_mut().zip(force[k..].iter().step_by(nh)).for_each(|(own, force)| *own = *force);
-            let own = if let Some(pairs) = self.pairs.get(k) {
+            let own = if let Some(pairs) = self.gemv_copies.get(k) {
                 pairs.apply(forces, &mut self.memory);
                 &*forces
             } else if axes >= BLOCKED {
@@ -106,11 +106,13 @@ impl ModalReceptance {
         series: &[f64],
     ) -> Result<Self, UndampedResonance> {
         let rates: Vec<Complex64> = harmonics.iter().map(|h| Complex64::new(0.0, *h as f64 * omega)).collect();
-        let gains = rates.iter().map(|s| structure.gains(*s, omega)).collect::<Result<Vec<_>, _>>()?;
+        let gains = rates.iter().map(|s| structure.modal_receptances(*s, omega)).collect::<Result<Vec<_>, _>>()?;
         let mean = match (harmonics[0], closed) {
             // the force of a spring is at most its stiffness times the displacement
             (0, Some(closed)) => closed.springs.iter().map(|k| if *k > 0.0 { k.recip() } else { 0.0 }).collect(),
-            (0, None) => structure.own_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect(),
+            (0, None) => {
+                structure.diagonal_receptance(&gains[0]).iter().zip(series).map(|(r, s)| r.norm() + s).collect()
+            }
             _ => vec![0.0; structure.axes],
         };
         Ok(ModalReceptance {
@@ -118,7 +120,7 @@ impl ModalReceptance {
             omega,
             rates,
             gains,
-            closed: closed.and_then(|closed| closed.of_the_modes(omega)).transpose()?,
+            closed: closed.and_then(|closed| closed.modal_factor(omega)).transpose()?,
             series: series.to_vec(),
             mean,
             forces: Vec::new(),
@@ -129,7 +131,7 @@ impl ModalReceptance {
 
     /// Applies the receptances to the forces of all harmonics at once.
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
-        let (nh, p, n) = (self.rates.len(), self.structure.axes, self.structure.own().len());
+        let (nh, p, n) = (self.rates.len(), self.structure.axes, self.structure.modal_coefficients().len());
         let tall = 2 * nh;
         self.forces.clear();
         self.forces.extend(force.iter().flat_map(|f| [f.re, f.im]));
@@ -181,7 +183,7 @@ impl Receptance {
 
     /// Returns the size of the motion along an axis under a unit force along it, at the first
     /// harmonic, m/N. The first harmonic must be the mean.
-    pub fn mean(&self, q: usize) -> f64 {
+    pub fn mean_receptance(&self, q: usize) -> f64 {
         match self {
             Receptance::Formed(formed) => formed.matrices.first().map_or(0.0, |r| r[(q, q)].norm()),
             Receptance::Modal(modal) => modal.mean[q],

@@ -1,7 +1,7 @@
 //! Dynamic stiffness of a tuned ring in travelling waves, from one sector.
 
 use super::uncoupled_modes::UndampedResonance;
-use crate::method::harmonic_balance::equations::regularization::soft_spring;
+use crate::method::harmonic_balance::equations::regularization::regularizing_stiffness;
 use crate::model::CyclicSymmetry;
 use crate::structure::{DynamicStiffness, RingSector, Structure, Wave, WaveStiffness, unit_root};
 use nalgebra::{DMatrix, DVector};
@@ -61,7 +61,8 @@ impl TravellingWaves {
             .entry(diameter)
             .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| UndampedResonance))
             .clone()?;
-        let factor = wave.dynamic_stiffness(s, soft_spring(s, omega)).map(Arc::new).map_err(|_| UndampedResonance);
+        let factor =
+            wave.dynamic_stiffness(s, regularizing_stiffness(s, omega)).map(Arc::new).map_err(|_| UndampedResonance);
         factors.push((diameter, FactoredStiffness { rate: s, omega, factor: factor.clone() }));
         factor
     }
@@ -97,7 +98,7 @@ impl TravellingWaves {
 
     /// Returns the displacement along each axis under a unit force along that axis alone,
     /// without forces on the other sectors, at a real rate. It is the mean over all waves.
-    pub fn own(
+    pub fn diagonal_receptance(
         &self,
         (rate, omega): (f64, f64),
         directions: &[Vec<(usize, f64)>],

@@ -5,7 +5,7 @@
 //! keeps. Φ is real and the same at all frequencies, and no matrix is factored at any
 //! frequency.
 
-use crate::method::harmonic_balance::equations::regularization::HOLD;
+use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::structure::{Structure, UncoupledModes};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -54,7 +54,7 @@ impl UncoupledDynamics {
     }
 
     /// Returns modal mass, damping and stiffness.
-    pub fn own(&self) -> &[[f64; 3]] {
+    pub fn modal_coefficients(&self) -> &[[f64; 3]] {
         &self.modes.own
     }
 
@@ -63,8 +63,8 @@ impl UncoupledDynamics {
     /// # Errors
     /// A resonance without damping.
     pub fn stiffness(&self, m: usize, s: Complex64, omega: f64) -> Result<Complex64, UndampedResonance> {
-        let [mass, damping, stiffness] = self.own()[m];
-        let hold = if s == ZERO { (HOLD * omega).powi(2) } else { 0.0 };
+        let [mass, damping, stiffness] = self.modal_coefficients()[m];
+        let hold = if s == ZERO { (REGULARIZING_FREQUENCY * omega).powi(2) } else { 0.0 };
         let of_mass = (s * s + hold) * mass;
         let sum = of_mass + s * damping + stiffness;
         let size = of_mass.norm() + (s * damping).norm() + stiffness.abs();
@@ -72,14 +72,14 @@ impl UncoupledDynamics {
     }
 
     /// Returns the inverse modal dynamic stiffness of all modes.
-    pub fn gains(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, UndampedResonance> {
-        (0..self.own().len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
+    pub fn modal_receptances(&self, s: Complex64, omega: f64) -> Result<Vec<Complex64>, UndampedResonance> {
+        (0..self.modal_coefficients().len()).map(|m| Ok(1.0 / self.stiffness(m, s, omega)?)).collect()
     }
 
     /// Returns the receptance of the axes, p × p.
     pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
-        let (p, n) = (self.axes, self.own().len());
-        let gains = self.gains(s, omega)?;
+        let (p, n) = (self.axes, self.modal_coefficients().len());
+        let gains = self.modal_receptances(s, omega)?;
         let part = |read: fn(&Complex64) -> f64| {
             let columns = self.at.chunks_exact(p.max(1)).zip(&gains);
             let weighted: Vec<f64> = columns.flat_map(|(at, g)| at.iter().map(move |a| a * read(g))).collect();
@@ -100,7 +100,7 @@ impl UncoupledDynamics {
     }
 
     /// Returns the diagonal of the receptance.
-    pub fn own_receptance(&self, gains: &[Complex64]) -> Vec<Complex64> {
+    pub fn diagonal_receptance(&self, gains: &[Complex64]) -> Vec<Complex64> {
         let mut sum = vec![ZERO; self.axes];
         for (at, gain) in self.at.chunks_exact(self.axes.max(1)).zip(gains) {
             sum.iter_mut().zip(at).for_each(|(sum, a)| *sum += gain * (a * a));
@@ -109,12 +109,12 @@ impl UncoupledDynamics {
     }
 
     /// Returns the modal forces of forces on all places.
-    pub fn onto_modes(&self, force: &DVector<f64>) -> DVector<f64> {
+    pub fn modal_forces(&self, force: &DVector<f64>) -> DVector<f64> {
         self.modes.shapes.as_ref().map_or_else(|| force.clone(), |shapes| shapes.tr_mul(force))
     }
 
     /// Returns the displacements of all places from modal displacements.
-    pub fn of_modes(&self, modal: &DVector<f64>) -> DVector<f64> {
+    pub fn physical_displacements(&self, modal: &DVector<f64>) -> DVector<f64> {
         self.modes.shapes.as_ref().map_or_else(|| modal.clone(), |shapes| shapes * modal)
     }
 
@@ -125,7 +125,7 @@ impl UncoupledDynamics {
         omega: f64,
         force: &DVector<Complex64>,
     ) -> Result<DVector<Complex64>, UndampedResonance> {
-        let gains = self.gains(s, omega)?;
+        let gains = self.modal_receptances(s, omega)?;
         let Some(shapes) = &self.modes.shapes else {
             return Ok(DVector::from_iterator(force.len(), force.iter().zip(&gains).map(|(f, g)| f * g)));
         };
@@ -149,7 +149,7 @@ mod tests {
     /// Uncoupled modes respond like the dynamic stiffness, with massless and with free
     /// directions. Damping that couples the modes is detected.
     #[test]
-    fn modes_answer_as_the_dynamic_stiffness() {
+    fn modal_receptance_equals_inverse_dynamic_stiffness() {
         let n = 12;
         let spread = DMatrix::from_fn(n, n - 1, |i, k| noise(i * n + k));
         let stiffness = &spread * spread.transpose();
@@ -171,8 +171,8 @@ mod tests {
             [(Complex64::new(0.0, 0.8), 0.8), (Complex64::new(0.0, 2.4), 0.8), (Complex64::new(1.5, 0.0), 0.8)]
         {
             let receptance = modes.receptance(s, omega).unwrap();
-            let gains = modes.gains(s, omega).unwrap();
-            let own = modes.own_receptance(&gains);
+            let gains = modes.modal_receptances(s, omega).unwrap();
+            let own = modes.diagonal_receptance(&gains);
             for (b, direction) in directions.iter().enumerate() {
                 let mut x = DVector::from_element(n, ZERO);
                 direction.iter().for_each(|&(i, w)| x[i] += Complex64::new(w, 0.0));

@@ -8,7 +8,7 @@
 const RIPPLE: f64 = 30.0;
 
 /// Returns ε (N s/m) of a contact with this receptance (m/N) at the highest harmonic `top`.
-pub(crate) fn penalty(receptance: f64, top: usize, omega: f64) -> f64 {
+pub(crate) fn contact_parameter(receptance: f64, top: usize, omega: f64) -> f64 {
     let impedance = 1.0 / (receptance * top as f64 * omega);
     impedance * (1.0 + RIPPLE / top as f64)
 }

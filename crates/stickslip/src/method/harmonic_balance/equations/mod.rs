@@ -1,7 +1,8 @@
 //! The equations of harmonic balance.
 //!
-//! The receptance `R` of the structure between the axes of the ports gives the motion per harmonic:
-//! `u = u_lin - R f`. A port `q` has unknowns `y`, forces `f(y)` and a residual `r(y, u)`:
+//! The receptance `R` of the structure between the axes of the ports gives the motion per
+//! harmonic: `u = u_lin - R f`. A port `q` has unknowns `y`, forces `f(y)` and a residual
+//! `r(y, u)`:
 //! - A motion port has its motion as the unknown: `f = f(y)`, `r = y - u`.
 //! - A force port has its force as the unknown, `y = λ`: `f = y`,
 //!   `r = λ - P J(λ + ε u')`. `J` is the resolvent of the law, and `P` truncates to
@@ -15,8 +16,9 @@
 //! their force is subtracted from `f`, see `closed_contacts`.
 //!
 //! `ε` is not a free parameter: it is the impedance of the structure at the contact at the
-//! highest harmonic, the resolution of the series (see [`contact_parameter`](super::equations::contact_parameter::penalty)).
-//! Another ε changes the solution no more than the missing harmonics do.
+//! highest harmonic, the resolution of the series (see
+//! [`contact_parameter`](super::equations::contact_parameter::contact_parameter)). Another ε
+//! changes the solution no more than the missing harmonics do.
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian
 //! frequency-time method".
@@ -29,16 +31,16 @@ pub(super) mod regularization;
 mod scaled_unknowns;
 mod scaling;
 
-use super::aft::{FrequencyTime, InitialState, Port, Ports, block, blocks};
-use super::budget::{POINT, WorkShare};
+use super::aft::{FrequencyTime, InitialState, Port, Ports, tangent_range, tangent_ranges};
+use super::budget::{POINT_LIMIT, WorkShare};
 use super::dynamics::banded::BandedForm;
 use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
-use super::equations::harmonic_set::weight;
+use super::equations::harmonic_set::velocity_weight;
 use super::globalization::found_by::FoundBy;
 use super::globalization::homotopy::Homotopy;
 use super::globalization::subdomain::NonlinearElimination;
 use super::linear_solve::linearization::LinearizedEquations;
-use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, by_products, dot};
+use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, dot, uses_krylov};
 use crate::model::CyclicSymmetry;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -46,35 +48,35 @@ use num_complex::Complex64;
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Factor of the springs of closed contacts in a law's derivative, if the structure contains them.
-pub(super) const OPEN: f64 = -1.0;
+pub(super) const CLOSED_CONTACT_SIGN: f64 = -1.0;
 
 /// The discretization by one list of harmonics: equations, scratch memory, and work counters.
 #[derive(Debug, Clone)]
 pub(super) struct Discretization {
     /// Number of evaluations of laws with derivatives, and of eliminations of
     /// the Jacobian, in the present search.
-    pub assembled: usize,
-    pub eliminated: usize,
+    pub evaluations: usize,
+    pub eliminations: usize,
     /// True if the search begins with the solution of a shorter series, which
     /// remains valid if the search fails. With unknown forces, the work limit
     /// then holds without a guaranteed number of steps.
-    pub prolongs: bool,
+    pub extends_shorter: bool,
     /// Work of earlier searches of the present point, here and at other levels,
-    /// see [`Discretization::taken`].
-    pub spent: WorkShare,
-    pub elsewhere: WorkShare,
+    /// see [`Discretization::work_used`].
+    pub work_before: WorkShare,
+    pub work_elsewhere: WorkShare,
     /// Work limit of all these searches together.
-    pub allowed: WorkShare,
-    pub alternation: FrequencyTime,
+    pub work_limit: WorkShare,
+    pub aft: FrequencyTime,
     /// Receptance of the axes; empty in the banded form.
     pub(super) receptance: Receptance,
     /// Penalty ε per port, N s/m; infinite if the motion is imposed.
     pub(super) penalty: Vec<f64>,
     /// Force that would hold the contacts against the motion without friction,
     /// N: the largest product of a penalty and a velocity.
-    holding: f64,
+    largest_holding_force: f64,
     /// Motion of the axes without friction, [axis][harmonic].
-    pub linear: Vec<Complex64>,
+    pub linear_motion: Vec<Complex64>,
     /// Mean of the imposed motion along the axes, m.
     imposed: Vec<f64>,
     /// Displacements along the axes in static equilibrium, m; empty if unknown.
@@ -85,24 +87,24 @@ pub(super) struct Discretization {
     series: Vec<f64>,
     /// Stiffness of closed contacts along the axes (N/m) that the structure contains for the
     /// mean; empty if it is held without them.
-    pub(super) springs: Vec<f64>,
+    pub(super) closed_stiffness: Vec<f64>,
     /// Forces on the structure: those of the ports minus those of these
     /// springs, [axis][harmonic], N.
     acting: Vec<Complex64>,
     /// Motion of all places without friction, per harmonic.
-    pub free: Vec<DVector<Complex64>>,
+    pub free_response: Vec<DVector<Complex64>>,
     /// Banded form of a large system, in place of receptance and Jacobian.
-    pub sparse: Option<BandedForm>,
+    pub banded: Option<BandedForm>,
     /// Memory of the nonlinear elimination, if the system allows it.
-    pub(super) settling: Option<NonlinearElimination>,
+    pub(super) elimination: Option<NonlinearElimination>,
     /// GMRES with its preconditioner, in place of the Jacobian, for many joints
     /// that the structure couples.
-    pub(super) coupled: Option<NewtonKrylov>,
+    pub(super) newton_krylov: Option<NewtonKrylov>,
     /// True if the Jacobian is needed as a matrix, and the receptances with it.
     with_matrix: bool,
     /// Number of products with the Jacobian in the present search.
     pub products: usize,
-    /// Derivatives K or T of all ports in sequence, see [`blocks`].
+    /// Derivatives K or T of all ports in sequence, see [`tangent_ranges`].
     pub(super) tangents: Vec<f64>,
     pub(super) blocks: Vec<usize>,
     /// Per axis: true if its unknown is a force.
@@ -111,9 +113,10 @@ pub(super) struct Discretization {
     pub(super) residual: Vec<f64>,
     /// Units of the residual.
     pub(super) units: Vec<f64>,
-    pub(super) before: HarmonicSolution,
+    pub(super) previous: HarmonicSolution,
     pub(super) best: HarmonicSolution,
-    /// Forces to which [`Homotopy::pull`] draws the force unknowns, [axis][harmonic], N.
+    /// Forces to which [`Homotopy::proximal_weight`] draws the force unknowns, [axis][harmonic],
+    /// N.
     pub(super) anchor: Vec<Complex64>,
     pub(super) step: Vec<f64>,
     pub(super) image: Vec<Complex64>,
@@ -122,18 +125,19 @@ pub(super) struct Discretization {
     pub(super) states: Vec<InitialState>,
     /// True if laws that forget their initial states begin the next motion with these. They
     /// reach the same states as from static equilibrium, in fewer periods.
-    pub(super) nearby: bool,
+    pub(super) reuses_states: bool,
     /// Coarse sampling of the period, for derivatives of many contacts: see
-    /// [`Discretization::follow_slopes`].
-    pub(super) sketch: Option<FrequencyTime>,
+    /// [`Discretization::complete_derivatives`].
+    pub(super) coarse: Option<FrequencyTime>,
     /// True if the present search uses the coarse sampling.
-    pub(super) sketches: bool,
-    /// Sampling with twice the samples, created on first use, see [`Discretization::by_twice_the_samples`].
+    pub(super) uses_coarse: bool,
+    /// Sampling with twice the samples, created on first use, see
+    /// [`Discretization::correct_twice_the_samples`].
     pub(super) twice: Option<FrequencyTime>,
     /// True if the tangents are those of the present search, without added springs.
     pub(super) linearised: bool,
     /// True if the tangents are those of the initial guess of the next search, by coarse sampling.
-    pub(super) keeps_slopes: bool,
+    pub(super) keeps_tangents: bool,
     /// Motions along the axes under the forces, [axis][harmonic].
     moved: Vec<Complex64>,
     product: Vec<f64>,
@@ -143,7 +147,7 @@ pub(super) struct Discretization {
 #[derive(Debug, Clone)]
 pub(super) struct ProximalSprings {
     /// Stiffness relative to the springs of closed contacts.
-    pub share: f64,
+    pub relative_stiffness: f64,
     /// Displacements at which the springs are relaxed, m.
     pub anchor: Vec<f64>,
 }
@@ -161,12 +165,12 @@ pub(super) struct HarmonicSolution {
 }
 
 impl HarmonicSolution {
-    pub fn rest(length: usize) -> Self {
+    pub fn zero(length: usize) -> Self {
         HarmonicSolution { c: vec![ZERO; length], force: vec![ZERO; length], ..HarmonicSolution::default() }
     }
 
     /// Copies `other` without new memory.
-    pub fn copy(&mut self, other: &HarmonicSolution) {
+    pub fn copy_from(&mut self, other: &HarmonicSolution) {
         self.c.clone_from(&other.c);
         self.force.clone_from(&other.force);
         (self.residual, self.iterations) = (other.residual, other.iterations);
@@ -186,11 +190,11 @@ pub(super) enum DerivativeScope {
 
 impl Discretization {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<BandedForm>) -> Self {
-        let mut level = Discretization::unassembled(FrequencyTime::new(harmonics, samples), ports, sparse);
+        let mut level = Discretization::without_solver(FrequencyTime::new(harmonics, samples), ports, sparse);
         let size = level.residual.len();
-        level.coupled = (level.sparse.is_none() && by_products(size, ports)).then(NewtonKrylov::default);
-        if level.coupled.is_some() && !ports.has_forces() {
-            level.keep_sketch();
+        level.newton_krylov = (level.banded.is_none() && uses_krylov(size, ports)).then(NewtonKrylov::default);
+        if level.newton_krylov.is_some() && !ports.has_forces() {
+            level.create_coarse_sampling();
         }
         level
     }
@@ -201,71 +205,71 @@ impl Discretization {
     }
 
     /// Creates the level without the solver for Newton steps.
-    fn unassembled(alternation: FrequencyTime, ports: &Ports, sparse: Option<BandedForm>) -> Self {
+    fn without_solver(alternation: FrequencyTime, ports: &Ports, sparse: Option<BandedForm>) -> Self {
         let (nh, axes) = (alternation.harmonics.len(), ports.count());
         let size = 2 * nh * axes;
-        let (blocks, tangents) = blocks(ports, nh);
+        let (blocks, tangents) = tangent_ranges(ports, nh);
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
         Discretization {
-            assembled: 0,
-            eliminated: 0,
-            prolongs: false,
-            spent: WorkShare::default(),
-            elsewhere: WorkShare::default(),
-            allowed: POINT,
-            alternation,
+            evaluations: 0,
+            eliminations: 0,
+            extends_shorter: false,
+            work_before: WorkShare::default(),
+            work_elsewhere: WorkShare::default(),
+            work_limit: POINT_LIMIT,
+            aft: alternation,
             receptance: Receptance::Formed(ReceptanceMatrices::default()),
             penalty: vec![0.0; ports.len()],
-            holding: 0.0,
-            linear: vec![ZERO; nh * axes],
+            largest_holding_force: 0.0,
+            linear_motion: vec![ZERO; nh * axes],
             imposed: vec![0.0; axes],
             equilibrium: ports.equilibrium().to_vec(),
             tether: None,
-            series: ports.iter().flat_map(|port| vec![port.series; port.axes]).collect(),
-            springs: Vec::new(),
+            series: ports.iter().flat_map(|port| vec![port.series_compliance; port.axes]).collect(),
+            closed_stiffness: Vec::new(),
             acting: Vec::new(),
-            free: Vec::new(),
+            free_response: Vec::new(),
             tangents: vec![0.0; tangents],
             blocks,
             forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
             jacobian: Vec::new(),
-            settling: None,
-            coupled: None,
+            elimination: None,
+            newton_krylov: None,
             with_matrix: false,
             products: 0,
-            sparse,
+            banded: sparse,
             residual: vec![0.0; size],
             units: vec![1.0; size],
-            before: HarmonicSolution::rest(nh * axes),
-            best: HarmonicSolution::rest(nh * axes),
+            previous: HarmonicSolution::zero(nh * axes),
+            best: HarmonicSolution::zero(nh * axes),
             anchor: Vec::new(),
             step: vec![0.0; size],
             image: vec![ZERO; nh * widest],
             states: vec![InitialState::default(); ports.len()],
-            nearby: false,
-            sketch: None,
-            sketches: false,
+            reuses_states: false,
+            coarse: None,
+            uses_coarse: false,
             twice: None,
             linearised: false,
-            keeps_slopes: false,
+            keeps_tangents: false,
             moved: vec![ZERO; nh * axes],
             product: Vec::new(),
         }
     }
 
     pub fn harmonics(&self) -> &[usize] {
-        &self.alternation.harmonics
+        &self.aft.harmonics
     }
 
-    /// Tells whether GMRES computes the Newton steps, see [`by_products`].
-    pub fn is_coupled(&self) -> bool {
-        self.coupled.is_some()
+    /// Tells whether GMRES computes the Newton steps, see [`uses_krylov`].
+    pub fn uses_krylov(&self) -> bool {
+        self.newton_krylov.is_some()
     }
 
     /// Extends a motion of one sector to the whole ring, for postprocessing:
     /// the returned level cannot be solved. `ports` are those of the ring.
     /// Every sector moves with the phase of the travelling wave.
-    pub fn around(
+    pub fn over_ring(
         &self,
         cyclic: CyclicSymmetry,
         ports: &Ports,
@@ -279,14 +283,14 @@ impl Discretization {
         let motion = HarmonicSolution { c: all(&motion.c), force: all(&motion.force), ..*motion };
         let level = Discretization {
             penalty: (0..ports.len()).map(|p| self.penalty[p % self.penalty.len()]).collect(),
-            ..Discretization::unassembled(self.alternation.clone(), ports, None)
+            ..Discretization::without_solver(self.aft.clone(), ports, None)
         };
         (level, motion)
     }
 
     /// Evaluates forces and residual at the unknowns in `motion`, and updates the other part of
-    /// `motion`. Writes the derivatives of the ports into `self.tangents`, see [`DerivativeScope`].
-    /// Returns the relative size of the residual.
+    /// `motion`. Writes the derivatives of the ports into `self.tangents`, see
+    /// [`DerivativeScope`]. Returns the relative size of the residual.
     pub fn evaluate(
         &mut self,
         ports: &Ports,
@@ -296,21 +300,21 @@ impl Discretization {
         length: f64,
         slopes: DerivativeScope,
     ) -> f64 {
-        self.assembled += usize::from(slopes != DerivativeScope::None);
-        self.respond(ports, omega, motion, ease, slopes);
-        self.follow(motion, ease);
-        self.image(ports, omega, motion, ease, slopes);
-        self.measure(ports, motion, length);
+        self.evaluations += usize::from(slopes != DerivativeScope::None);
+        self.motion_port_forces(ports, omega, motion, ease, slopes);
+        self.structure_motion(motion, ease);
+        self.force_port_residuals(ports, omega, motion, ease, slopes);
+        self.set_residual_units(ports, motion, length);
         // relative to the units of the residual; motions are weighted as velocities
         let nh = self.harmonics().len();
         let mut sum = 0.0;
         for port in ports.iter() {
             for q in port.range() {
-                for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+                for (k, &h) in self.aft.harmonics.iter().enumerate() {
                     let at = 2 * (q * nh + k);
                     let square = self.residual[at] * self.residual[at] + self.residual[at + 1] * self.residual[at + 1];
                     let unit = self.units[at];
-                    sum += square * if port.is_force() { 1.0 } else { weight(h) } / (unit * unit);
+                    sum += square * if port.is_force() { 1.0 } else { velocity_weight(h) } / (unit * unit);
                 }
             }
         }
@@ -318,7 +322,7 @@ impl Discretization {
     }
 
     /// Computes the forces of motion ports, and their derivatives.
-    pub(super) fn respond(
+    pub(super) fn motion_port_forces(
         &mut self,
         ports: &Ports,
         omega: f64,
@@ -327,39 +331,40 @@ impl Discretization {
         slopes: DerivativeScope,
     ) {
         let nh = self.harmonics().len();
-        self.alternation.static_share = self.load(ease) / ease.limits;
+        self.aft.static_share = self.load_factor(ease) / ease.limit_factor;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
-            let range = port.first * nh..(port.first + port.axes) * nh;
-            let wanted = slopes == DerivativeScope::All || (slopes == DerivativeScope::Cheap && !port.marches());
-            let slot = wanted.then_some(&mut self.tangents[block(&self.blocks, p, port, nh)]);
+            let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
+            let wanted =
+                slopes == DerivativeScope::All || (slopes == DerivativeScope::Cheap && !port.has_memory_steps());
+            let slot = wanted.then_some(&mut self.tangents[tangent_range(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
-            if port.marches() && self.nearby {
-                self.alternation.begin = self.states[p].forgotten();
+            if port.has_memory_steps() && self.reuses_states {
+                self.aft.known_state = self.states[p].if_forgotten();
             }
-            self.alternation.respond(port, (omega, ease.limits), c, force, slot);
+            self.aft.motion_port_force(port, (omega, ease.limit_factor), c, force, slot);
             if wanted {
-                self.add_springs(p, port, OPEN + self.tether_share());
+                self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
             }
-            if port.marches() {
-                self.states[p].state.clone_from(&self.alternation.state);
+            if port.has_memory_steps() {
+                self.states[p].state.clone_from(&self.aft.state);
             }
         }
     }
 
     /// Computes the motion of the structure under the forces. Writes the
     /// residual of motion ports, and the motion of force ports.
-    pub(super) fn follow(&mut self, motion: &mut HarmonicSolution, ease: Homotopy) {
+    pub(super) fn structure_motion(&mut self, motion: &mut HarmonicSolution, ease: Homotopy) {
         let nh = self.harmonics().len();
-        let share = self.load(ease);
-        self.act(motion, share);
-        let acting = if self.springs.is_empty() { &motion.force } else { &self.acting };
-        if self.sparse.is_none() {
+        let share = self.load_factor(ease);
+        self.compute_structure_forces(motion, share);
+        let acting = if self.closed_stiffness.is_empty() { &motion.force } else { &self.acting };
+        if self.banded.is_none() {
             self.receptance.apply(acting, &mut self.moved);
         }
         for k in 0..nh {
-            let (residual, linear, forces) = (&mut self.residual, &self.linear, &self.forces);
+            let (residual, linear, forces) = (&mut self.residual, &self.linear_motion, &self.forces);
             let c = &mut motion.c;
-            let share = if self.alternation.harmonics[k] == 0 { share } else { 1.0 };
+            let share = if self.aft.harmonics[k] == 0 { share } else { 1.0 };
             let mut follow = |q: usize, u: Complex64| {
                 let at = q * nh + k;
                 let moved = linear[at] * share - u;
@@ -370,9 +375,9 @@ impl Discretization {
                     (residual[2 * at], residual[2 * at + 1]) = (r.re, r.im);
                 }
             };
-            match &mut self.sparse {
+            match &mut self.banded {
                 Some(sparse) => {
-                    sparse.receive(k, |q| acting[q * nh + k], follow);
+                    sparse.response_along_axes(k, |q| acting[q * nh + k], follow);
                 }
                 None => {
                     self.moved.chunks_exact(nh).enumerate().for_each(|(q, u)| follow(q, u[k]));
@@ -382,14 +387,21 @@ impl Discretization {
     }
 
     /// Computes the residual of all force ports, and its derivatives.
-    fn image(&mut self, ports: &Ports, omega: f64, motion: &HarmonicSolution, ease: Homotopy, slopes: DerivativeScope) {
+    fn force_port_residuals(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &HarmonicSolution,
+        ease: Homotopy,
+        slopes: DerivativeScope,
+    ) {
         for p in (0..ports.len()).filter(|p| ports[*p].is_force()) {
-            self.image_of(ports, p, omega, motion, (ease, slopes));
+            self.force_port_residual(ports, p, omega, motion, (ease, slopes));
         }
     }
 
     /// Computes the residual of one force port, and its derivatives.
-    pub(super) fn image_of(
+    pub(super) fn force_port_residual(
         &mut self,
         ports: &Ports,
         p: usize,
@@ -398,20 +410,20 @@ impl Discretization {
         (ease, slopes): (Homotopy, DerivativeScope),
     ) {
         let (port, nh) = (&ports[p], self.harmonics().len());
-        let range = port.first * nh..(port.first + port.axes) * nh;
+        let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
         let penalty = self.penalty[p];
         let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
-        let slot = &mut self.tangents[block(&self.blocks, p, port, nh)];
+        let slot = &mut self.tangents[tangent_range(&self.blocks, p, port, nh)];
         let image = &mut self.image[..range.len()];
         let slot = (slopes != DerivativeScope::None).then(|| {
             slot.fill(0.0);
             slot
         });
-        self.alternation.image(port, (omega, penalty, ease.limits), (c, force), image, slot);
+        self.aft.force_port_image(port, (omega, penalty, ease.limit_factor), (c, force), image, slot);
         for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
             let mut r = force - image;
-            if ease.pull > 0.0 {
-                r += (force - self.anchor[at]) * ease.pull;
+            if ease.proximal_weight > 0.0 {
+                r += (force - self.anchor[at]) * ease.proximal_weight;
             }
             (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
         }
@@ -422,11 +434,11 @@ impl Discretization {
     pub(super) fn step_forces(&mut self, ports: &Ports, motion: &mut HarmonicSolution, length: f64) {
         let pair = 2 * self.harmonics().len();
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
-            self.add_springs(p, port, -OPEN);
+            self.add_springs(p, port, -CLOSED_CONTACT_SIGN);
             let (wide, unit) = (pair * port.axes, port.unit(length));
-            let step = &self.step[port.first * pair..][..wide];
-            let rows = self.tangents[block(&self.blocks, p, port, pair / 2)].chunks_exact(2 * wide);
-            for (force, rows) in motion.force[port.first * pair / 2..].iter_mut().zip(rows) {
+            let step = &self.step[port.first_axis * pair..][..wide];
+            let rows = self.tangents[tangent_range(&self.blocks, p, port, pair / 2)].chunks_exact(2 * wide);
+            for (force, rows) in motion.force[port.first_axis * pair / 2..].iter_mut().zip(rows) {
                 let (re, im) = rows.split_at(wide);
                 *force -= Complex64::new(dot(re, step), dot(im, step)) * unit;
             }
@@ -436,45 +448,47 @@ impl Discretization {
 
     /// Begins a point. All searches of the point share one work limit.
     pub fn begin_point(&mut self) {
-        (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
-        (self.spent, self.elsewhere) = (WorkShare::default(), WorkShare::default());
-        self.prolongs = false;
-        if let Some(settling) = &mut self.settling {
-            settling.helps = true;
+        (self.evaluations, self.eliminations, self.products, self.aft.law_steps) = (0, 0, 0, 0);
+        (self.work_before, self.work_elsewhere) = (WorkShare::default(), WorkShare::default());
+        self.extends_shorter = false;
+        if let Some(settling) = &mut self.elimination {
+            settling.is_useful = true;
         }
     }
 
     /// Begins a search without known states of the laws with memory.
-    pub fn begin_anew(&mut self, ports: &Ports) {
-        self.spent = self.taken_of_point(ports);
-        (self.assembled, self.eliminated, self.products, self.alternation.marched) = (0, 0, 0, 0);
-        (self.nearby, self.linearised, self.sketches) = (false, false, self.sketch.is_some());
-        self.keeps_slopes = false;
+    pub fn begin_search(&mut self, ports: &Ports) {
+        self.work_before = self.point_work_used(ports);
+        (self.evaluations, self.eliminations, self.products, self.aft.law_steps) = (0, 0, 0, 0);
+        (self.reuses_states, self.linearised, self.uses_coarse) = (false, false, self.coarse.is_some());
+        self.keeps_tangents = false;
         self.states.iter_mut().for_each(|known| *known = InitialState::default());
     }
 
     /// Tells whether the states of a law may cross their range between two
     /// samples of a motion. Such a law is as steep for the series as a law of
     /// velocity, and samples locate its sign change only to within one sample.
-    pub fn jumps(&self, ports: &Ports, motion: &HarmonicSolution) -> bool {
+    pub fn states_cross_within_sample(&self, ports: &Ports, motion: &HarmonicSolution) -> bool {
         let (nh, samples) = (self.harmonics().len(), self.all_samples() as f64);
         let phase = |k: usize| self.harmonics()[k] as f64 * std::f64::consts::TAU / samples;
         let fastest = |q: usize| (0..nh).map(|k| motion.c[q * nh + k].norm() * phase(k)).sum::<f64>();
-        ports.iter().any(|port| port.layer().is_some_and(|layer| port.range().any(|q| fastest(q) > layer)))
+        ports
+            .iter()
+            .any(|port| port.state_range_displacement().is_some_and(|layer| port.range().any(|q| fastest(q) > layer)))
     }
 
     /// Tells whether contacts alone hold some body.
-    pub fn stands(&self) -> bool {
-        !self.springs.is_empty()
+    pub fn is_held_by_contacts(&self) -> bool {
+        !self.closed_stiffness.is_empty()
     }
 
     /// Returns the static equilibrium times `share`. If it is unknown, returns
     /// the mean on closed contacts.
-    pub fn at_rest(&self, share: f64) -> HarmonicSolution {
+    pub fn static_solution(&self, share: f64) -> HarmonicSolution {
         let nh = self.harmonics().len();
-        let mut motion = HarmonicSolution::rest(self.linear.len());
+        let mut motion = HarmonicSolution::zero(self.linear_motion.len());
         let known = &self.equilibrium;
-        let still = |i: usize| known.get(i / nh).map_or(self.linear[i], |u| Complex64::new(*u, 0.0));
+        let still = |i: usize| known.get(i / nh).map_or(self.linear_motion[i], |u| Complex64::new(*u, 0.0));
         motion.c.iter_mut().enumerate().step_by(nh).for_each(|(i, c)| *c = still(i) * share);
         motion
     }
@@ -482,67 +496,68 @@ impl Discretization {
     /// Returns the factor of the constant loads. If contacts carry the loads, these grow with
     /// the slip limits, so that a contact that sticks under all of them sticks during the
     /// homotopy. The excitation is then smaller relative to the loads.
-    fn load(&self, ease: Homotopy) -> f64 {
-        if self.stands() { ease.limits } else { 1.0 }
+    fn load_factor(&self, ease: Homotopy) -> f64 {
+        if self.is_held_by_contacts() { ease.limit_factor } else { 1.0 }
     }
 
-    /// Computes the forces minus those of the springs in the structure, into `self.acting`.
-    fn act(&mut self, motion: &HarmonicSolution, share: f64) {
-        if !self.stands() {
+    /// Computes the forces minus those of the springs in the structure, into
+    /// `self.structure_forces`.
+    fn compute_structure_forces(&mut self, motion: &HarmonicSolution, share: f64) {
+        if !self.is_held_by_contacts() {
             return;
         }
-        let nh = self.alternation.harmonics.len();
+        let nh = self.aft.harmonics.len();
         self.acting.clone_from(&motion.force);
-        for (q, (k, imposed)) in self.springs.iter().zip(&self.imposed).enumerate() {
+        for (q, (k, imposed)) in self.closed_stiffness.iter().zip(&self.imposed).enumerate() {
             self.acting[q * nh] -= (motion.c[q * nh] - imposed * share) * *k;
         }
         if let Some(tether) = &self.tether {
-            for (q, (k, anchor)) in self.springs.iter().zip(&tether.anchor).enumerate() {
-                self.acting[q * nh] += (motion.c[q * nh] - anchor) * (tether.share * k);
+            for (q, (k, anchor)) in self.closed_stiffness.iter().zip(&tether.anchor).enumerate() {
+                self.acting[q * nh] += (motion.c[q * nh] - anchor) * (tether.relative_stiffness * k);
             }
         }
     }
 
     /// Returns the forces on the structure in a motion, [axis][harmonic], N,
-    /// see [`Discretization::springs`].
-    pub fn acting<'a>(&'a mut self, motion: &'a HarmonicSolution) -> &'a [Complex64] {
-        self.act(motion, 1.0);
-        if self.stands() { &self.acting } else { &motion.force }
+    /// see [`Discretization::closed_stiffness`].
+    pub fn structure_forces<'a>(&'a mut self, motion: &'a HarmonicSolution) -> &'a [Complex64] {
+        self.compute_structure_forces(motion, 1.0);
+        if self.is_held_by_contacts() { &self.acting } else { &motion.force }
     }
 
     /// Returns the stiffness of the tether, relative to the springs of closed contacts.
-    pub(super) fn tether_share(&self) -> f64 {
-        self.tether.as_ref().map_or(0.0, |tether| tether.share)
+    pub(super) fn proximal_stiffness(&self) -> f64 {
+        self.tether.as_ref().map_or(0.0, |tether| tether.relative_stiffness)
     }
 
     /// Adds `share` times the springs of closed contacts to the derivative of
-    /// the mean at a port. The share is [`OPEN`] if the structure contains
+    /// the mean at a port. The share is [`CLOSED_CONTACT_SIGN`] if the structure contains
     /// them, and positive to shorten the step of the mean.
     pub(super) fn add_springs(&mut self, p: usize, port: &Port, share: f64) {
-        let nh = self.alternation.harmonics.len();
+        let nh = self.aft.harmonics.len();
         let tall = 2 * nh * port.axes;
-        let tangent = &mut self.tangents[block(&self.blocks, p, port, nh)];
-        for (a, k) in self.springs.iter().skip(port.first).take(port.axes).enumerate() {
+        let tangent = &mut self.tangents[tangent_range(&self.blocks, p, port, nh)];
+        for (a, k) in self.closed_stiffness.iter().skip(port.first_axis).take(port.axes).enumerate() {
             let at = 2 * nh * a;
             tangent[at * tall + at] += share * k;
         }
     }
 
     /// Returns the motion without friction.
-    pub fn unhindered(&self) -> HarmonicSolution {
-        HarmonicSolution { c: self.linear.clone(), ..HarmonicSolution::rest(self.linear.len()) }
+    pub fn frictionless_motion(&self) -> HarmonicSolution {
+        HarmonicSolution { c: self.linear_motion.clone(), ..HarmonicSolution::zero(self.linear_motion.len()) }
     }
 
-    /// Samples the forces of a port, into `self.alternation`.
+    /// Samples the forces of a port, into `self.aft`.
     pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &HarmonicSolution) {
         let nh = self.harmonics().len();
         let port = &ports[p];
-        if self.linearised && port.marches() {
-            self.alternation.begin = self.states[p].forgotten();
+        if self.linearised && port.has_memory_steps() {
+            self.aft.known_state = self.states[p].if_forgotten();
         }
-        self.alternation.static_share = 1.0;
-        let range = port.first * nh..(port.first + port.axes) * nh;
-        self.alternation.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
+        self.aft.static_share = 1.0;
+        let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
+        self.aft.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
     }
 
     /// Returns the forces along all axes at the harmonics `wanted`, per harmonic, from the
@@ -558,7 +573,7 @@ impl Discretization {
         for (p, port) in ports.iter().enumerate() {
             self.sample(ports, p, omega, motion);
             for q in port.range() {
-                self.alternation.add_harmonics(q - port.first, wanted, |k, f| forces[k][q] += f);
+                self.aft.add_harmonics(q - port.first_axis, wanted, |k, f| forces[k][q] += f);
             }
         }
         forces
@@ -566,11 +581,11 @@ impl Discretization {
 
     /// Computes the Newton step by GMRES. `self.step` contains the residual in units on entry
     /// and the step on return. Returns false if GMRES does not converge.
-    pub(super) fn coupled_step(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
-        let Some(coupled) = &mut self.coupled else { return false };
+    pub(super) fn krylov_step(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
+        let Some(coupled) = &mut self.newton_krylov else { return false };
         let linear = LinearizedEquations {
             ports,
-            harmonics: &self.alternation.harmonics,
+            harmonics: &self.aft.harmonics,
             omega,
             ease,
             length: near.length,
@@ -590,7 +605,7 @@ impl Discretization {
         let Receptance::Formed(formed) = &self.receptance else { return false };
         let linear = LinearizedEquations {
             ports,
-            harmonics: &self.alternation.harmonics,
+            harmonics: &self.aft.harmonics,
             omega,
             ease,
             length,
@@ -611,7 +626,7 @@ impl Discretization {
 }
 
 /// Returns `motion` with other harmonics. New harmonics are zero.
-pub(super) fn transfer(motion: &HarmonicSolution, from: &[usize], to: &[usize]) -> HarmonicSolution {
+pub(super) fn with_harmonics(motion: &HarmonicSolution, from: &[usize], to: &[usize]) -> HarmonicSolution {
     let pick = |values: &[Complex64]| {
         let mut out = Vec::with_capacity(values.len() / from.len().max(1) * to.len());
         for values in values.chunks_exact(from.len()) {
@@ -674,7 +689,7 @@ mod tests {
             let sparse = sparse.then(|| BandedForm::new(&self.system, &self.ports, &harmonics).unwrap());
             let samples = 256.max(16 * harmonics[harmonics.len() - 1]);
             let mut level = Discretization::new(harmonics, samples, &self.ports, sparse);
-            level.drive(&self.system, &self.ports, &self.rest, self.omega).unwrap();
+            level.set_frequency(&self.system, &self.ports, &self.rest, self.omega).unwrap();
             level
         }
     }
@@ -692,7 +707,7 @@ mod tests {
             let case = Case::new(mixed(6, constant), 0.9);
             let mut level = case.level(harmonics, false);
             let size = level.residual.len();
-            let mut motion = HarmonicSolution::rest(level.linear.len());
+            let mut motion = HarmonicSolution::zero(level.linear_motion.len());
             // the mean has no imaginary part
             let real = |i: usize| level.harmonics()[(i / 2) % level.harmonics().len()] == 0 && i % 2 == 1;
             let x: Vec<f64> = (0..size).map(|i| if real(i) { 0.0 } else { 0.4 * noise(i) }).collect();
@@ -731,7 +746,7 @@ mod tests {
         let case = Case::new(mixed(44, 0.0), 0.9);
         let solve = |sparse: bool| {
             let mut level = case.level(vec![1, 3, 5], sparse);
-            let start = level.begin(&case.system, &case.ports, None, case.omega);
+            let start = level.initial_guess(&case.system, &case.ports, None, case.omega);
             level.solve(&case.ports, case.omega, start).unwrap()
         };
         let (dense, banded) = (solve(false), solve(true));
@@ -754,7 +769,7 @@ mod tests {
                 let solution = |top: usize, factor: f64| {
                     let mut level = case.level((1..=top).step_by(2).collect(), false);
                     level.penalty[0] *= factor;
-                    let start = level.begin(&case.system, &case.ports, None, case.omega);
+                    let start = level.initial_guess(&case.system, &case.ports, None, case.omega);
                     let motion = level.solve(&case.ports, case.omega, start).unwrap();
                     postprocess::places(&mut level, &case.rest, case.omega, &motion).unwrap()
                 };

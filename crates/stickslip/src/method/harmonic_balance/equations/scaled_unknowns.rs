@@ -2,7 +2,7 @@
 
 use super::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::globalization::homotopy::GIVEN;
+use crate::method::harmonic_balance::globalization::homotopy::GIVEN_EQUATIONS;
 use num_complex::Complex64;
 
 impl Discretization {
@@ -20,12 +20,12 @@ impl Discretization {
     ) {
         self.unpack(ports, (unknowns, length), motion);
         let slopes = if jacobian.is_some() { DerivativeScope::All } else { DerivativeScope::None };
-        self.evaluate(ports, omega, motion, GIVEN, length, slopes);
+        self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, slopes);
         for ((out, r), unit) in residual.iter_mut().zip(&self.residual).zip(&self.units) {
             *out = r / unit;
         }
         if let Some(jacobian) = jacobian {
-            if self.assemble(ports, omega, GIVEN, length) {
+            if self.assemble(ports, omega, GIVEN_EQUATIONS, length) {
                 jacobian.copy_from_slice(&self.jacobian);
             } else {
                 jacobian.fill(f64::NAN);
@@ -39,7 +39,7 @@ impl Discretization {
         let mut out = Vec::with_capacity(2 * motion.c.len());
         for port in ports.iter() {
             let values = if port.is_force() { &motion.force } else { &motion.c };
-            for value in &values[port.first * nh..(port.first + port.axes) * nh] {
+            for value in &values[port.first_axis * nh..(port.first_axis + port.axes) * nh] {
                 let value = value / port.unit(length);
                 out.extend([value.re, value.im]);
             }
@@ -52,7 +52,7 @@ impl Discretization {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let values = if port.is_force() { &mut motion.force } else { &mut motion.c };
-            let range = port.first * nh..(port.first + port.axes) * nh;
+            let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
             for (value, pair) in values[range.clone()].iter_mut().zip(unknowns[2 * range.start..].chunks_exact(2)) {
                 *value = Complex64::new(pair[0], pair[1]) * port.unit(length);
             }

@@ -15,9 +15,11 @@
 //! Sources: Mehrotra (1992), "On the implementation of a primal-dual interior point method";
 //! Wright, "Primal-Dual Interior-Point Methods" (1997).
 
-use super::homotopy::GIVEN;
-use crate::method::harmonic_balance::aft::{FrequencyTime, InteriorPort, Port, Ports, block};
-use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution, OPEN};
+use super::homotopy::GIVEN_EQUATIONS;
+use crate::method::harmonic_balance::aft::{FrequencyTime, InteriorPort, Port, Ports, tangent_range};
+use crate::method::harmonic_balance::equations::{
+    CLOSED_CONTACT_SIGN, DerivativeScope, Discretization, HarmonicSolution,
+};
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 use num_complex::Complex64;
@@ -25,15 +27,15 @@ use stickslip_numerics::interrupt;
 
 /// Samples per wave of the highest harmonic on the path. Newton's method continues with all
 /// samples.
-const SAMPLED: usize = 16;
+const SAMPLES_PER_WAVE: usize = 16;
 /// Complementarity product, in units of the squared limit, at which the path ends. Nearly all
 /// samples are then at a limit or clearly inside.
-const DECIDED: f64 = 1e-4;
+const END_OF_PATH: f64 = 1e-4;
 /// Largest number of steps; 5 to 30 are usual.
 const MOST: usize = 60;
 /// Steps without halved products after which the path is given up. Elastic friction next to the
 /// rigid one may stop its progress, because its kinks are not smoothed.
-const PATIENCE: usize = 8;
+const STAGNATION_STEPS: usize = 8;
 /// Newton iterations from the end of the path; 1 to 5 are usual.
 const ITERATIONS: usize = 30;
 
@@ -43,7 +45,7 @@ struct CentralPath {
     barriers: Vec<Option<InteriorPort>>,
     alternation: FrequencyTime,
     /// Harmonics of the argument `λ + ε u'` of one barrier.
-    y: Vec<Complex64>,
+    argument: Vec<Complex64>,
 }
 
 impl CentralPath {
@@ -61,57 +63,57 @@ impl CentralPath {
 impl Discretization {
     /// Solves by the interior point method from `motion`. Its rigid friction forces are
     /// ignored.
-    pub(crate) fn by_interior_points(
+    pub(crate) fn interior_point_method(
         &mut self,
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
     ) -> Result<(), SolveError> {
-        self.begin_anew(ports);
-        if !self.follow_interior(ports, omega, motion) {
-            return Err(SolveError::after(motion.iterations, f64::INFINITY));
+        self.begin_search(ports);
+        if !self.follow_central_path(ports, omega, motion) {
+            return Err(SolveError::not_converged(motion.iterations, f64::INFINITY));
         }
-        self.newton(ports, omega, motion, GIVEN, (ITERATIONS, StopCriterion::Solved))
+        self.newton(ports, omega, motion, GIVEN_EQUATIONS, (ITERATIONS, StopCriterion::Solved))
     }
 
     /// Follows the path. Returns true if its end was reached.
-    fn follow_interior(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> bool {
-        let Some(mut along) = self.begin_interior(ports, omega, motion) else { return false };
+    fn follow_central_path(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> bool {
+        let Some(mut along) = self.start_central_path(ports, omega, motion) else { return false };
         let (mut mark, mut waited) = (f64::INFINITY, 0);
         for _ in 0..MOST {
             interrupt::check();
-            let left = along.each().map(InteriorPort::left).fold(0.0, f64::max);
-            if left <= DECIDED {
+            let left = along.each().map(InteriorPort::remaining_gap).fold(0.0, f64::max);
+            if left <= END_OF_PATH {
                 return true;
             }
             (mark, waited) = if left < 0.5 * mark { (left, 0) } else { (mark, waited + 1) };
-            if !left.is_finite() || waited > PATIENCE || self.is_exhausted(ports) {
+            if !left.is_finite() || waited > STAGNATION_STEPS || self.is_budget_used(ports) {
                 return false;
             }
-            self.assembled += 1;
-            self.respond(ports, omega, motion, GIVEN, DerivativeScope::All);
-            self.follow(motion, GIVEN);
-            let length = self.length(motion);
-            self.measure(ports, motion, length);
+            self.evaluations += 1;
+            self.motion_port_forces(ports, omega, motion, GIVEN_EQUATIONS, DerivativeScope::All);
+            self.structure_motion(motion, GIVEN_EQUATIONS);
+            let length = self.motion_scale(motion);
+            self.set_residual_units(ports, motion, length);
             for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.is_force()) {
-                let tangent = block(&self.blocks, p, port, self.harmonics().len());
-                argument((self, p, port), omega, motion, &mut along.y);
+                let tangent = tangent_range(&self.blocks, p, port, self.harmonics().len());
+                argument((self, p, port), omega, motion, &mut along.argument);
                 match &mut along.barriers[p] {
                     Some(barrier) => {
-                        barrier.linearise(&mut along.alternation, &along.y, &mut self.tangents[tangent]);
+                        barrier.linearise(&mut along.alternation, &along.argument, &mut self.tangents[tangent]);
                     }
-                    None => self.image_of(ports, p, omega, motion, (GIVEN, DerivativeScope::All)),
+                    None => self.force_port_residual(ports, p, omega, motion, (GIVEN_EQUATIONS, DerivativeScope::All)),
                 }
             }
-            self.before.copy(motion);
-            let near = StepStart { length, residual: 1.0, sketched: false, kept: false };
+            self.previous.copy_from(motion);
+            let near = StepStart { length, residual: 1.0, coarse: false, same_derivatives: false };
             let Some(ahead) = self.interior_step(ports, omega, motion, &mut along, (0.0, near)) else { return false };
             let gap = along.gap(0.0) * (along.gap(ahead) / along.gap(0.0)).powi(3);
-            motion.copy(&self.before);
-            self.follow(motion, GIVEN);
+            motion.copy_from(&self.previous);
+            self.structure_motion(motion, GIVEN_EQUATIONS);
             let Some(share) = self.interior_step(ports, omega, motion, &mut along, (gap, near)) else { return false };
             motion.iterations += 1;
-            self.advance(ports, motion, share, length);
+            self.apply_step(ports, motion, share, length);
             along.barriers.iter_mut().flatten().for_each(|barrier| barrier.advance(share));
         }
         false
@@ -119,14 +121,14 @@ impl Discretization {
 
     /// Returns the first point of the path, without rigid friction. Returns `None` if no port
     /// has it.
-    fn begin_interior(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> Option<CentralPath> {
+    fn start_central_path(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> Option<CentralPath> {
         let nh = self.harmonics().len();
         let top = self.harmonics().last().copied().unwrap_or(0);
-        let samples = (SAMPLED * (top + 1)).next_power_of_two();
+        let samples = (SAMPLES_PER_WAVE * (top + 1)).next_power_of_two();
         let mut along = CentralPath {
             barriers: Vec::with_capacity(ports.len()),
             alternation: FrequencyTime::new(self.harmonics().to_vec(), samples),
-            y: vec![Complex64::default(); nh],
+            argument: vec![Complex64::default(); nh],
         };
         let limits: Vec<Option<f64>> =
             ports.iter().zip(&self.penalty).map(|(port, e)| port.limit().filter(|_| e.is_finite())).collect();
@@ -134,13 +136,13 @@ impl Discretization {
             return None;
         }
         for (port, _) in ports.iter().zip(&limits).filter(|(_, limit)| limit.is_some()) {
-            motion.force[port.first * nh..][..nh].fill(Complex64::default());
+            motion.force[port.first_axis * nh..][..nh].fill(Complex64::default());
         }
-        self.respond(ports, omega, motion, GIVEN, DerivativeScope::None);
-        self.follow(motion, GIVEN);
+        self.motion_port_forces(ports, omega, motion, GIVEN_EQUATIONS, DerivativeScope::None);
+        self.structure_motion(motion, GIVEN_EQUATIONS);
         for (p, (port, limit)) in ports.iter().zip(limits).enumerate() {
-            argument((self, p, port), omega, motion, &mut along.y);
-            along.barriers.push(limit.map(|limit| InteriorPort::new(limit, &mut along.alternation, &along.y)));
+            argument((self, p, port), omega, motion, &mut along.argument);
+            along.barriers.push(limit.map(|limit| InteriorPort::new(limit, &mut along.alternation, &along.argument)));
         }
         Some(along)
     }
@@ -163,31 +165,31 @@ impl Discretization {
         let corrected = gap > 0.0;
         for (p, port) in ports.iter().enumerate() {
             let Some(barrier) = &mut along.barriers[p] else { continue };
-            barrier.aim((gap, corrected), &mut along.alternation, &mut self.image[..nh]);
-            let range = port.first * nh..(port.first + 1) * nh;
+            barrier.set_targets((gap, corrected), &mut along.alternation, &mut self.image[..nh]);
+            let range = port.first_axis * nh..(port.first_axis + 1) * nh;
             for (at, (force, image)) in range.clone().zip(motion.force[range].iter().zip(&self.image)) {
                 let r = force - image;
                 (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
             }
         }
         let found = match corrected {
-            true => self.newton_step_again(ports, omega, GIVEN, near),
-            false => self.newton_step(ports, omega, GIVEN, near),
+            true => self.newton_step_same_jacobian(ports, omega, GIVEN_EQUATIONS, near),
+            false => self.newton_step(ports, omega, GIVEN_EQUATIONS, near),
         };
         if !found {
             return None;
         }
-        self.advance(ports, motion, 1.0, near.length);
+        self.apply_step(ports, motion, 1.0, near.length);
         self.step_forces(ports, motion, near.length);
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
-            self.add_springs(p, port, OPEN);
+            self.add_springs(p, port, CLOSED_CONTACT_SIGN);
         }
-        self.follow(motion, GIVEN);
+        self.structure_motion(motion, GIVEN_EQUATIONS);
         let mut share = 1.0f64;
         for (p, port) in ports.iter().enumerate() {
             if let Some(barrier) = &mut along.barriers[p] {
-                argument((self, p, port), omega, motion, &mut along.y);
-                share = share.min(barrier.step(&mut along.alternation, &along.y));
+                argument((self, p, port), omega, motion, &mut along.argument);
+                share = share.min(barrier.step(&mut along.alternation, &along.argument));
             }
         }
         Some(share)
@@ -201,7 +203,7 @@ fn argument(
     motion: &HarmonicSolution,
     y: &mut [Complex64],
 ) {
-    let at = port.first * y.len();
+    let at = port.first_axis * y.len();
     let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(level.harmonics());
     for (y, ((c, force), h)) in y.iter_mut().zip(own) {
         *y = force + c * Complex64::new(0.0, level.penalty[p] * *h as f64 * omega);
@@ -210,7 +212,7 @@ fn argument(
 
 #[cfg(test)]
 mod tests {
-    use super::super::homotopy::SOLVED;
+    use super::super::homotopy::RESIDUAL_TOLERANCE;
     use super::*;
     use crate::law::{Coulomb, Jenkins};
     use crate::method::harmonic_balance::dynamics::banded::BandedForm;
@@ -251,19 +253,19 @@ mod tests {
         let harmonics: Vec<usize> = (1..=15).step_by(2).collect();
         let mut level =
             Discretization::new(harmonics.clone(), 1024, &ports, BandedForm::new(system, &ports, &harmonics));
-        level.drive(system, &ports, &LinearDynamics::new(system, &ports), TAU * hertz).unwrap();
+        level.set_frequency(system, &ports, &LinearDynamics::new(system, &ports), TAU * hertz).unwrap();
         (level, ports)
     }
 
     /// The interior point method and the proximal point method find the same solution.
     #[test]
-    fn interior_points_lead_to_the_motion_that_proximal_points_find() {
+    fn interior_point_and_proximal_point_solutions_agree() {
         let system = ring(12, 0.5);
         let (mut level, ports) = level(&system, NEAR);
-        let start = level.unhindered();
+        let start = level.frictionless_motion();
         let (mut one, mut other) = (start.clone(), start);
-        level.by_interior_points(&ports, TAU * NEAR, &mut one).unwrap();
-        level.by_proximal_points(&ports, TAU * NEAR, &mut other).unwrap();
+        level.interior_point_method(&ports, TAU * NEAR, &mut one).unwrap();
+        level.proximal_point_method(&ports, TAU * NEAR, &mut other).unwrap();
         let size = other.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
         let apart = one.c.iter().zip(&other.c).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(apart < 1e-6 * size, "{apart:.1e} of {size:.1e}");
@@ -278,9 +280,9 @@ mod tests {
                 let steps = [12, 96].map(|blades| {
                     let system = ring(blades, limit);
                     let (mut level, ports) = level(&system, hertz);
-                    let mut motion = level.unhindered();
-                    level.by_interior_points(&ports, TAU * hertz, &mut motion).unwrap();
-                    assert!(motion.residual <= SOLVED);
+                    let mut motion = level.frictionless_motion();
+                    level.interior_point_method(&ports, TAU * hertz, &mut motion).unwrap();
+                    assert!(motion.residual <= RESIDUAL_TOLERANCE);
                     motion.iterations
                 });
                 assert!(steps[1] <= 2 * steps[0].max(20), "{hertz} Hz, {limit} N: {steps:?}");
@@ -290,11 +292,11 @@ mod tests {
 
     /// Without rigid friction there is no path.
     #[test]
-    fn elastic_friction_has_no_interior() {
+    fn elastic_friction_has_no_central_path() {
         let mut couple = crate::model::example::blade_couple_massless();
         couple.joints[0].law = Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 });
         let (mut level, ports) = level(&couple.assemble().unwrap(), 121.0);
-        let mut motion = level.unhindered();
-        assert!(level.by_interior_points(&ports, TAU * 121.0, &mut motion).is_err());
+        let mut motion = level.frictionless_motion();
+        assert!(level.interior_point_method(&ports, TAU * 121.0, &mut motion).is_err());
     }
 }

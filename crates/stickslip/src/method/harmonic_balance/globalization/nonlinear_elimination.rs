@@ -19,35 +19,35 @@
 
 use super::homotopy::Homotopy;
 use super::subdomain::{Adjacency, NonlinearElimination, Subdomain};
-use crate::method::harmonic_balance::aft::{Port, Ports, block};
-use crate::method::harmonic_balance::equations::harmonic_set::weight;
+use crate::method::harmonic_balance::aft::{Port, Ports, tangent_range};
+use crate::method::harmonic_balance::equations::harmonic_set::velocity_weight;
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::newton::{HALVINGS, SHORTENS};
+use crate::method::harmonic_balance::newton::{HALVINGS, SUFFICIENT_DECREASE};
 use num_complex::Complex64;
 
 /// Residual along a contact, relative to the largest, above which the contact is solved locally.
-const MISSED: f64 = 0.1;
+const LOCAL_RESIDUAL: f64 = 0.1;
 /// Maximum number of axes of a cluster.
 const MOST_AXES: usize = 16;
 /// Layers of adjacent places in the subdomain of a cluster.
-const AROUND: usize = 3;
+const OVERLAP_LAYERS: usize = 3;
 /// Maximum number of Newton steps in a cluster, and the share of the residual that they may
 /// leave; the next step of all contacts reduces the remainder.
 const STEPS: usize = 20;
-const LEFT: f64 = 1e-3;
+const CLUSTER_TOLERANCE: f64 = 1e-3;
 /// Share of the residual that the elimination may leave at most to be used again at this point.
 /// It does not pay off if motion decays slowly from blade to blade, or if most contacts fail.
-const WORTH: f64 = 0.5;
+const USEFUL_SHARE: f64 = 0.5;
 
 /// Forces along the axes of a cluster after a trial step.
 #[derive(Debug, Default, Clone)]
 struct TrialStep {
     step: Vec<f64>,
     /// φ and its derivative.
-    beyond: Vec<f64>,
+    nonlinear_force: Vec<f64>,
     slopes: Vec<f64>,
     /// Residual of `d = d₀ + S φ(d)`, m.
-    rest: Vec<f64>,
+    residual_step: Vec<f64>,
     residual: Vec<f64>,
     size: f64,
 }
@@ -55,40 +55,40 @@ struct TrialStep {
 impl Discretization {
     /// Tells whether nonlinear elimination can follow the next step. Stores the
     /// derivatives of that step.
-    pub(crate) fn can_settle(&mut self, ports: &Ports) -> bool {
-        let Some(sparse) = self.sparse.as_ref().filter(|_| self.springs.is_empty()) else { return false };
-        if ports.iter().any(|port| port.is_force() || port.marches()) {
+    pub(crate) fn can_eliminate(&mut self, ports: &Ports) -> bool {
+        let Some(sparse) = self.banded.as_ref().filter(|_| self.closed_stiffness.is_empty()) else { return false };
+        if ports.iter().any(|port| port.is_force() || port.has_memory_steps()) {
             return false;
         }
-        let settling = self.settling.get_or_insert_with(|| NonlinearElimination::new(Adjacency::new(sparse, ports)));
-        if settling.helps {
+        let settling = self.elimination.get_or_insert_with(|| NonlinearElimination::new(Adjacency::new(sparse, ports)));
+        if settling.is_useful {
             settling.tangents.clone_from(&self.tangents);
         }
-        settling.helps
+        settling.is_useful
     }
 
     /// Solves failed contacts locally, after a full step with a residual above `beaten`. Writes
     /// the new solution into `motion`. Returns its residual if that is less than `beaten`;
     /// otherwise restores the step of all contacts.
-    pub(crate) fn settle(
+    pub(crate) fn eliminate_nonlinear(
         &mut self,
         ports: &Ports,
         (omega, ease): (f64, Homotopy),
         motion: &mut HarmonicSolution,
         (length, beaten): (f64, f64),
     ) -> Option<f64> {
-        let mut settling = self.settling.take()?;
-        let after = self.settled(&mut settling, ports, (omega, ease), motion, length);
-        settling.helps = after.is_some_and(|after| after < WORTH * beaten);
-        let after = after.filter(|after| *after < (1.0 - SHORTENS) * beaten);
+        let mut settling = self.elimination.take()?;
+        let after = self.eliminate_clusters(&mut settling, ports, (omega, ease), motion, length);
+        settling.is_useful = after.is_some_and(|after| after < USEFUL_SHARE * beaten);
+        let after = after.filter(|after| *after < (1.0 - SUFFICIENT_DECREASE) * beaten);
         if after.is_none() {
             self.step.copy_from_slice(&settling.step);
         }
-        self.settling = Some(settling);
+        self.elimination = Some(settling);
         after
     }
 
-    fn settled(
+    fn eliminate_clusters(
         &mut self,
         settling: &mut NonlinearElimination,
         ports: &Ports,
@@ -96,43 +96,44 @@ impl Discretization {
         motion: &mut HarmonicSolution,
         length: f64,
     ) -> Option<f64> {
-        let NonlinearElimination { neighbours, tangents, step, beyond, left, .. } = settling;
+        let NonlinearElimination { neighbours, tangents, step, nonlinear_forces: beyond, residual_steps: left, .. } =
+            settling;
         step.clone_from(&self.step);
-        let sizes: Vec<f64> = ports.iter().map(|port| self.left_along(port)).collect();
+        let sizes: Vec<f64> = ports.iter().map(|port| self.port_residual(port)).collect();
         let largest = sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
-        let missed: Vec<bool> = sizes.iter().map(|size| *size > MISSED * largest).collect();
+        let missed: Vec<bool> = sizes.iter().map(|size| *size > LOCAL_RESIDUAL * largest).collect();
         for sums in [&mut *beyond, &mut *left] {
             sums.clear();
             sums.resize(step.len(), 0.0);
         }
         for cluster in neighbours.clusters(ports, &missed, MOST_AXES) {
-            let sparse = self.sparse.as_ref()?;
-            let at = (&*cluster, AROUND);
+            let sparse = self.banded.as_ref()?;
+            let at = (&*cluster, OVERLAP_LAYERS);
             let mut window = Subdomain::new(sparse, neighbours, ports, at, (tangents, &self.blocks))?;
             let along = (&**tangents, &**step, &mut **beyond, &mut **left);
-            self.settle_cluster(ports, &cluster, &mut window, along, (omega, ease, length));
+            self.solve_cluster(ports, &cluster, &mut window, along, (omega, ease, length));
         }
-        self.eliminated += 1;
+        self.eliminations += 1;
         // the step of all contacts with the nonlinear parts of these forces
-        self.sparse.as_mut()?.receive_all(beyond);
+        self.banded.as_mut()?.solve_along_axes(beyond);
         for ((d, left), (step, moved)) in self.step.iter_mut().zip(&*left).zip(step.iter().zip(&*beyond)) {
             *d = step + (moved + left) / length;
         }
-        self.advance(ports, motion, 1.0, length);
+        self.apply_step(ports, motion, 1.0, length);
         Some(self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap))
     }
 
     /// Returns the size of the residual along a port, weighted as velocities.
-    fn left_along(&self, port: &Port) -> f64 {
+    fn port_residual(&self, port: &Port) -> f64 {
         let nh = self.harmonics().len();
-        let pairs = self.residual[2 * port.first * nh..2 * (port.first + port.axes) * nh].chunks_exact(2);
-        let weights = self.harmonics().iter().cycle().map(|h| weight(*h));
+        let pairs = self.residual[2 * port.first_axis * nh..2 * (port.first_axis + port.axes) * nh].chunks_exact(2);
+        let weights = self.harmonics().iter().cycle().map(|h| velocity_weight(*h));
         pairs.zip(weights).map(|(r, w)| w * (r[0] * r[0] + r[1] * r[1])).sum::<f64>().sqrt()
     }
 
     /// Solves `d = d₀ + S φ(d)` along the axes of a cluster, from the step tried last or from
     /// zero. Writes φ into `beyond` and the residual into `left`.
-    fn settle_cluster(
+    fn solve_cluster(
         &mut self,
         ports: &Ports,
         cluster: &[usize],
@@ -142,16 +143,17 @@ impl Discretization {
     ) {
         let pair = 2 * self.harmonics().len();
         let along = |values: &[f64]| -> Vec<f64> {
-            let ranges = cluster.iter().map(|p| pair * ports[*p].first..pair * (ports[*p].first + ports[*p].axes));
+            let ranges =
+                cluster.iter().map(|p| pair * ports[*p].first_axis..pair * (ports[*p].first_axis + ports[*p].axes));
             ranges.flat_map(|range| values[range].iter().map(|d| d * length)).collect()
         };
         let goal = along(step);
         let slopes = cluster.iter().map(|p| (pair * ports[*p].axes).pow(2)).sum();
         let zero = TrialStep {
             step: vec![0.0; goal.len()],
-            beyond: vec![0.0; goal.len()],
+            nonlinear_force: vec![0.0; goal.len()],
             slopes: vec![0.0; slopes],
-            rest: goal.iter().map(|d| -d).collect(),
+            residual_step: goal.iter().map(|d| -d).collect(),
             residual: Vec::new(),
             size: 0.0,
         };
@@ -165,20 +167,22 @@ impl Discretization {
         }
         let (mut change, mut pull) = (vec![0.0; goal.len()], vec![0.0; goal.len()]);
         for _ in 0..STEPS {
-            if now.size < LEFT * whole || !window.change(cluster.iter().map(|p| ports[*p].axes), &now.slopes) {
+            if now.size < CLUSTER_TOLERANCE * whole
+                || !window.factor_changed(cluster.iter().map(|p| ports[*p].axes), &now.slopes)
+            {
                 break;
             }
             // (1 + S ΔK)⁻¹ r = r - S' ΔK r
-            multiply(ports, cluster, pair, &now.slopes, &now.rest, &mut pull);
-            window.receive_changed(&mut pull);
-            change.iter_mut().zip(now.rest.iter().zip(&pull)).for_each(|(d, (r, u))| *d = r - u);
+            multiply(ports, cluster, pair, &now.slopes, &now.residual_step, &mut pull);
+            window.solve_changed(&mut pull);
+            change.iter_mut().zip(now.residual_step.iter().zip(&pull)).for_each(|(d, (r, u))| *d = r - u);
             let mut fraction = 1.0;
             let mut found = false;
             for _ in 0..=HALVINGS {
                 let steps = trial.step.iter_mut().zip(now.step.iter().zip(&change));
                 steps.for_each(|(trial, (now, change))| *trial = now - fraction * change);
                 self.try_cluster(ports, cluster, window, (tangents, &goal), (omega, ease), &mut trial);
-                found = trial.size < (1.0 - SHORTENS * fraction) * now.size;
+                found = trial.size < (1.0 - SUFFICIENT_DECREASE * fraction) * now.size;
                 if found {
                     break;
                 }
@@ -192,8 +196,8 @@ impl Discretization {
         let mut at = 0;
         for port in cluster.iter().map(|p| &ports[*p]) {
             let own = port.axes * pair;
-            beyond[pair * port.first..][..own].copy_from_slice(&now.beyond[at..at + own]);
-            left[pair * port.first..][..own].copy_from_slice(&now.rest[at..at + own]);
+            beyond[pair * port.first_axis..][..own].copy_from_slice(&now.nonlinear_force[at..at + own]);
+            left[pair * port.first_axis..][..own].copy_from_slice(&now.residual_step[at..at + own]);
             at += own;
         }
     }
@@ -213,29 +217,31 @@ impl Discretization {
         let [mut c, mut force] = [const { Vec::new() }; 2];
         for &p in cluster {
             let port = &ports[p];
-            let (own, range) = (2 * nh * port.axes, port.first * nh..(port.first + port.axes) * nh);
+            let (own, range) = (2 * nh * port.axes, port.first_axis * nh..(port.first_axis + port.axes) * nh);
             let step = &trial.step[at..at + own];
             let slopes = &mut trial.slopes[from..from + own * own];
             c.clear();
-            let before = self.before.c[range.clone()].iter();
+            let before = self.previous.c[range.clone()].iter();
             c.extend(before.zip(step.chunks_exact(2)).map(|(c, d)| c - Complex64::new(d[0], d[1])));
             force.clone_from(&c);
-            self.alternation.respond(port, (omega, ease.limits), &c, &mut force, Some(slopes));
-            let given = &tangents[block(&self.blocks, p, port, nh)];
+            self.aft.motion_port_force(port, (omega, ease.limit_factor), &c, &mut force, Some(slopes));
+            let given = &tangents[tangent_range(&self.blocks, p, port, nh)];
             slopes.iter_mut().zip(given).for_each(|(slope, given)| *slope -= given);
             let changed = force
                 .iter()
-                .zip(&self.before.force[range])
+                .zip(&self.previous.force[range])
                 .flat_map(|(f, before)| [f.re - before.re, f.im - before.im]);
-            for (beyond, (changed, row)) in trial.beyond[at..].iter_mut().zip(changed.zip(given.chunks_exact(own))) {
+            for (beyond, (changed, row)) in
+                trial.nonlinear_force[at..].iter_mut().zip(changed.zip(given.chunks_exact(own)))
+            {
                 *beyond = changed + row.iter().zip(step).map(|(k, d)| k * d).sum::<f64>();
             }
             (at, from) = (at + own, from + own * own);
         }
-        trial.rest.copy_from_slice(&trial.beyond);
-        window.receive(&mut trial.rest);
+        trial.residual_step.copy_from_slice(&trial.nonlinear_force);
+        window.solve(&mut trial.residual_step);
         trial
-            .rest
+            .residual_step
             .iter_mut()
             .zip(trial.step.iter().zip(goal))
             .for_each(|(rest, (step, goal))| *rest = step - goal - *rest);
@@ -252,25 +258,25 @@ impl Discretization {
         trial: &mut TrialStep,
     ) {
         let nh = self.harmonics().len();
-        trial.residual.resize(trial.rest.len(), 0.0);
+        trial.residual.resize(trial.residual_step.len(), 0.0);
         let mut at = 0;
         for &p in cluster {
             let port = &ports[p];
             let own = 2 * nh * port.axes;
-            let rows = tangents[block(&self.blocks, p, port, nh)].chunks_exact(own);
+            let rows = tangents[tangent_range(&self.blocks, p, port, nh)].chunks_exact(own);
             for (out, row) in trial.residual[at..].iter_mut().zip(rows) {
-                *out = row.iter().zip(&trial.rest[at..at + own]).map(|(k, r)| k * r).sum();
+                *out = row.iter().zip(&trial.residual_step[at..at + own]).map(|(k, r)| k * r).sum();
             }
             at += own;
         }
-        window.receive_alone(&mut trial.residual);
-        trial.residual.iter_mut().zip(&trial.rest).for_each(|(out, rest)| *out += rest);
+        window.solve_structure(&mut trial.residual);
+        trial.residual.iter_mut().zip(&trial.residual_step).for_each(|(out, rest)| *out += rest);
         trial.size = self.weighted(&trial.residual);
     }
 
     /// Returns the size of a vector along whole axes, weighted as velocities.
     fn weighted(&self, values: &[f64]) -> f64 {
-        let weights = self.harmonics().iter().cycle().map(|h| weight(*h));
+        let weights = self.harmonics().iter().cycle().map(|h| velocity_weight(*h));
         values.chunks_exact(2).zip(weights).map(|(v, w)| w * (v[0] * v[0] + v[1] * v[1])).sum::<f64>().sqrt()
     }
 }

@@ -12,25 +12,25 @@
 //!
 //! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
 
-use super::homotopy::{GIVEN, Homotopy, SOLVED};
+use super::homotopy::{GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 
 /// First value of `s`.
-const PULL: f64 = 1.0;
+const FIRST_WEIGHT: f64 = 1.0;
 /// Largest value of `s`. Beyond it a proximal point hardly moves.
-const MOST_PULL: f64 = 1e4;
+const LARGEST_WEIGHT: f64 = 1e4;
 /// Bounds of the factor by which `s` shrinks after a point. The factor is squared after few
 /// Newton iterations, within these bounds; failures increase it.
-const LESS: [f64; 2] = [0.1, 0.3];
+const REDUCTION: [f64; 2] = [0.1, 0.3];
 /// Factor above which a failure keeps `s` in the next try. A failure with an unchanged `s`
 /// increases it.
-const AGAIN: f64 = 0.5;
+const RETRY_FACTOR: f64 = 0.5;
 /// Residual at which the last point counts as the solution if the next one is not found. It is
 /// a thousandth of the usual truncation error. The total force of redundant contacts is then
 /// known to this accuracy; only its distribution among them is not.
-const ENOUGH: f64 = 1e-6;
+const ACCEPTED_RESIDUAL: f64 = 1e-6;
 /// Largest number of points and tries; ten are usual.
 const MOST: usize = 40;
 /// Newton iterations per point; 2 to 10 are usual.
@@ -41,16 +41,16 @@ const QUICK: usize = 8;
 impl Discretization {
     /// Solves by the proximal point method from `motion`. If that fails, `motion` is the last
     /// point found.
-    pub(crate) fn by_proximal_points(
+    pub(crate) fn proximal_point_method(
         &mut self,
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
     ) -> Result<(), SolveError> {
-        self.begin_anew(ports);
+        self.begin_search(ports);
         self.anchor.clone_from(&motion.force);
         let mut good = HarmonicSolution { residual: f64::INFINITY, ..motion.clone() };
-        let (mut pull, mut factor) = (PULL, 1.0f64);
+        let (mut pull, mut factor) = (FIRST_WEIGHT, 1.0f64);
         for _ in 0..MOST {
             let next = pull * factor;
             let before = motion.iterations;
@@ -58,35 +58,42 @@ impl Discretization {
                 ports,
                 omega,
                 motion,
-                Homotopy { pull: next, ..GIVEN },
+                Homotopy { proximal_weight: next, ..GIVEN_EQUATIONS },
                 (ITERATIONS, StopCriterion::Solved),
             );
             if found.is_ok() {
-                let length = self.length(motion);
-                motion.residual = self.evaluate(ports, omega, motion, GIVEN, length, DerivativeScope::None);
-                if motion.residual <= SOLVED {
+                let length = self.motion_scale(motion);
+                motion.residual = self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, DerivativeScope::None);
+                if motion.residual <= RESIDUAL_TOLERANCE {
                     return Ok(());
                 }
-                good.copy(motion);
+                good.copy_from(motion);
                 self.anchor.clone_from(&motion.force);
                 pull = next;
                 if motion.iterations - before <= QUICK || factor == 1.0 {
-                    factor = (factor * factor).clamp(LESS[0], LESS[1]);
+                    factor = (factor * factor).clamp(REDUCTION[0], REDUCTION[1]);
                 }
             } else {
                 good.iterations = motion.iterations;
-                motion.copy(&good);
+                motion.copy_from(&good);
                 match factor {
-                    ..AGAIN => factor = factor.sqrt(),
+                    ..RETRY_FACTOR => factor = factor.sqrt(),
                     ..1.0 => factor = 1.0,
-                    _ => pull /= LESS[0],
+                    _ => pull /= REDUCTION[0],
                 }
             }
-            if pull > MOST_PULL || self.is_exhausted(ports) || (found.is_err() && good.residual <= ENOUGH) {
+            if pull > LARGEST_WEIGHT
+                || self.is_budget_used(ports)
+                || (found.is_err() && good.residual <= ACCEPTED_RESIDUAL)
+            {
                 break;
             }
         }
-        motion.copy(&good);
-        if motion.residual <= ENOUGH { Ok(()) } else { Err(SolveError::after(motion.iterations, motion.residual)) }
+        motion.copy_from(&good);
+        if motion.residual <= ACCEPTED_RESIDUAL {
+            Ok(())
+        } else {
+            Err(SolveError::not_converged(motion.iterations, motion.residual))
+        }
     }
 }

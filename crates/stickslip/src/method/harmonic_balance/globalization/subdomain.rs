@@ -1,6 +1,6 @@
 //! Subdomain of a large structure around some contacts. Places outside of it are fixed.
 
-use crate::method::harmonic_balance::aft::{Ports, block};
+use crate::method::harmonic_balance::aft::{Ports, tangent_range};
 use crate::method::harmonic_balance::dynamics::banded::BandedForm;
 use stickslip_numerics::banded::BandedMatrix;
 
@@ -41,7 +41,7 @@ impl Adjacency {
             let (mut cluster, mut axes, mut next) = (vec![first], ports[first].axes, 0);
             while next < cluster.len() {
                 for &place in &self.of_port[cluster[next]] {
-                    for p in self.near(place).flat_map(|near| &self.at_place[near]).copied() {
+                    for p in self.with_adjacent_places(place).flat_map(|near| &self.at_place[near]).copied() {
                         if left[p] && axes + ports[p].axes <= most {
                             left[p] = false;
                             axes += ports[p].axes;
@@ -58,12 +58,12 @@ impl Adjacency {
     }
 
     /// Returns a place and the places that the structure couples with it.
-    fn near(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
+    fn with_adjacent_places(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::once(place).chain(self.links[place].iter().copied())
     }
 
     /// Returns the places of some ports, with `times` layers of adjacent places.
-    fn around(&self, cluster: &[usize], times: usize) -> Vec<usize> {
+    fn subdomain_places(&self, cluster: &[usize], times: usize) -> Vec<usize> {
         let mut inside = vec![false; self.at_place.len()];
         let mut places = Vec::new();
         let mut add = |place: usize, places: &mut Vec<usize>| {
@@ -95,16 +95,23 @@ pub(crate) struct NonlinearElimination {
     /// Newton step of all contacts, in units.
     pub step: Vec<f64>,
     /// Nonlinear parts of the forces of clusters, N, and the residual of their equations, m.
-    pub beyond: Vec<f64>,
-    pub left: Vec<f64>,
+    pub nonlinear_forces: Vec<f64>,
+    pub residual_steps: Vec<f64>,
     /// True unless the elimination was of little use at this point.
-    pub helps: bool,
+    pub is_useful: bool,
 }
 
 impl NonlinearElimination {
     pub fn new(neighbours: Adjacency) -> Self {
         let [tangents, step, beyond, left] = [const { Vec::new() }; 4];
-        NonlinearElimination { neighbours, tangents, step, beyond, left, helps: true }
+        NonlinearElimination {
+            neighbours,
+            tangents,
+            step,
+            nonlinear_forces: beyond,
+            residual_steps: left,
+            is_useful: true,
+        }
     }
 }
 
@@ -116,7 +123,7 @@ pub(crate) struct Subdomain {
     /// Number of unknowns of a place.
     size: usize,
     /// The structure alone, factored.
-    alone: BandedMatrix,
+    structure: BandedMatrix,
     /// The equations, their factor, and the factor with changed derivatives of the cluster.
     matrix: BandedMatrix,
     factored: BandedMatrix,
@@ -135,7 +142,7 @@ impl Subdomain {
         (tangents, blocks): (&[f64], &[usize]),
     ) -> Option<Self> {
         let size = sparse.unknowns();
-        let mut places = neighbours.around(cluster, times);
+        let mut places = neighbours.subdomain_places(cluster, times);
         places.sort_unstable_by_key(|place| sparse.position(*place));
         let mut number = vec![None; sparse.places()];
         places.iter().enumerate().for_each(|(i, place)| number[*place] = Some(i));
@@ -160,7 +167,7 @@ impl Subdomain {
         for &p in &near {
             let port = &ports[p];
             let ends: Vec<Vec<(usize, f64)>> = port.range().map(|q| here(sparse.ends(q))).collect();
-            add_port(&ends, &tangents[block(blocks, p, port, size / 2)], size, &mut matrix);
+            add_port(&ends, &tangents[tangent_range(blocks, p, port, size / 2)], size, &mut matrix);
         }
         let mut factored = matrix.clone();
         if !factored.factor() {
@@ -170,7 +177,7 @@ impl Subdomain {
         Some(Subdomain {
             ends,
             size,
-            alone,
+            structure: alone,
             changed: matrix.clone(),
             matrix,
             factored,
@@ -179,18 +186,18 @@ impl Subdomain {
     }
 
     /// Replaces forces along the axes of the cluster by the motion along them.
-    pub fn receive(&mut self, forces: &mut [f64]) {
-        through(&self.ends, self.size, (&self.factored, &mut self.right), forces);
+    pub fn solve(&mut self, forces: &mut [f64]) {
+        solve_along(&self.ends, self.size, (&self.factored, &mut self.right), forces);
     }
 
     /// Replaces forces by the motion of the structure alone.
-    pub fn receive_alone(&mut self, forces: &mut [f64]) {
-        through(&self.ends, self.size, (&self.alone, &mut self.right), forces);
+    pub fn solve_structure(&mut self, forces: &mut [f64]) {
+        solve_along(&self.ends, self.size, (&self.structure, &mut self.right), forces);
     }
 
     /// Factors the equations with the derivatives of the cluster's ports changed by `slopes`,
     /// one block after the other. Returns false if they are singular.
-    pub fn change(&mut self, axes: impl Iterator<Item = usize>, slopes: &[f64]) -> bool {
+    pub fn factor_changed(&mut self, axes: impl Iterator<Item = usize>, slopes: &[f64]) -> bool {
         self.changed.clone_from(&self.matrix);
         let (mut first, mut from) = (0, 0);
         for axes in axes {
@@ -203,13 +210,18 @@ impl Subdomain {
     }
 
     /// Replaces forces by the motion with these changed derivatives.
-    pub fn receive_changed(&mut self, forces: &mut [f64]) {
-        through(&self.ends, self.size, (&self.changed, &mut self.right), forces);
+    pub fn solve_changed(&mut self, forces: &mut [f64]) {
+        solve_along(&self.ends, self.size, (&self.changed, &mut self.right), forces);
     }
 }
 
 /// Replaces forces along axes by the motions along them.
-fn through(ends: &[Vec<(usize, f64)>], size: usize, (matrix, right): (&BandedMatrix, &mut [f64]), forces: &mut [f64]) {
+fn solve_along(
+    ends: &[Vec<(usize, f64)>],
+    size: usize,
+    (matrix, right): (&BandedMatrix, &mut [f64]),
+    forces: &mut [f64],
+) {
     right.fill(0.0);
     for (ends, forces) in ends.iter().zip(forces.chunks_exact(size)) {
         for &(i, w) in ends {
@@ -242,10 +254,10 @@ fn add_port(ends: &[Vec<(usize, f64)>], tangent: &[f64], size: usize, matrix: &m
 
 #[cfg(test)]
 mod tests {
-    use super::super::homotopy::GIVEN;
+    use super::super::homotopy::GIVEN_EQUATIONS;
     use super::*;
     use crate::law::Jenkins;
-    use crate::method::harmonic_balance::aft::blocks;
+    use crate::method::harmonic_balance::aft::tangent_ranges;
     use crate::method::harmonic_balance::dynamics::banded::StepParameters;
     use crate::model::{GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
@@ -270,10 +282,10 @@ mod tests {
         let system = model.assemble().unwrap();
         let ports = Ports::new(&system).unwrap();
         let mut sparse = BandedForm::new(&system, &ports, &HARMONICS).unwrap();
-        sparse.drive(2.5).unwrap(); // above all resonances, where motion decays from blade to blade
-        let (blocks, size) = blocks(&ports, HARMONICS.len());
+        sparse.factor_dynamic_stiffness(2.5).unwrap(); // above all resonances, where motion decays from blade to blade
+        let (blocks, size) = tangent_ranges(&ports, HARMONICS.len());
         let tangents: Vec<f64> = (0..size).map(|i| 0.2 * ((i * 7919 + 13) as f64).sin()).collect();
-        let along = StepParameters { penalty: &vec![0.0; ports.len()], ease: GIVEN };
+        let along = StepParameters { penalty: &vec![0.0; ports.len()], homotopy: GIVEN_EQUATIONS };
         assert!(sparse.linearise(&ports, &along, &tangents));
         (sparse, ports, tangents, blocks)
     }
@@ -281,7 +293,7 @@ mod tests {
     /// A subdomain with all places around it is the whole structure; one with a
     /// few places is nearly the same.
     #[test]
-    fn a_window_moves_as_the_whole_does() {
+    fn subdomain_agrees_with_whole_structure() {
         let (mut sparse, ports, tangents, blocks) = ring();
         let neighbours = Adjacency::new(&sparse, &ports);
         let size = 2 * HARMONICS.len();
@@ -289,12 +301,12 @@ mod tests {
         let mut whole = vec![0.0; BLADES * size];
         (0..3 * size).for_each(|i| whole[7 * size + i] = 1.0 + i as f64);
         let forces = whole[7 * size..10 * size].to_vec();
-        sparse.receive_all(&mut whole);
+        sparse.solve_along_axes(&mut whole);
         for (around, error) in [(BLADES, 1e-12), (3, 1e-3)] {
             let at = (&cluster[..], around);
             let mut window = Subdomain::new(&sparse, &neighbours, &ports, at, (&tangents, &blocks)).unwrap();
             let mut motion = forces.clone();
-            window.receive(&mut motion);
+            window.solve(&mut motion);
             let largest = motion.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
             for (u, v) in motion.iter().zip(&whole[7 * size..]) {
                 assert!((u - v).abs() < error * largest, "{around}: {u} {v}");

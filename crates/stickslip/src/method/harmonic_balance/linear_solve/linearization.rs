@@ -3,7 +3,7 @@
 //! The Jacobian is `δ_qp r_y - r_u R_qp f_y`, see `equations`. The matrix has
 //! the lowest harmonics alone, or all of them.
 
-use crate::method::harmonic_balance::aft::{Port, Ports, block};
+use crate::method::harmonic_balance::aft::{Port, Ports, tangent_range};
 use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -24,7 +24,7 @@ pub(crate) struct LinearizedEquations<'a> {
 impl LinearizedEquations<'_> {
     /// Returns K or T of a port.
     pub fn tangent(&self, p: usize, port: &Port) -> &[f64] {
-        &self.tangents[block(self.blocks, p, port, self.harmonics.len())]
+        &self.tangents[tangent_range(self.blocks, p, port, self.harmonics.len())]
     }
 
     /// Assembles the Jacobian of the first `kept` harmonics without the others, row-major and
@@ -55,7 +55,7 @@ impl LinearizedEquations<'_> {
                 for a in 0..row.axes {
                     for b in 0..column.axes {
                         for k in 0..kept {
-                            let r = receptance[k][(row.first + a, column.first + b)];
+                            let r = receptance[k][(row.first_axis + a, column.first_axis + b)];
                             let at = (a * pair + 2 * k) * wide;
                             let (first, second) = product[at..at + 2 * wide].split_at_mut(wide);
                             if column.is_force() {
@@ -82,7 +82,7 @@ impl LinearizedEquations<'_> {
                 // -r_u = 1, or T ε d/dt
                 let penalty = self.penalty[q];
                 for i in 0..tall {
-                    let start = (row.first * pair + i) * size + column.first * pair;
+                    let start = (row.first_axis * pair + i) * size + column.first_axis * pair;
                     let out = &mut jacobian[start..start + wide];
                     if !row.is_force() {
                         out.copy_from_slice(&product[i * wide..(i + 1) * wide]);
@@ -120,22 +120,22 @@ impl LinearizedEquations<'_> {
         for (q, row) in ports.iter().enumerate() {
             let own = self.tangent(q, row);
             for i in 0..pair * row.axes {
-                let at = row.first * pair + i;
+                let at = row.first_axis * pair + i;
                 let line = &mut jacobian[at * size..(at + 1) * size];
                 line[at] += 1.0;
                 if row.is_force() {
-                    line[at] += self.ease.stay(harmonics[i % pair / 2]);
+                    line[at] += self.ease.diagonal_term(harmonics[i % pair / 2]);
                     let slopes = &own[(i / pair * whole + i % pair) * whole * row.axes..][..whole * row.axes];
                     for (a, slopes) in slopes.chunks_exact(whole).enumerate() {
-                        let own = &mut line[(row.first + a) * pair..][..pair];
+                        let own = &mut line[(row.first_axis + a) * pair..][..pair];
                         own.iter_mut().zip(slopes).for_each(|(j, t)| *j -= t);
                     }
                 }
-                let unit_of_row = self.units[row.first * whole + i / pair * whole + i % pair];
+                let unit_of_row = self.units[row.first_axis * whole + i / pair * whole + i % pair];
                 for column in ports.iter() {
                     let scale = column.unit(self.length) / unit_of_row;
                     if scale != 1.0 {
-                        let columns = column.first * pair..(column.first + column.axes) * pair;
+                        let columns = column.first_axis * pair..(column.first_axis + column.axes) * pair;
                         line[columns].iter_mut().for_each(|j| *j *= scale);
                     }
                 }

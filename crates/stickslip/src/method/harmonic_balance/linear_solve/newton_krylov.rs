@@ -18,10 +18,10 @@
 //! matrices over the axes and one over axes and modes.
 
 use super::linearization::LinearizedEquations;
-use crate::method::harmonic_balance::aft::{MANY_DIRECTIONS, Port, Ports};
+use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Port, Ports};
 use crate::method::harmonic_balance::dynamics::linear_dynamics::CACHED;
 use crate::method::harmonic_balance::dynamics::receptance::{ModalReceptance, Receptance};
-use crate::method::harmonic_balance::globalization::homotopy::SOLVED;
+use crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -35,29 +35,29 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
 /// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. The second limit applies with
 /// rigid friction, whose lowest harmonics are eliminated in any case.
-const MANY: usize = 200;
+const KRYLOV_UNKNOWNS: usize = 200;
 const MANY_OF_FORCES: usize = 400;
 /// Number of unknowns up to which the Jacobian is formed if GMRES does not
 /// converge: 130 MB, seconds.
-pub(crate) const FORMED: usize = 4096;
+pub(crate) const FORMED_UNKNOWNS: usize = 4096;
 /// Number of unknowns from which GMRES is used for few directions with rigid
 /// friction, whose series are long. Measured: a step of 10 joints with 128
 /// harmonics, 2560 unknowns, takes 80 products, an eighth of its elimination.
-const LONG: usize = 2048;
+const KRYLOV_LONG_SERIES: usize = 2048;
 /// Number of unknowns of the lowest harmonics that are factored together to precondition such a
 /// step. Measured: with a quarter of the harmonics a step takes 80 products, with an eighth
 /// 150. With none, each harmonic by its mean, it does not converge in hundreds.
-const LOWEST: usize = 1000;
+const LOWEST_UNKNOWNS: usize = 1000;
 /// Tells whether a level with `size` unknowns uses GMRES.
-pub(crate) fn by_products(size: usize, ports: &Ports) -> bool {
-    let many = if ports.has_forces() { MANY_OF_FORCES } else { MANY };
-    let many = size >= many && ports.count() >= MANY_DIRECTIONS;
-    size > FORMED || many || (size > LONG && ports.has_forces())
+pub(crate) fn uses_krylov(size: usize, ports: &Ports) -> bool {
+    let many = if ports.has_forces() { MANY_OF_FORCES } else { KRYLOV_UNKNOWNS };
+    let many = size >= many && ports.count() >= KRYLOV_AXES;
+    size > FORMED_UNKNOWNS || many || (size > KRYLOV_LONG_SERIES && ports.has_forces())
 }
 
 /// Relative tolerance of GMRES, as a share of Newton's residual, and its upper bound.
 /// Derivatives of laws cost as much as tens of products, so that fewer Newton steps count more.
-const SHARE: f64 = 0.1;
+const FORCING_TERM: f64 = 0.1;
 const COARSEST: f64 = 1e-6;
 /// Upper bound with modes, whose products cost more than derivatives do: for 1000 nodes one
 /// product takes 50 ms, all derivatives 0.3 s.
@@ -71,10 +71,10 @@ const PRODUCTS: usize = 320;
 /// Relative residual of the linear equations up to which a step is used.
 const USEFUL: f64 = 0.1;
 /// Number of products beyond which a kept preconditioner is replaced.
-const STALE: usize = 25;
+const KEPT_PRODUCTS: usize = 25;
 /// Number of products that later steps may take in total in excess of the step for which a
 /// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
-const PAID: usize = 10;
+const EXCESS_PRODUCTS: usize = 10;
 /// Modes with frequencies above this multiple of the highest harmonic respond almost statically.
 const ABOVE: f64 = 3.0;
 
@@ -100,15 +100,15 @@ pub(crate) struct NewtonKrylov {
 /// The state in which a Newton step begins.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StepStart {
-    /// The length of motions, m, see `Discretization::length`.
+    /// The length of motions, m, see `Discretization::motion_scale`.
     pub length: f64,
     /// The size of the residual.
     pub residual: f64,
     /// True if derivatives, or all of the equations, use the coarse sampling,
-    /// see `Discretization::follow_slopes`.
-    pub sketched: bool,
+    /// see `Discretization::complete_derivatives`.
+    pub coarse: bool,
     /// True if the derivatives are those of the last step, whose preconditioner then fits.
-    pub kept: bool,
+    pub same_derivatives: bool,
 }
 
 impl NewtonKrylov {
@@ -134,21 +134,25 @@ impl NewtonKrylov {
         near: StepStart,
     ) -> (bool, usize) {
         let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
-        let (residual, finest) = (near.residual, if near.sketched { FINEST_OF_SKETCHES } else { 0.0 });
-        let wanted = (SHARE * residual).min(coarsest).max(SHARE * SOLVED / residual.max(SOLVED)).max(finest);
+        let (residual, finest) = (near.residual, if near.coarse { FINEST_OF_SKETCHES } else { 0.0 });
+        let wanted = (FORCING_TERM * residual)
+            .min(coarsest)
+            .max(FORCING_TERM * RESIDUAL_TOLERANCE / residual.max(RESIDUAL_TOLERANCE))
+            .max(finest);
         let limits = GmresLimits { tolerance: wanted, restart: VECTORS, products: PRODUCTS };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let NewtonKrylov { gmres, harmonics, split, above, force, moved, parts } = self;
         // with unknown forces, the samples that slip couple the lowest harmonics
-        harmonics.take_if(|_| !near.kept && linear.ports.has_forces());
+        harmonics.take_if(|_| !near.same_derivatives && linear.ports.has_forces());
         let found = loop {
             let Some(preconditioner) =
                 linear.preconditioner(receptance, (&mut *harmonics, &mut *split, &mut *above), &mut fresh)
             else {
                 break false;
             };
-            let most = if fresh { limits } else { GmresLimits { products: STALE, restart: STALE, ..limits } };
+            let most =
+                if fresh { limits } else { GmresLimits { products: KEPT_PRODUCTS, restart: KEPT_PRODUCTS, ..limits } };
             let outcome = gmres.solve(
                 step,
                 most,
@@ -161,14 +165,14 @@ impl NewtonKrylov {
             }
             harmonics.take_if(|known| {
                 known.excess += outcome.products.saturating_sub(known.products);
-                known.excess > PAID
+                known.excess > EXCESS_PRODUCTS
             });
             if fresh || outcome.solved {
                 break outcome.solved || outcome.residual <= USEFUL;
             }
             // the stiffness of another motion
             *harmonics = None;
-            *above = split.take().map(|split| (split.bound, split.above));
+            *above = split.take().map(|split| (split.bound, split.residual_flexibility));
             step.copy_from_slice(&right);
         };
         if !found {
@@ -179,13 +183,13 @@ impl NewtonKrylov {
 }
 
 /// Returns the number of entries in the factor of the lowest harmonics.
-pub(crate) fn of_lowest(ports: &Ports, harmonics: usize) -> usize {
-    (2 * ports.count() * lowest(ports, harmonics)).pow(2)
+pub(crate) fn lowest_factor_entries(ports: &Ports, harmonics: usize) -> usize {
+    (2 * ports.count() * lowest_count(ports, harmonics)).pow(2)
 }
 
 /// Returns the number of lowest harmonics that are factored together; zero if it would be one.
-fn lowest(ports: &Ports, harmonics: usize) -> usize {
-    let count = if ports.has_forces() { LOWEST / (2 * ports.count()) } else { 0 };
+fn lowest_count(ports: &Ports, harmonics: usize) -> usize {
+    let count = if ports.has_forces() { LOWEST_UNKNOWNS / (2 * ports.count()) } else { 0 };
     if count < 2 { 0 } else { count.min(harmonics) }
 }
 
@@ -206,8 +210,8 @@ impl LinearizedEquations<'_> {
         for (p, port) in self.ports.iter().enumerate() {
             let wide = pair * port.axes;
             let unit = port.unit(self.length);
-            let v = &v[port.first * pair..][..wide];
-            let force = &mut force[port.first * nh..][..wide / 2];
+            let v = &v[port.first_axis * pair..][..wide];
+            let force = &mut force[port.first_axis * nh..][..wide / 2];
             if port.is_force() {
                 force.iter_mut().zip(v.chunks_exact(2)).for_each(|(f, v)| *f = Complex64::new(v[0], v[1]) * unit);
                 continue;
@@ -226,10 +230,10 @@ impl LinearizedEquations<'_> {
         receptance.apply(force, moved);
         for (p, port) in self.ports.iter().enumerate() {
             let wide = pair * port.axes;
-            let range = port.first * pair..port.first * pair + wide;
+            let range = port.first_axis * pair..port.first_axis * pair + wide;
             let unit = port.unit(self.length);
             let (v, out, units) = (&v[range.clone()], &mut out[range.clone()], &self.units[range]);
-            let moved = &moved[port.first * nh..][..wide / 2];
+            let moved = &moved[port.first_axis * nh..][..wide / 2];
             if !port.is_force() {
                 for (i, out) in out.iter_mut().enumerate() {
                     let u = moved[i / 2];
@@ -250,7 +254,7 @@ impl LinearizedEquations<'_> {
                 })
                 .collect();
             for (i, (out, row)) in out.iter_mut().zip(self.tangent(p, port).chunks_exact(wide)).enumerate() {
-                let kept = 1.0 + self.ease.stay(self.harmonics[i % pair / 2]);
+                let kept = 1.0 + self.ease.diagonal_term(self.harmonics[i % pair / 2]);
                 *out = (kept * unit * v[i] - dot(row, &changed)) / units[i];
             }
         }
@@ -286,7 +290,7 @@ impl LinearizedEquations<'_> {
                 if harmonics.is_none() {
                     let lowest = self.lowest(&formed.matrices)?;
                     let rest = formed.matrices.iter().enumerate().skip(lowest.count);
-                    let others = rest.map(|(k, matrix)| self.of_harmonic(k, matrix)).collect::<Option<_>>()?;
+                    let others = rest.map(|(k, matrix)| self.harmonic_block(k, matrix)).collect::<Option<_>>()?;
                     *harmonics = Some(BlockPreconditioner { lowest, others, products: 0, excess: 0 });
                 }
                 harmonics.as_ref().map(Preconditioner::Harmonics)
@@ -317,7 +321,7 @@ impl LinearizedEquations<'_> {
 
     /// Factors the equations of the lowest harmonics, if forces are unknown.
     fn lowest(&self, receptance: &[DMatrix<Complex64>]) -> Option<LowestHarmonicsFactor> {
-        let count = lowest(self.ports, self.harmonics.len());
+        let count = lowest_count(self.ports, self.harmonics.len());
         let mut matrix = Vec::new();
         self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
         // the matrix is row-major: its transpose is factored
@@ -326,21 +330,21 @@ impl LinearizedEquations<'_> {
     }
 
     /// Factors the equations of one harmonic with the mean tangents.
-    fn of_harmonic(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<BlockSolver> {
+    fn harmonic_block(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<BlockSolver> {
         let size = receptance.nrows();
         let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
         let mut matrix = vec![ZERO; size * size];
         // R f_y
         for (p, port) in self.ports.iter().enumerate() {
             for b in 0..port.axes {
-                let column = &mut matrix[(port.first + b) * size..][..size];
+                let column = &mut matrix[(port.first_axis + b) * size..][..size];
                 if port.is_force() {
-                    column.copy_from_slice(moved(port.first + b));
+                    column.copy_from_slice(moved(port.first_axis + b));
                     continue;
                 }
                 for a in 0..port.axes {
                     let stiffness = self.mean(self.tangent(p, port), port.axes, (a, b), k);
-                    column.iter_mut().zip(moved(port.first + a)).for_each(|(out, r)| *out += r * stiffness);
+                    column.iter_mut().zip(moved(port.first_axis + a)).for_each(|(out, r)| *out += r * stiffness);
                 }
             }
         }
@@ -362,7 +366,7 @@ impl LinearizedEquations<'_> {
                 }
             }
             for (a, q) in port.range().enumerate() {
-                matrix[q * size + q] += 1.0 + self.ease.stay(h);
+                matrix[q * size + q] += 1.0 + self.ease.diagonal_term(h);
                 for (b, column) in port.range().enumerate() {
                     matrix[column * size + q] -= turn[a * port.axes + b];
                 }
@@ -458,7 +462,7 @@ impl Preconditioner<'_> {
         }
         for port in linear.ports.iter() {
             let unit = port.unit(linear.length);
-            v[2 * nh * port.first..2 * nh * (port.first + port.axes)].iter_mut().for_each(|v| *v /= unit);
+            v[2 * nh * port.first_axis..2 * nh * (port.first_axis + port.axes)].iter_mut().for_each(|v| *v /= unit);
         }
         if let Preconditioner::Harmonics(BlockPreconditioner {
             lowest: LowestHarmonicsFactor { count: count @ 1.., .. },
@@ -472,24 +476,25 @@ impl Preconditioner<'_> {
 }
 
 /// Number of harmonics above which derivatives of laws do not fit in the cache.
-const COUNTED: usize = 64;
+const CACHED_HARMONICS: usize = 64;
 /// Cost factor of products with the derivatives of unknown forces, whose series are long: every
 /// product reads them from memory. Measured: 21 ms a product of 11 joints with 512 harmonics.
-const READ: f64 = 8.0;
+const UNCACHED_COST: f64 = 8.0;
 
 /// Returns the multiplications in a product with the Jacobian: of the structure
 /// over the axes, and of the laws over the harmonics.
 pub(crate) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
     let of_law = |port: &Port| {
-        (2 * harmonics * port.axes).pow(2) as f64 * if port.is_force() && harmonics > COUNTED { READ } else { 1.0 }
+        (2 * harmonics * port.axes).pow(2) as f64
+            * if port.is_force() && harmonics > CACHED_HARMONICS { UNCACHED_COST } else { 1.0 }
     };
     4.0 * harmonics as f64 * (ports.count() as f64).powi(2) + ports.iter().map(of_law).sum::<f64>()
 }
 
 /// Returns the multiplications in a step by GMRES, with the lowest harmonics of
 /// unknown forces factored together.
-pub(crate) fn step_products(ports: &Ports, harmonics: usize) -> f64 {
-    let together = if ports.has_forces() { LOWEST.min(2 * harmonics * ports.count()) } else { 0 };
+pub(crate) fn krylov_step_work(ports: &Ports, harmonics: usize) -> f64 {
+    let together = if ports.has_forces() { LOWEST_UNKNOWNS.min(2 * harmonics * ports.count()) } else { 0 };
     VECTORS as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
 }
 
@@ -501,15 +506,15 @@ struct ModalPreconditioner {
     /// True if the mean has closed contacts. These already precondition it.
     closed: bool,
     /// Numbers of these modes.
-    low: Vec<usize>,
+    low_modes: Vec<usize>,
     /// Residual flexibility S of the other modes, with the springs in series. It does not
     /// depend on the stiffness of the joints.
-    above: Arc<Vec<f64>>,
+    residual_flexibility: Arc<Vec<f64>>,
     /// `1 + S K`, factored.
     factor: DenseLu<f64>,
     /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
-    pull: Vec<f64>,
-    moved: Vec<f64>,
+    modal_stiffness: Vec<f64>,
+    solved_modes: Vec<f64>,
     /// `Φᵀ K (1 + S K)⁻¹ Φ`.
     core: Vec<f64>,
     /// `core` plus the dynamic stiffness of the modes, factored, per harmonic
@@ -534,14 +539,16 @@ impl ModalPreconditioner {
         ports: &Ports,
     ) -> Option<Self> {
         let structure = &modal.structure;
-        let (p, n) = (structure.axes, structure.own().len());
+        let (p, n) = (structure.axes, structure.modal_coefficients().len());
         let is_low = |own: &[f64; 3]| own[2] <= bound * bound * own[0];
-        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.own()[m]));
+        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.modal_coefficients()[m]));
         let column = |m: usize| &structure.at[m * p..(m + 1) * p];
         let above = above.unwrap_or_else(|| {
             let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
-            let weighted: Vec<f64> =
-                high.iter().flat_map(|&m| column(m).iter().map(move |a| a / structure.own()[m][2])).collect();
+            let weighted: Vec<f64> = high
+                .iter()
+                .flat_map(|&m| column(m).iter().map(move |a| a / structure.modal_coefficients()[m][2]))
+                .collect();
             let mut sum = vec![0.0; p * p];
             multiply_blocked(
                 &weighted,
@@ -578,11 +585,11 @@ impl ModalPreconditioner {
         Some(ModalPreconditioner {
             bound,
             closed,
-            low,
-            above,
+            low_modes: low,
+            residual_flexibility: above,
             factor,
-            pull,
-            moved,
+            modal_stiffness: pull,
+            solved_modes: moved,
             core,
             harmonics: Vec::new(),
             omega: f64::NAN,
@@ -594,11 +601,11 @@ impl ModalPreconditioner {
         if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
             return Some(());
         }
-        let l = self.low.len();
+        let l = self.low_modes.len();
         self.harmonics.clear();
         for rate in &modal.rates {
             let mut matrix: Vec<Complex64> = self.core.iter().map(|x| Complex64::new(*x, 0.0)).collect();
-            for (i, &m) in self.low.iter().enumerate() {
+            for (i, &m) in self.low_modes.iter().enumerate() {
                 matrix[i * l + i] += modal.structure.stiffness(m, *rate, modal.omega).ok()?;
             }
             self.harmonics.push(ComplexLu::new(matrix, l).ok()?);
@@ -610,7 +617,7 @@ impl ModalPreconditioner {
     /// Applies the preconditioner to [axis][harmonic]:
     /// `(1 + R K)⁻¹ v = y - (1 + S K)⁻¹ Φ (1/g + core)⁻¹ Φᵀ K y`, with `y = (1 + S K)⁻¹ v`.
     fn apply(&self, v: &mut [f64]) {
-        let (nh, l) = (self.harmonics.len(), self.low.len());
+        let (nh, l) = (self.harmonics.len(), self.low_modes.len());
         let wide = 2 * nh;
         let p = v.len() / wide;
         let mut columns = vec![0.0; v.len()];
@@ -621,7 +628,7 @@ impl ModalPreconditioner {
         if l > 0 {
             let mut pulled = vec![0.0; l * wide];
             multiply_blocked(
-                &self.pull,
+                &self.modal_stiffness,
                 &columns,
                 &mut pulled,
                 ProductShape { rows: l, inner: p, columns: wide },
@@ -637,7 +644,7 @@ impl ModalPreconditioner {
             }
             let mut moved = vec![0.0; p * wide];
             multiply_blocked(
-                &self.moved,
+                &self.solved_modes,
                 &pulled,
                 &mut moved,
                 ProductShape { rows: p, inner: l, columns: wide },
@@ -661,11 +668,11 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};
-    use crate::method::harmonic_balance::budget::{POINT, WorkShare};
+    use crate::method::harmonic_balance::budget::{POINT_LIMIT, WorkShare};
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
     use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
     use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
-    use crate::method::harmonic_balance::globalization::homotopy::GIVEN;
+    use crate::method::harmonic_balance::globalization::homotopy::GIVEN_EQUATIONS;
     use crate::model::{Axis, System};
     use crate::structure::Structure;
     use std::sync::Arc;
@@ -711,11 +718,11 @@ mod tests {
         let ports = Ports::new(system).unwrap();
         let rest = LinearDynamics::new(system, &ports);
         let mut level = Discretization::new(harmonics.to_vec(), 1024, &ports, None);
-        level.coupled = (form != SolverForm::Eliminated).then(NewtonKrylov::default);
+        level.newton_krylov = (form != SolverForm::Eliminated).then(NewtonKrylov::default);
         if form == SolverForm::Sketched {
-            level.keep_sketch();
+            level.create_coarse_sampling();
         }
-        level.drive(system, &ports, &rest, omega).unwrap();
+        level.set_frequency(system, &ports, &rest, omega).unwrap();
         if form == SolverForm::Modal {
             let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
             let structure = Arc::new(UncoupledDynamics::new(system.structure(), &directions).unwrap());
@@ -723,10 +730,10 @@ mod tests {
             level.receptance =
                 Receptance::Modal(ModalReceptance::new((&structure, None), (harmonics, omega), &series).unwrap());
         }
-        let start = level.begin(system, &ports, None, omega);
+        let start = level.initial_guess(system, &ports, None, omega);
         let found = level.solve(&ports, omega, start);
         let found = found.unwrap_or_else(|lost| panic!("{form:?} at {omega}: {lost:?}"));
-        (found, level.products, level.alternation.marched)
+        (found, level.products, level.aft.law_steps)
     }
 
     fn agree(system: &System, harmonics: &[usize], forms: &[SolverForm]) {
@@ -745,7 +752,7 @@ mod tests {
 
     /// Elimination, GMRES with receptances and GMRES with modes find the same motion.
     #[test]
-    fn products_lead_where_elimination_does() {
+    fn gmres_finds_the_motion_of_elimination() {
         let contact = |i: usize| -> (SharedLaw, usize) {
             let stiffness = 1.5 + 0.5 * noise(i);
             match i % 2 {
@@ -760,7 +767,7 @@ mod tests {
     /// With a coarse sampling first, the search finds the motion of all
     /// samples, in fewer steps of the laws.
     #[test]
-    fn sketches_lead_to_the_motion_of_all_samples() {
+    fn coarse_sampling_finds_the_motion_of_all_samples() {
         let contact = |i: usize| -> (SharedLaw, usize) {
             (Arc::new(Jenkins2d { stiffness: 1.5 + 0.5 * noise(i), limit: 0.2 + 0.1 * noise(5 * i) }), 2)
         };
@@ -778,44 +785,47 @@ mod tests {
     /// Products are the work of a search; shortened steps are not. The next
     /// point has its full budget.
     #[test]
-    fn products_are_the_work_of_a_search() {
+    fn products_count_as_work() {
         let contacts: Vec<(SharedLaw, usize)> =
             (0..201).map(|_| (Arc::new(Jenkins2d { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 2)).collect();
         let system = system(&contacts);
         let ports = Ports::new(&system).unwrap();
         let mut level = Discretization::new(vec![1], 64, &ports, None);
-        level.begin_anew(&ports);
-        level.assembled = 10_000;
-        assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
+        level.begin_search(&ports);
+        level.evaluations = 10_000;
+        assert!(level.newton_krylov.is_some() && !level.is_budget_used(&ports));
         level.products = 1_000_000;
-        assert!(level.is_exhausted(&ports));
+        assert!(level.is_budget_used(&ports));
         level.begin_point();
-        assert!(!level.is_exhausted(&ports));
+        assert!(!level.is_budget_used(&ports));
     }
 
     /// Work of earlier searches of a point, here or at other levels, reduces
     /// the budget of the next search.
     #[test]
-    fn searches_of_a_point_share_what_it_may_take() {
+    fn searches_of_a_point_share_its_budget() {
         let joints: Vec<_> = (0..3).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
         let ports = Ports::new(&system(&joints)).unwrap();
         let mut level = Discretization::new(vec![1, 3], 64, &ports, None);
-        level.alternation.marched = usize::MAX / 2;
-        assert!(level.is_exhausted(&ports));
-        level.begin_anew(&ports);
-        assert!(level.spent.is_beyond(POINT) && level.is_exhausted(&ports), "the point has nothing left");
-        let share = |share: f64| WorkShare { eliminated: share * POINT.eliminated, marched: share * POINT.marched };
-        (level.spent, level.elsewhere) = (share(0.6), share(0.3));
-        assert!(!level.is_exhausted(&ports));
-        level.elsewhere = share(0.5);
-        assert!(level.is_exhausted(&ports));
+        level.aft.law_steps = usize::MAX / 2;
+        assert!(level.is_budget_used(&ports));
+        level.begin_search(&ports);
+        assert!(level.work_before.exceeds(POINT_LIMIT) && level.is_budget_used(&ports), "the point has nothing left");
+        let share = |share: f64| WorkShare {
+            multiplications: share * POINT_LIMIT.multiplications,
+            time_steps: share * POINT_LIMIT.time_steps,
+        };
+        (level.work_before, level.work_elsewhere) = (share(0.6), share(0.3));
+        assert!(!level.is_budget_used(&ports));
+        level.work_elsewhere = share(0.5);
+        assert!(level.is_budget_used(&ports));
         level.begin_point();
-        assert!(!level.is_exhausted(&ports));
+        assert!(!level.is_budget_used(&ports));
     }
 
     /// GMRES also solves for unknown forces, of rigid friction together with elastic friction.
     #[test]
-    fn forces_are_unknowns_of_products_too() {
+    fn gmres_solves_for_unknown_forces() {
         let laws: [SharedLaw; 3] = [
             Arc::new(Coulomb { limit: 0.3 }),
             Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 }),
@@ -828,27 +838,27 @@ mod tests {
     /// A few joints with rigid friction and long series: GMRES converges with
     /// the lowest harmonics factored together.
     #[test]
-    fn lowest_harmonics_together_lead_to_steps_of_long_series() {
+    fn factored_lowest_harmonics_precondition_long_series() {
         let laws: [SharedLaw; 2] = [Arc::new(Coulomb { limit: 0.3 }), Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 })];
         let joints: Vec<_> = (0..12).map(|i| (laws[usize::from(i % 3 == 2)].clone(), 1)).collect();
         let harmonics: Vec<usize> = (1..128).step_by(2).collect();
-        assert!(LOWEST < 24 * harmonics.len(), "some are left to their means");
+        assert!(LOWEST_UNKNOWNS < 24 * harmonics.len(), "some are left to their means");
         agree(&system(&joints), &harmonics, &[SolverForm::Formed]);
     }
 
     /// With few joints and long series, products with the laws dominate the
     /// work, and they end a search.
     #[test]
-    fn the_laws_of_long_series_are_work() {
+    fn products_with_laws_count_as_work() {
         let joints: Vec<_> = (0..10).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
         let system = system(&joints);
         let ports = Ports::new(&system).unwrap();
         let mut level = Discretization::new((1..512).step_by(2).collect(), 8192, &ports, None);
-        level.begin_anew(&ports);
+        level.begin_search(&ports);
         level.products = 1_000;
-        assert!(level.coupled.is_some() && !level.is_exhausted(&ports));
+        assert!(level.newton_krylov.is_some() && !level.is_budget_used(&ports));
         level.products = 2_000;
-        assert!(level.is_exhausted(&ports));
+        assert!(level.is_budget_used(&ports));
     }
 
     /// The Jacobian is formed on request, also if modes would replace the receptances.
@@ -863,17 +873,17 @@ mod tests {
         for needed in [false, true] {
             let level = Discretization::new(vec![1], 64, &ports, None);
             let mut level = if needed { level.with_matrix() } else { level };
-            level.drive(&system, &ports, &rest, 0.7).unwrap();
-            let mut motion = level.begin(&system, &ports, None, 0.7);
+            level.set_frequency(&system, &ports, &rest, 0.7).unwrap();
+            let mut motion = level.initial_guess(&system, &ports, None, 0.7);
             level.evaluate(
                 &ports,
                 0.7,
                 &mut motion,
-                GIVEN,
+                GIVEN_EQUATIONS,
                 1.0,
                 crate::method::harmonic_balance::equations::DerivativeScope::All,
             );
-            assert_eq!(level.assemble(&ports, 0.7, GIVEN, 1.0), needed);
+            assert_eq!(level.assemble(&ports, 0.7, GIVEN_EQUATIONS, 1.0), needed);
         }
     }
 }

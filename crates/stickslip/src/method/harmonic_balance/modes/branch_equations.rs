@@ -1,15 +1,15 @@
 //! The equations of harmonic balance with a parameter, for continuation.
 
-use crate::method::harmonic_balance::accuracy::truncation_error::{ComparedSolution, estimate};
+use crate::method::harmonic_balance::accuracy::truncation_error::{ComparedSolution, truncation_error};
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::dynamics::banded::GUESSED;
+use crate::method::harmonic_balance::dynamics::banded::DESCRIBING_DOFS;
 use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
 use crate::method::harmonic_balance::equations::harmonic_set::HarmonicSet;
-use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution, transfer};
-use crate::method::harmonic_balance::memory_estimate::{check_memory, memory};
+use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution, with_harmonics};
+use crate::method::harmonic_balance::memory_estimate::{check_memory, unbanded_memory};
 use crate::method::harmonic_balance::options::{HarmonicBalance, TOLERANCE};
 use crate::method::harmonic_balance::postprocess;
-use crate::method::harmonic_balance::solver::LARGEST;
+use crate::method::harmonic_balance::solver::MOST_ELIMINATED_UNKNOWNS;
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
 use crate::method::{MethodError, OrbitError, ways};
@@ -26,25 +26,25 @@ const HARMONICS: usize = 15;
 const DIFFERENCE: f64 = 1e-6;
 
 /// Newton iterations of the solution for the error estimate.
-const CHECK: usize = 30;
+const ESTIMATE_ITERATIONS: usize = 30;
 /// Unit of the unknowns relative to the first motion. Motions grow towards a resonance, and the
 /// unknowns then stay of order one.
-const RESONANCE: f64 = 30.0;
+const UNIT_OF_MOTION: f64 = 30.0;
 
 /// Equations whose unknowns are the harmonics along the joints, relative to the size of the
 /// first orbit.
 pub(crate) struct BranchEquations<'a> {
     /// Returns the system and the excitation frequency (rad/s) for a value of the parameter.
-    at: &'a dyn Fn(f64) -> (System, f64),
+    system_at: &'a dyn Fn(f64) -> (System, f64),
     system: Arc<System>,
     omega: f64,
     value: f64,
-    span: f64,
+    range_length: f64,
     ports: Ports,
     around: Option<Ports>,
     rest: LinearDynamics,
     /// System to which `rest` belongs.
-    rest_of: Arc<System>,
+    receptance_of: Arc<System>,
     level: Discretization,
     /// Equations with twice the harmonics for the error estimate, unless they are too large.
     finer: Option<Discretization>,
@@ -69,7 +69,7 @@ impl<'a> BranchEquations<'a> {
         let kept = HarmonicSet::new(&system, |_| true);
         method.check(kept.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
-        let (ports, around) = Ports::of_sector(&system).map_err(|error| error.with(ways(&system)))?;
+        let (ports, around) = Ports::for_sector(&system).map_err(|error| error.with(ways(&system)))?;
         let rest = LinearDynamics::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let level = |top: usize| {
@@ -77,18 +77,18 @@ impl<'a> BranchEquations<'a> {
                 .with_matrix()
         };
         let harmonics = kept.up_to(top).len();
-        check_memory(memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
-        let few = 2 * ports.count() * kept.up_to(kept.double(top)).len() <= LARGEST;
-        let (finer, level) = (few.then(|| level(kept.double(top))), level(top));
-        let motion = HarmonicSolution::rest(level.linear.len());
+        check_memory(unbanded_memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
+        let few = 2 * ports.count() * kept.up_to(kept.doubled(top)).len() <= MOST_ELIMINATED_UNKNOWNS;
+        let (finer, level) = (few.then(|| level(kept.doubled(top))), level(top));
+        let motion = HarmonicSolution::zero(level.linear_motion.len());
         Ok(BranchEquations {
-            at,
-            rest_of: system.clone(),
+            system_at: at,
+            receptance_of: system.clone(),
             judge: OrbitCheck::new(&system),
             system,
             omega,
             value: f64::NAN,
-            span: (range.1 - range.0).abs(),
+            range_length: (range.1 - range.0).abs(),
             ports,
             around,
             rest,
@@ -106,13 +106,13 @@ impl<'a> BranchEquations<'a> {
     /// Returns false if the frequency is not positive, or if the joints or their kinds of law
     /// have changed, so that the unknowns differ. Returns false at a resonance without damping
     /// too.
-    fn set(&mut self, value: f64) -> bool {
+    fn set_parameter(&mut self, value: f64) -> bool {
         if value == self.value {
             return true;
         }
-        let (system, omega) = (self.at)(value);
+        let (system, omega) = (self.system_at)(value);
         let system = Arc::new(system);
-        match Ports::of_sector(&system) {
+        match Ports::for_sector(&system) {
             Ok((found, around))
                 if omega > 0.0
                     && found.wave() == self.ports.wave()
@@ -123,12 +123,12 @@ impl<'a> BranchEquations<'a> {
             }
             _ => return false,
         }
-        let same = system.structure() == self.rest_of.structure();
+        let same = system.structure() == self.receptance_of.structure();
         if !same {
             self.rest = LinearDynamics::new(&system, &self.ports);
-            self.rest_of = system.clone();
+            self.receptance_of = system.clone();
         }
-        if self.level.drive(&system, &self.ports, &self.rest, omega).is_err() {
+        if self.level.set_frequency(&system, &self.ports, &self.rest, omega).is_err() {
             return false;
         }
         if !same || self.system.joints() != system.joints() {
@@ -139,66 +139,73 @@ impl<'a> BranchEquations<'a> {
     }
 
     /// Returns the error for a search that did not converge.
-    fn lost(&self, iterations: usize, residual: f64) -> OrbitError {
+    fn not_converged(&self, iterations: usize, residual: f64) -> OrbitError {
         OrbitError::not_converged(crate::method::harmonic_balance::NAME, self.omega, iterations, residual)
     }
 
     /// Finds the first point from the describing functions.
     pub fn start(&mut self, value: f64) -> Result<Vec<f64>, OrbitError> {
-        if !self.set(value) {
+        if !self.set_parameter(value) {
             return Err(OrbitError::Frequency { omega: self.omega });
         }
         // as for a single point: the initial guess solves the whole structure; large systems
         // start without friction
-        let guess = (self.system.dofs() < GUESSED).then(|| DescribingGuess::new(&self.system, self.omega));
-        let start = self.level.begin(&self.system, &self.ports, guess.as_ref(), self.omega);
+        let guess = (self.system.dofs() < DESCRIBING_DOFS).then(|| DescribingGuess::new(&self.system, self.omega));
+        let start = self.level.initial_guess(&self.system, &self.ports, guess.as_ref(), self.omega);
         self.level.begin_point();
         let solved = self.level.solve(&self.ports, self.omega, start);
-        self.motion = solved.map_err(|lost| self.lost(lost.iterations, lost.residual))?;
+        self.motion = solved.map_err(|lost| self.not_converged(lost.iterations, lost.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-        let size = norm(&self.motion.c).max(1e-3 * norm(&self.level.linear));
-        self.length = (RESONANCE * size).max(f64::MIN_POSITIVE);
+        let size = norm(&self.motion.c).max(1e-3 * norm(&self.level.linear_motion));
+        self.length = (UNIT_OF_MOTION * size).max(f64::MIN_POSITIVE);
         Ok(self.level.pack(&self.ports, &self.motion, self.length))
     }
 
     /// Returns the orbit of a point of the branch.
     pub fn orbit(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
-        if !self.set(value) {
+        if !self.set_parameter(value) {
             return None;
         }
         self.level.unpack(&self.ports, (x, self.length), &mut self.motion);
         self.level.begin_point();
-        self.level.polish(&self.ports, self.omega, &mut self.motion, 10).ok()?;
+        self.level.newton_from(&self.ports, self.omega, &mut self.motion, 10).ok()?;
         let places = postprocess::places(&mut self.level, &self.rest, self.omega, &self.motion).ok()?;
         let truncation = self.finer.as_mut().and_then(|finer| {
-            finer.drive(&self.system, &self.ports, &self.rest, self.omega).ok()?;
-            let mut motion = transfer(&self.motion, self.level.harmonics(), finer.harmonics());
+            finer.set_frequency(&self.system, &self.ports, &self.rest, self.omega).ok()?;
+            let mut motion = with_harmonics(&self.motion, self.level.harmonics(), finer.harmonics());
             // Newton's method alone: a search would find another branch near a turning point
             finer.begin_point();
-            finer.polish(&self.ports, self.omega, &mut motion, CHECK).ok()?;
+            finer.newton_from(&self.ports, self.omega, &mut motion, ESTIMATE_ITERATIONS).ok()?;
             let better = postprocess::places(finer, &self.rest, self.omega, &motion).ok()?;
             let coarse = ComparedSolution { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
-            let steep = self.ports.has_steep() || self.level.jumps(&self.ports, &self.motion);
+            let steep = self.ports.has_steep() || self.level.states_cross_within_sample(&self.ports, &self.motion);
             let at = (self.kept, self.omega, steep);
-            Some(estimate(self.system.place_axes(), &self.ports, &self.rest, at, &coarse, (finer, &motion, &better)))
+            Some(truncation_error(
+                self.system.place_axes(),
+                &self.ports,
+                &self.rest,
+                at,
+                &coarse,
+                (finer, &motion, &better),
+            ))
         });
         let setting = postprocess::OrbitInput {
             system: &self.system,
             ports: &self.ports,
-            around: self.around.as_ref(),
+            ring_ports: self.around.as_ref(),
             omega: self.omega,
-            first: 1,
-            odd: self.kept.half_period(),
+            excitation_harmonic: 1,
+            half_period: self.kept.has_half_period_symmetry(),
             truncation,
             tolerance: self.tolerance,
             judge: Some(&mut self.judge),
         };
         postprocess::orbit(setting, &mut self.level, &self.motion, places)
-            .filter(|orbit| postprocess::balances(&self.system, orbit))
+            .filter(|orbit| postprocess::energies_balance(&self.system, orbit))
     }
 
     /// Returns the orbit at `value` that the solver finds from the nearby point `x`.
-    pub fn near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
+    pub fn orbit_near(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
         let mut x = x.to_vec();
         self.jump_kink(&mut x, value).then(|| self.orbit(&x, value))?
     }
@@ -210,16 +217,16 @@ impl ParametricEquations for BranchEquations<'_> {
     }
 
     fn tolerance(&self) -> f64 {
-        crate::method::harmonic_balance::globalization::homotopy::SOLVED / RESONANCE
+        crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE / UNIT_OF_MOTION
     }
 
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
         if !p.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return false;
         }
-        let step = DIFFERENCE * p.abs().max(self.span);
+        let step = DIFFERENCE * p.abs().max(self.range_length);
         for (sign, at) in [(1.0, p + step), (-1.0, p - step)] {
-            if !self.set(at) {
+            if !self.set_parameter(at) {
                 return false;
             }
             self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, None);
@@ -227,7 +234,7 @@ impl ParametricEquations for BranchEquations<'_> {
                 *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step) };
             }
         }
-        if !self.set(p) {
+        if !self.set_parameter(p) {
             return false;
         }
         self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
@@ -235,7 +242,7 @@ impl ParametricEquations for BranchEquations<'_> {
     }
 
     fn jump_kink(&mut self, x: &mut [f64], p: f64) -> bool {
-        if !self.set(p) {
+        if !self.set_parameter(p) {
             return false;
         }
         let mut start = self.motion.clone();

@@ -2,13 +2,13 @@
 //!
 //! The amplitude `a` is an unknown, so the curve may have turning points in it. The unknowns
 //! are the shape `y = x/a`, the forces along laws of velocity, ω, ζ and `ln a`.
-//! [`ModeEquations::weigh`] defines the arc length.
+//! [`ModeEquations::apply_metric`] defines the arc length.
 //!
 //! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
 //! (2003), Ch. 6.
 
 use super::nonlinear_mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
-use crate::method::harmonic_balance::newton::{GROWS, HALVINGS, SHORTENS};
+use crate::method::harmonic_balance::newton::{DIVERGENCE, HALVINGS, SUFFICIENT_DECREASE};
 use num_complex::Complex64;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::{dense, interrupt};
@@ -33,18 +33,18 @@ pub(crate) struct ModeArc {
     /// It is constant along a smooth curve. A change means that another branch was crossed, or
     /// that the step has jumped to one. It is zero if the equations are singular and the
     /// determinant is rounding.
-    pub side: f64,
+    pub determinant_sign: f64,
 }
 
 impl ModeArc {
     /// Returns the same point with the curve followed in the opposite direction.
     pub fn reversed(&self) -> ModeArc {
         let tangent = self.tangent.iter().map(|t| -t).collect();
-        ModeArc { tangent, side: -self.side, ..self.clone() }
+        ModeArc { tangent, determinant_sign: -self.determinant_sign, ..self.clone() }
     }
 
     /// Returns the point at arc length `length` along the tangent, with the same tangent.
-    fn predicted(&self, length: f64) -> ModeArc {
+    fn predictor(&self, length: f64) -> ModeArc {
         let mut next = self.clone();
         next.shift(&self.tangent, length);
         next
@@ -67,7 +67,7 @@ impl ModeArc {
     }
 
     /// Returns the difference from here to `other`, in the unknowns of the tangent.
-    fn towards(&self, other: &ModeArc) -> Vec<f64> {
+    fn difference_to(&self, other: &ModeArc) -> Vec<f64> {
         let mut way = Vec::with_capacity(self.tangent.len());
         let shapes = self.state.x.iter().zip(&other.state.x);
         let forces = self.state.force.iter().zip(&other.state.force);
@@ -83,11 +83,11 @@ impl ModeArc {
     }
 
     /// Returns the point at amplitude `a` on the straight line between two points.
-    pub fn between(&self, other: &ModeArc, a: f64) -> ModeState {
+    pub fn interpolated(&self, other: &ModeArc, a: f64) -> ModeState {
         let whole = (other.amplitude / self.amplitude).ln();
         let share = if whole == 0.0 { 0.0 } else { (a / self.amplitude).ln() / whole };
         let mut point = self.clone();
-        point.shift(&self.towards(other), share);
+        point.shift(&self.difference_to(other), share);
         point.state
     }
 }
@@ -98,19 +98,19 @@ pub(crate) struct ModeStep {
     /// Newton iterations.
     pub iterations: usize,
     /// Distance between the predicted and the corrected point.
-    pub off: f64,
+    pub predictor_distance: f64,
     /// Cosine of the angle between the tangents at both ends.
-    pub straight: f64,
+    pub tangent_cosine: f64,
 }
 
 impl ModeEquations<'_> {
     /// Starts a curve towards smaller amplitudes from a solution. Returns `None` if the point
     /// is singular.
-    pub fn begin(&mut self, state: &ModeState, amplitude: f64) -> Option<ModeArc> {
+    pub fn start_curve(&mut self, state: &ModeState, amplitude: f64) -> Option<ModeArc> {
         let mut row = vec![0.0; self.size() + 1];
         row[self.size()] = -1.0;
-        let point = ModeArc { amplitude, state: state.clone(), tangent: row.clone(), side: 1.0 };
-        self.correct_along(point, &row, false).map(|(point, _)| point)
+        let point = ModeArc { amplitude, state: state.clone(), tangent: row.clone(), determinant_sign: 1.0 };
+        self.corrector(point, &row, false).map(|(point, _)| point)
     }
 
     /// Takes a step of the given arc length. Returns `None` if the corrector does not converge.
@@ -118,21 +118,21 @@ impl ModeEquations<'_> {
     /// A `bold` step takes the full Newton step if no fraction of it reduces the residual. This
     /// passes over kinks, but a long step may then jump to another branch.
     pub fn step(&mut self, from: &ModeArc, length: f64, bold: bool) -> Option<ModeStep> {
-        let row = self.weigh(from, &from.tangent);
-        let predicted = from.predicted(length);
+        let row = self.apply_metric(from, &from.tangent);
+        let predicted = from.predictor(length);
         if !(predicted.state.omega > 0.0 && predicted.amplitude.is_finite()) {
             return None;
         }
-        let (to, iterations) = self.correct_along(predicted.clone(), &row, bold)?;
-        let off = self.length(from, &predicted.towards(&to));
+        let (to, iterations) = self.corrector(predicted.clone(), &row, bold)?;
+        let off = self.length(from, &predicted.difference_to(&to));
         let straight = dot(&row, &to.tangent);
-        Some(ModeStep { to, iterations, off, straight })
+        Some(ModeStep { to, iterations, predictor_distance: off, tangent_cosine: straight })
     }
 
     /// Returns the arc length from a point to a motion along the straight line.
     pub fn distance(&self, from: &ModeArc, state: &ModeState, amplitude: f64) -> f64 {
-        let to = ModeArc { amplitude, state: state.clone(), tangent: Vec::new(), side: 1.0 };
-        self.length(from, &from.towards(&to))
+        let to = ModeArc { amplitude, state: state.clone(), tangent: Vec::new(), determinant_sign: 1.0 };
+        self.length(from, &from.difference_to(&to))
     }
 
     /// Returns the length of a direction at a point.
@@ -142,7 +142,7 @@ impl ModeEquations<'_> {
 
     /// Returns the inner product of two directions at a point in the metric of the arc length.
     pub(crate) fn inner(&self, at: &ModeArc, one: &[f64], other: &[f64]) -> f64 {
-        dot(&self.weigh(at, one), other)
+        dot(&self.apply_metric(at, one), other)
     }
 
     /// Returns the metric of the arc length times a direction.
@@ -152,7 +152,7 @@ impl ModeEquations<'_> {
     /// by the reach of the spring if that is larger. ω and 1 + ζ count relatively, and the
     /// amplitude by its logarithm. Without the terms for forces and relative motions, the onset
     /// and the end of slip would be corners of the curve.
-    fn weigh(&self, at: &ModeArc, direction: &[f64]) -> Vec<f64> {
+    fn apply_metric(&self, at: &ModeArc, direction: &[f64]) -> Vec<f64> {
         let (n, last) = (self.system.dofs(), self.size());
         let nh = self.alternation.harmonics.len();
         let mut out = vec![0.0; last + 1];
@@ -166,13 +166,15 @@ impl ModeEquations<'_> {
                 }
             }
         }
-        for (placed, w) in self.elastic.iter().flat_map(|placed| placed.w.iter().map(move |w| (placed, w))) {
+        for (placed, w) in
+            self.motion_ports.iter().flat_map(|placed| placed.directions.iter().map(move |w| (placed, w)))
+        {
             let along =
                 |k: usize, value: &dyn Fn(usize) -> f64| -> f64 { (0..n).map(|i| w[i] * value(k * n + i)).sum() };
             let square: f64 = (0..nh)
                 .map(|k| along(k, &|i| at.state.x[i].re).powi(2) + along(k, &|i| at.state.x[i].im).powi(2))
                 .sum();
-            let reach = placed.port.reach();
+            let reach = placed.port.slip_displacement();
             let size = square + reach * reach + (SMALL * at.amplitude).powi(2);
             let weight = at.amplitude * at.amplitude / size;
             for k in 0..nh {
@@ -184,8 +186,8 @@ impl ModeEquations<'_> {
                 }
             }
         }
-        for placed in &self.contacts {
-            let first = 2 * nh * (n + placed.port.first);
+        for placed in &self.force_ports {
+            let first = 2 * nh * (n + placed.port.first_axis);
             for i in first..first + 2 * nh * placed.port.axes {
                 out[i] = direction[i] / (placed.port.scale * placed.port.scale);
             }
@@ -201,7 +203,7 @@ impl ModeEquations<'_> {
     ///
     /// The line search halves steps as in [`ModeEquations::solve`]. Returns the solution with
     /// its unit tangent, on the side of `row`, and the iterations.
-    fn correct_along(&mut self, mut point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
+    fn corrector(&mut self, mut point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
         let size = self.size();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
         let (mut bordered, mut right) = (vec![0.0; (size + 1) * (size + 1)], vec![0.0; size + 1]);
@@ -228,7 +230,7 @@ impl ModeEquations<'_> {
                 }
                 right[size] = 0.0;
             }
-            let open = if self.mixes { null_directions(&bordered, size + 1) } else { Vec::new() };
+            let open = if self.may_be_singular { null_directions(&bordered, size + 1) } else { Vec::new() };
             let mut sign = dense::solve_with_determinant_sign(&mut bordered, size + 1, &mut right)?;
             if !open.is_empty() {
                 sign = 0.0;
@@ -241,7 +243,7 @@ impl ModeEquations<'_> {
                 }
                 right.iter_mut().for_each(|t| *t /= length);
                 point.tangent.copy_from_slice(&right);
-                point.side = sign;
+                point.determinant_sign = sign;
                 return Some((point, iteration));
             }
             iteration += 1;
@@ -260,7 +262,9 @@ impl ModeEquations<'_> {
                 trial.shift(&right, -fraction);
                 let sensible = trial.state.omega > 0.0 && trial.amplitude.is_finite() && trial.amplitude > 0.0;
                 let after = if sensible { evaluate(self, &trial, &mut residual, &mut jacobian) } else { f64::INFINITY };
-                if after < (1.0 - SHORTENS * fraction) * now || (bold && halving > HALVINGS && after < GROWS * now) {
+                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * now
+                    || (bold && halving > HALVINGS && after < DIVERGENCE * now)
+                {
                     (point, now) = (trial, after);
                     break;
                 }

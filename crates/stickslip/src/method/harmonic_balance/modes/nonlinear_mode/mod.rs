@@ -21,9 +21,9 @@ pub(crate) use linear_modes::LinearMode;
 
 use crate::method::MethodError;
 use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
-use crate::method::harmonic_balance::equations::contact_parameter::penalty;
-use crate::method::harmonic_balance::equations::regularization::{CLEAR, stay};
-use crate::method::harmonic_balance::newton::{HALVINGS, SHORTENS};
+use crate::method::harmonic_balance::equations::contact_parameter::contact_parameter;
+use crate::method::harmonic_balance::equations::regularization::{LEAST_EPSILON_RATIO, force_regularization};
+use crate::method::harmonic_balance::newton::{HALVINGS, SUFFICIENT_DECREASE};
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -41,7 +41,7 @@ pub(crate) const SOLVED: f64 = 1e-11;
 pub(crate) const ROUNDED: f64 = 1e-8;
 /// Factors of smaller motions that test proportionality. If these motions solve the equations,
 /// all smaller ones do.
-const SMALLER: [f64; 3] = [0.7, 0.5, 0.01];
+const PROPORTIONALITY_FACTORS: [f64; 3] = [0.7, 0.5, 0.01];
 
 /// Point of a nonlinear mode.
 #[derive(Debug, Clone)]
@@ -61,21 +61,21 @@ pub(crate) struct ModeState {
 pub(crate) struct ModeEquations<'a> {
     pub(crate) system: &'a System,
     /// Motion ports.
-    pub(super) elastic: Vec<PlacedPort>,
+    pub(super) motion_ports: Vec<PlacedPort>,
     /// Force ports. Their axes have separate numbers.
-    pub(super) contacts: Vec<PlacedPort>,
+    pub(super) force_ports: Vec<PlacedPort>,
     pub(super) alternation: FrequencyTime,
     /// Index of the first harmonic.
     first: usize,
     /// True if motions may be mixtures of two modes of equal frequency, so that the equations
     /// may be singular.
-    pub mixes: bool,
+    pub may_be_singular: bool,
 }
 
 /// Port with the directions of its axes in the structure.
 pub(super) struct PlacedPort {
     pub port: Port,
-    pub w: Vec<DVector<f64>>,
+    pub directions: Vec<DVector<f64>>,
 }
 
 impl PlacedPort {
@@ -84,7 +84,7 @@ impl PlacedPort {
         let one = |w: &DVector<f64>, k: usize| -> Complex64 {
             x[k * w.len()..(k + 1) * w.len()].iter().zip(w.iter()).map(|(x, w)| x * *w).sum()
         };
-        self.w.iter().flat_map(|w| (0..nh).map(move |k| one(w, k))).collect()
+        self.directions.iter().flat_map(|w| (0..nh).map(move |k| one(w, k))).collect()
     }
 }
 
@@ -109,21 +109,28 @@ impl<'a> ModeEquations<'a> {
         for port in ports.iter() {
             let w: Vec<DVector<f64>> = port.range().map(|q| ports.axis(system, q).dense(system.dofs())).collect();
             if !port.is_force() {
-                elastic.push(PlacedPort { port: port.clone(), w });
+                elastic.push(PlacedPort { port: port.clone(), directions: w });
             } else if w.iter().any(|w| w.amax() > 0.0) {
                 // a contact between imposed places exerts no force on the structure, and the
                 // mode does not move it
-                let first = contacts.last().map_or(0, |last| last.port.first + last.port.axes);
+                let first = contacts.last().map_or(0, |last| last.port.first_axis + last.port.axes);
                 let mut port = port.clone();
-                port.first = first;
-                contacts.push(PlacedPort { port, w });
+                port.first_axis = first;
+                contacts.push(PlacedPort { port, directions: w });
             }
         }
         let odd = system.joints().iter().all(|joint| joint.law().is_odd());
         let list: Vec<usize> = if odd { (1..=harmonics).step_by(2).collect() } else { (0..=harmonics).collect() };
         let mut alternation = FrequencyTime::new(list, samples);
         alternation.by_frequency = Some(Vec::new());
-        Ok(ModeEquations { system, elastic, contacts, alternation, first: usize::from(!odd), mixes: false })
+        Ok(ModeEquations {
+            system,
+            motion_ports: elastic,
+            force_ports: contacts,
+            alternation,
+            first: usize::from(!odd),
+            may_be_singular: false,
+        })
     }
 
     /// Returns harmonics times samples.
@@ -132,22 +139,22 @@ impl<'a> ModeEquations<'a> {
     }
 
     /// Returns the number of time steps of laws with memory.
-    pub fn marched(&self) -> usize {
-        self.alternation.marched
+    pub fn time_steps(&self) -> usize {
+        self.alternation.law_steps
     }
 
     /// Returns true if the system has one degree of freedom and a law with memory.
-    pub fn is_alone_with_memory(&self) -> bool {
-        self.system.dofs() == 1 && self.elastic.iter().any(|placed| placed.port.marches())
+    pub fn is_single_dof_with_memory(&self) -> bool {
+        self.system.dofs() == 1 && self.motion_ports.iter().any(|placed| placed.port.has_memory_steps())
     }
 
     /// Returns the number of axes of the force ports.
-    pub(crate) fn forces(&self) -> usize {
-        self.contacts.last().map_or(0, |last| last.port.first + last.port.axes)
+    pub(crate) fn force_axes(&self) -> usize {
+        self.force_ports.last().map_or(0, |last| last.port.first_axis + last.port.axes)
     }
 
     /// Returns the first harmonic of the places.
-    fn first<'s>(&self, state: &'s ModeState) -> &'s [Complex64] {
+    fn first_harmonic<'s>(&self, state: &'s ModeState) -> &'s [Complex64] {
         let n = self.system.dofs();
         &state.x[self.first * n..(self.first + 1) * n]
     }
@@ -155,21 +162,21 @@ impl<'a> ModeEquations<'a> {
     /// Returns true if the force of some law is unbounded, so that it stays significant at
     /// large amplitudes.
     pub fn is_unbounded(&self) -> bool {
-        self.elastic.iter().chain(&self.contacts).any(|placed| !placed.port.scale.is_finite())
+        self.motion_ports.iter().chain(&self.force_ports).any(|placed| !placed.port.scale.is_finite())
     }
 
     /// Returns the number of unknowns: real and imaginary parts of motions and forces, ω and ζ.
     pub(crate) fn size(&self) -> usize {
-        2 * self.alternation.harmonics.len() * (self.system.dofs() + self.forces()) + 2
+        2 * self.alternation.harmonics.len() * (self.system.dofs() + self.force_axes()) + 2
     }
 
-    /// Returns ε of every contact, N s/m, see [`penalty`].
+    /// Returns ε of every contact, N s/m, see [`contact_parameter`].
     ///
     /// The receptance is that without resonances, `wᵀ (K + h² ω² M)⁻¹ w`, at the highest
     /// harmonic `h`. It changes smoothly along the mode. With many harmonics it equals the
     /// receptance of the structure.
     fn penalties(&self, omega: f64) -> Vec<f64> {
-        if self.contacts.is_empty() {
+        if self.force_ports.is_empty() {
             return Vec::new();
         }
         let top = self.alternation.harmonics[self.alternation.harmonics.len() - 1];
@@ -179,11 +186,12 @@ impl<'a> ModeEquations<'a> {
         // finite either
         let factor = stiff.cholesky();
         let receptance = |w: &DVector<f64>| factor.as_ref().map_or(0.0, |factor| w.dot(&factor.solve(w)));
-        self.contacts
+        self.force_ports
             .iter()
-            .map(|PlacedPort { port, w }| {
+            .map(|PlacedPort { port, directions: w }| {
                 let mean = w.iter().map(receptance).sum::<f64>() / w.len() as f64;
-                penalty(mean + port.series, top, omega).max(CLEAR * port.least_penalty)
+                contact_parameter(mean + port.series_compliance, top, omega)
+                    .max(LEAST_EPSILON_RATIO * port.least_penalty)
             })
             .collect()
     }
@@ -248,7 +256,7 @@ impl<'a> ModeEquations<'a> {
         // modal amplitude, relative, and phase; a single place cannot stand for the motion,
         // because a contact mass that moves most in slip may rest in stick
         let (mut square, mut turned, last) = (0.0, 0.0, size - 2);
-        let (now, then) = (self.first(state), self.first(start));
+        let (now, then) = (self.first_harmonic(state), self.first_harmonic(start));
         for i in 0..n {
             let (mut x, mut before) = (ZERO, ZERO);
             for l in 0..n {
@@ -273,14 +281,14 @@ impl<'a> ModeEquations<'a> {
     /// Adds the forces of motion ports on the places.
     fn add_elastic_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
         let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
-        for placed in &self.elastic {
-            let wide = 2 * nh * placed.w.len();
-            let mut force = vec![ZERO; nh * placed.w.len()];
+        for placed in &self.motion_ports {
+            let wide = 2 * nh * placed.directions.len();
+            let mut force = vec![ZERO; nh * placed.directions.len()];
             let mut tangent = vec![0.0; if jacobian.is_some() { wide * wide } else { 0 }];
             let c = placed.along(&state.x, nh);
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
-            self.alternation.respond(&placed.port, (state.omega, 1.0), &c, &mut force, wanted);
-            for (a, w) in placed.w.iter().enumerate() {
+            self.alternation.motion_port_force(&placed.port, (state.omega, 1.0), &c, &mut force, wanted);
+            for (a, w) in placed.directions.iter().enumerate() {
                 for k in 0..nh {
                     for i in (0..n).filter(|&i| w[i] != 0.0) {
                         let row = 2 * (k * n + i);
@@ -293,7 +301,7 @@ impl<'a> ModeEquations<'a> {
                         }
                         for part in 0..2 {
                             let from = &tangent[(2 * (a * nh + k) + part) * wide..];
-                            for (b, v) in placed.w.iter().enumerate() {
+                            for (b, v) in placed.directions.iter().enumerate() {
                                 for l in 0..nh {
                                     let from = &from[2 * (b * nh + l)..];
                                     for p in (0..n).filter(|&p| v[p] != 0.0) {
@@ -318,18 +326,18 @@ impl<'a> ModeEquations<'a> {
     fn add_contact_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
         let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
         let penalties = self.penalties(state.omega);
-        for (placed, &penalty) in self.contacts.iter().zip(&penalties) {
+        for (placed, &penalty) in self.force_ports.iter().zip(&penalties) {
             let port = &placed.port;
             let wide = 2 * nh * port.axes;
-            let first = 2 * nh * (n + port.first);
-            let force = &state.force[port.first * nh..(port.first + port.axes) * nh];
+            let first = 2 * nh * (n + port.first_axis);
+            let force = &state.force[port.first_axis * nh..(port.first_axis + port.axes) * nh];
             let mut c = placed.along(&state.x, nh);
-            c.iter_mut().zip(force).for_each(|(c, force)| *c -= force * port.series);
+            c.iter_mut().zip(force).for_each(|(c, force)| *c -= force * port.series_compliance);
             let mut image = vec![ZERO; force.len()];
             let mut tangent = vec![0.0; if jacobian.is_some() { wide * wide } else { 0 }];
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
-            self.alternation.image(port, (state.omega, penalty, 1.0), (&c, force), &mut image, wanted);
-            for (a, w) in placed.w.iter().enumerate() {
+            self.alternation.force_port_image(port, (state.omega, penalty, 1.0), (&c, force), &mut image, wanted);
+            for (a, w) in placed.directions.iter().enumerate() {
                 for k in 0..nh {
                     let at = a * nh + k;
                     let r = force[at] - image[at];
@@ -347,14 +355,14 @@ impl<'a> ModeEquations<'a> {
             let Some(jacobian) = jacobian.as_deref_mut() else { continue };
             for (i, slopes) in tangent.chunks_exact(wide).enumerate() {
                 let row = &mut jacobian[(first + i) * size..(first + i + 1) * size];
-                row[first + i] += 1.0 + stay(self.alternation.harmonics[i / 2 % nh]);
-                for (b, v) in placed.w.iter().enumerate() {
+                row[first + i] += 1.0 + force_regularization(self.alternation.harmonics[i / 2 % nh]);
+                for (b, v) in placed.directions.iter().enumerate() {
                     for (l, &h) in self.alternation.harmonics.iter().enumerate() {
                         let at = b * nh + l;
                         let (x, y) = (slopes[2 * at], slopes[2 * at + 1]);
                         let by = |z: Complex64| (x * z.re + y * z.im, y * z.re - x * z.im);
                         let turn = Complex64::new(0.0, penalty * h as f64 * state.omega);
-                        let (re, im) = by(1.0 - turn * port.series);
+                        let (re, im) = by(1.0 - turn * port.series_compliance);
                         row[first + 2 * at] -= re;
                         row[first + 2 * at + 1] -= im;
                         for p in (0..n).filter(|&p| v[p] != 0.0) {
@@ -380,7 +388,7 @@ impl<'a> ModeEquations<'a> {
             .max(start.omega * start.omega * self.system.structure().mass().amax());
         let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
         let width = 2 * self.alternation.harmonics.len();
-        scale.extend(self.contacts.iter().flat_map(|placed| vec![placed.port.scale; width * placed.port.axes]));
+        scale.extend(self.force_ports.iter().flat_map(|placed| vec![placed.port.scale; width * placed.port.axes]));
         scale.extend([1.0; 2]);
         scale
     }
@@ -389,11 +397,11 @@ impl<'a> ModeEquations<'a> {
     /// no contact slips, opens or closes in it.
     pub fn is_proportional(&mut self, state: &ModeState, a: f64) -> bool {
         let mut residual = vec![0.0; self.size()];
-        SMALLER.iter().all(|factor| {
+        PROPORTIONALITY_FACTORS.iter().all(|factor| {
             let (smaller, a) = (self.scaled(state, *factor), a * factor);
             let units = self.units(&smaller, a);
             self.evaluate(&smaller, (&smaller, a), &mut residual, None);
-            size_in(&units, &residual) <= SOLVED
+            scaled_norm(&units, &residual) <= SOLVED
         })
     }
 
@@ -421,7 +429,7 @@ impl<'a> ModeEquations<'a> {
         let mut state = start.clone();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
         let scale = self.units(&start, a);
-        let norm = |residual: &[f64]| size_in(&scale, residual);
+        let norm = |residual: &[f64]| scaled_norm(&scale, residual);
         self.evaluate(&state, (&start, a), &mut residual, Some(&mut jacobian));
         let mut now = norm(&residual);
         for _ in 0..ITERATIONS {
@@ -433,14 +441,16 @@ impl<'a> ModeEquations<'a> {
                 residual[row] /= scale;
                 jacobian[row * size..(row + 1) * size].iter_mut().for_each(|x| *x /= scale);
             }
-            let open = if self.mixes { null_directions(&jacobian, size) } else { Vec::new() };
+            let open = if self.may_be_singular { null_directions(&jacobian, size) } else { Vec::new() };
             if !dense::solve(&mut jacobian, size, &mut residual) {
                 return None;
             }
             let mut step = residual.clone();
             if !open.is_empty() {
                 let motions = 2 * state.x.len();
-                min_norm_step(&mut step, open, &|one, other| self.kinetic(&one[..motions], &other[..motions]));
+                min_norm_step(&mut step, open, &|one, other| {
+                    self.kinetic_inner_product(&one[..motions], &other[..motions])
+                });
             }
             let mut fraction = 1.0;
             for halving in 0..=HALVINGS + 1 {
@@ -462,7 +472,7 @@ impl<'a> ModeEquations<'a> {
                     after = norm(&residual);
                 }
                 let whole = halving > HALVINGS && after.is_finite();
-                if after < (1.0 - SHORTENS * fraction) * now || whole {
+                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * now || whole {
                     (state, now) = (trial, after);
                     break;
                 }
@@ -477,7 +487,7 @@ impl<'a> ModeEquations<'a> {
 }
 
 /// Returns the norm of a residual whose entries have these units.
-fn size_in(units: &[f64], residual: &[f64]) -> f64 {
+fn scaled_norm(units: &[f64], residual: &[f64]) -> f64 {
     residual.iter().zip(units).map(|(r, unit)| (r / unit) * (r / unit)).sum::<f64>().sqrt()
 }
 
@@ -539,7 +549,7 @@ mod tests {
         for law in laws {
             let system = rated(law.clone());
             let mut equations = ModeEquations::new(&system, 5, 1024).unwrap();
-            let linear = equations.linear(&equations.linear_modes()[0], 1.0).unwrap();
+            let linear = equations.linear_state(&equations.linear_modes()[0], 1.0).unwrap();
             let start = equations.solve(&linear, 1.0, 1.0).unwrap();
             let mut state = start.clone();
             state.omega *= 1.02;
@@ -550,7 +560,7 @@ mod tests {
             let mut norms = Vec::new();
             for _ in 0..5 {
                 equations.evaluate(&state, (&start, 1.0), &mut residual, Some(&mut jacobian));
-                norms.push(size_in(&scale, &residual));
+                norms.push(scaled_norm(&scale, &residual));
                 assert!(dense::solve(&mut jacobian, size, &mut residual));
                 for (value, d) in state.x.iter_mut().chain(&mut state.force).zip(residual.chunks_exact(2)) {
                     *value -= Complex64::new(d[0], d[1]);
@@ -573,7 +583,7 @@ mod tests {
     fn the_derivative_agrees_with_differences() {
         let system = mixed();
         let mut equations = ModeEquations::new(&system, 5, 512).unwrap();
-        let start = equations.linear(&equations.linear_modes()[1], 1.0).unwrap();
+        let start = equations.linear_state(&equations.linear_modes()[1], 1.0).unwrap();
         let mut state = start.clone();
         for (i, value) in state.x.iter_mut().chain(&mut state.force).enumerate() {
             *value += Complex64::from_polar(0.3 / (1.0 + (i / 5) as f64), 1.7 * i as f64);
@@ -624,7 +634,7 @@ mod tests {
     fn mode(system: &System, harmonics: usize, amplitudes: &[f64]) -> (ModeState, f64) {
         let mut equations = ModeEquations::new(system, harmonics, 1024).unwrap();
         let first = &equations.linear_modes()[0];
-        let (mut state, mut before) = (equations.linear(first, amplitudes[0]).unwrap(), amplitudes[0]);
+        let (mut state, mut before) = (equations.linear_state(first, amplitudes[0]).unwrap(), amplitudes[0]);
         for &a in amplitudes {
             state = equations.solve(&state, before, a).unwrap();
             before = a;

@@ -30,7 +30,7 @@ fn half_range(terms: &[(f64, Complex64)]) -> f64 {
 
 impl ModeEquations<'_> {
     /// Returns the mass inner product `xᴴ M y` of two shapes.
-    fn in_masses(&self, x: &[Complex64], y: &[Complex64]) -> Complex64 {
+    fn mass_inner_product(&self, x: &[Complex64], y: &[Complex64]) -> Complex64 {
         let (n, mass) = (self.system.dofs(), self.system.structure().mass());
         let mut sum = ZERO;
         for i in 0..n {
@@ -43,25 +43,25 @@ impl ModeEquations<'_> {
 
     /// Returns the modal assurance criterion of two motions: their first harmonics in the mass
     /// inner product, from 0 to 1.
-    pub fn assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
-        let (one, other) = (self.first(one), self.first(other));
-        let squares = [one, other].map(|x| self.in_masses(x, x).re);
-        self.in_masses(one, other).norm_sqr() / (squares[0] * squares[1])
+    pub fn modal_assurance(&self, one: &ModeState, other: &ModeState) -> f64 {
+        let (one, other) = (self.first_harmonic(one), self.first_harmonic(other));
+        let squares = [one, other].map(|x| self.mass_inner_product(x, x).re);
+        self.mass_inner_product(one, other).norm_sqr() / (squares[0] * squares[1])
     }
 
     /// Returns the mass inner product of two changes of motion, summed over all harmonics.
-    pub(super) fn kinetic(&self, one: &[f64], other: &[f64]) -> f64 {
+    pub(super) fn kinetic_inner_product(&self, one: &[f64], other: &[f64]) -> f64 {
         let n = self.system.dofs();
         let shape = |parts: &[f64]| -> Vec<Complex64> {
             parts.chunks_exact(2).map(|part| Complex64::new(part[0], part[1])).collect()
         };
         let harmonics = one.chunks_exact(2 * n).zip(other.chunks_exact(2 * n));
-        harmonics.map(|(one, other)| self.in_masses(&shape(one), &shape(other)).re).sum()
+        harmonics.map(|(one, other)| self.mass_inner_product(&shape(one), &shape(other)).re).sum()
     }
 
     /// Returns the contribution of the viscous dampers to the damping ratio. It is the energy
     /// that they dissipate per cycle relative to the energy that `2 ζ ω M` supplies for ζ = 1.
-    pub fn viscous(&self, state: &ModeState) -> f64 {
+    pub fn viscous_damping_ratio(&self, state: &ModeState) -> f64 {
         let (n, mut lost, mut whole) = (self.system.dofs(), 0.0, 0.0);
         for (k, &h) in self.alternation.harmonics.iter().enumerate() {
             for i in 0..n {
@@ -77,7 +77,7 @@ impl ModeEquations<'_> {
 
     /// Returns the first harmonic of every place, m.
     pub fn places(&self, state: &ModeState) -> Vec<Complex64> {
-        self.at_places(self.first(state))
+        self.at_places(self.first_harmonic(state))
     }
 
     /// Returns half the range of motion of every place, m.
@@ -106,10 +106,10 @@ impl ModeEquations<'_> {
     /// orthogonal to itself.
     ///
     /// Source: Heiss (2012), "The physics of exceptional points".
-    pub fn rigidity(&self, state: &ModeState) -> f64 {
-        let x = self.first(state);
+    pub fn phase_collinearity(&self, state: &ModeState) -> f64 {
+        let x = self.first_harmonic(state);
         let conjugate: Vec<Complex64> = x.iter().map(Complex64::conj).collect();
-        self.in_masses(&conjugate, x).norm() / self.in_masses(x, x).re
+        self.mass_inner_product(&conjugate, x).norm() / self.mass_inner_product(x, x).re
     }
 }
 
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_way_of_a_motion_has_all_harmonics() {
+    fn half_range_uses_all_harmonics() {
         let of = |third: f64| half_range(&[(1.0, Complex64::new(0.0, -2.0)), (3.0, Complex64::new(0.0, third))]);
         // 2 sin t - sin(3t)/5 has its maximum at 90 degrees; 2 sin t + sin(3t) has it at sin² t
         // = 5/12, with the value (5 - 5/3) sin t
