@@ -158,7 +158,7 @@ impl OrbitMap for ExactSolver<'_> {
     /// Creates the orbit from the segments of the last run, which started from the converged
     /// state.
     fn finish(&mut self, closed: ClosedState) -> Result<Orbit, OrbitError> {
-        let omega = self.flow.drive.omega;
+        let omega = self.flow.excitation.omega;
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (at, closed) = ((omega, self.periods), (closed, self.weights.as_slice()));
         let orbit = postprocess::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
@@ -197,7 +197,7 @@ impl<'a> ExactSolver<'a> {
 
     /// Returns whether only friction balances the constant forces.
     fn is_held_by_friction(&self) -> bool {
-        let (mechanics, force) = (&self.flow.mechanics, &self.flow.drive.constant);
+        let (mechanics, force) = (&self.flow.mechanics, &self.flow.excitation.constant);
         if force.amax() == 0.0 || mechanics.parts.iter().any(|part| !part.is_slider()) {
             return false;
         }
@@ -243,8 +243,8 @@ impl Solver for ExactSolver<'_> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        let drive = HarmonicExcitation::new(self.system, &self.flow.mechanics.part_joints(), omega);
-        self.flow.set_drive(drive);
+        let excitation = HarmonicExcitation::new(self.system, &self.flow.mechanics.part_joints(), omega);
+        self.flow.set_excitation(excitation);
         self.weights = self.flow.mechanics.weights(omega);
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };

@@ -281,22 +281,22 @@ impl Pattern {
     }
 
     /// Computes the steady response and the basis at one excitation frequency.
-    pub fn drive(&self, mechanics: &Mechanics, drive: &HarmonicExcitation) -> ForcedResponse {
+    pub fn excitation(&self, mechanics: &Mechanics, excitation: &HarmonicExcitation) -> ForcedResponse {
         let n = mechanics.n;
         let mut driven = ForcedResponse { modes: self.lambda.len(), ..ForcedResponse::default() };
         driven.basis.drifts = self.drifts();
         driven.basis.exponents = self.lambda.clone();
-        driven.basis.exponents.extend(drive.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
+        driven.basis.exponents.extend(excitation.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
-        for (h, &rate) in drive.rates.iter().enumerate() {
+        for (h, &rate) in excitation.rates.iter().enumerate() {
             let s = Complex64::new(0.0, rate);
-            let held = DVector::from_fn(self.stuck_rigid.len(), |i, _| drive.imposed[h][self.stuck_rigid[i]]);
+            let held = DVector::from_fn(self.stuck_rigid.len(), |i, _| excitation.imposed[h][self.stuck_rigid[i]]);
             let moved = complex(&self.hold) * held; // S g: the constrained part moves with -S g
             let mut force =
-                drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
+                excitation.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
             for (i, part) in mechanics.parts.iter().enumerate() {
                 if let (Some(kt), true) = (part.stiffness(), self.stuck[i]) {
-                    force -= complex_vector(&part.direction) * (drive.imposed[h][i] * kt);
+                    force -= complex_vector(&part.direction) * (excitation.imposed[h][i] * kt);
                 }
             }
             let mut steady = -moved;
@@ -318,14 +318,15 @@ impl Pattern {
             }
             let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
             steady += complex(&self.free) * &free;
-            let inertia =
-                DVector::from_fn(self.stuck_rigid.len(), |i, _| drive.imposed[h][self.stuck_rigid[i]] * (rate * rate));
-            let held = complex(&self.multiplier) * &drive.forces[h] - complex(&self.inverse_delassus) * inertia;
+            let inertia = DVector::from_fn(self.stuck_rigid.len(), |i, _| {
+                excitation.imposed[h][self.stuck_rigid[i]] * (rate * rate)
+            });
+            let held = complex(&self.multiplier) * &excitation.forces[h] - complex(&self.inverse_delassus) * inertia;
             driven.held.push(held);
             driven.free_steady.push(free);
             driven.steady.push(steady);
         }
-        driven.held_constant = &self.multiplier * &drive.constant;
+        driven.held_constant = &self.multiplier * &excitation.constant;
         driven
     }
 
@@ -334,7 +335,7 @@ impl Pattern {
     pub fn displacement(
         &self,
         mechanics: &Mechanics,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         SegmentStart { driven, contacts, time, state }: SegmentStart<'_>,
         work: &mut PatternScratch,
         out: &mut [Complex64],
@@ -345,13 +346,13 @@ impl Pattern {
         // constant forces that do not depend on the state: loads, slip, imposed motion at the
         // start
         work.force.clear();
-        work.force.extend(drive.constant.iter());
+        work.force.extend(excitation.constant.iter());
         work.held.clear();
-        work.held.extend(self.stuck_rigid.iter().map(|&s| drive.imposed_at(s, time, 0)));
+        work.held.extend(self.stuck_rigid.iter().map(|&s| excitation.imposed_at(s, time, 0)));
         for (i, part) in mechanics.parts.iter().enumerate() {
             let value = match (contacts[i], part.kind) {
                 (Contact::Stick, PartKind::Rigid { .. }) => continue,
-                (Contact::Stick, PartKind::Elastic { stiffness, .. }) => stiffness * drive.imposed_at(i, time, 0),
+                (Contact::Stick, PartKind::Elastic { stiffness, .. }) => stiffness * excitation.imposed_at(i, time, 0),
                 (contact, _) => -part.constant_force(contact),
             };
             for row in 0..n {
@@ -372,8 +373,8 @@ impl Pattern {
                 }
             }
         }
-        for h in 0..drive.rates.len() {
-            let (sin, cos) = (drive.rates[h] * time).sin_cos();
+        for h in 0..excitation.rates.len() {
+            let (sin, cos) = (excitation.rates[h] * time).sin_cos();
             work.turn[h] = Complex64::new(cos, sin);
             for row in 0..n {
                 out[row * nb + count + h] = driven.steady[h][row] * work.turn[h];
@@ -408,17 +409,17 @@ impl Pattern {
             }
             out[constant].re = moved;
             for (r, (k, h, forward)) in driven.resonant.iter().enumerate() {
-                out[count + drive.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
+                out[count + excitation.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
             }
         }
-        self.add_polynomials(mechanics, drive, driven, state, work, out);
+        self.add_polynomials(mechanics, excitation, driven, state, work, out);
     }
 
     /// Adds free directions and drifting modes: 1, τ, τ²/2.
     fn add_polynomials(
         &self,
         mechanics: &Mechanics,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         driven: &ForcedResponse,
         state: &[f64],
         work: &mut PatternScratch,
@@ -442,10 +443,10 @@ impl Pattern {
         }
         for r in 0..self.free.ncols() {
             let (mut place, mut speed) = (0.0, 0.0);
-            for h in 0..drive.rates.len() {
+            for h in 0..excitation.rates.len() {
                 let z = driven.free_steady[h][r] * work.turn[h];
                 place -= z.re;
-                speed -= (z * Complex64::new(0.0, drive.rates[h])).re;
+                speed -= (z * Complex64::new(0.0, excitation.rates[h])).re;
             }
             let push: f64 = (0..n).map(|i| self.free_input[(r, i)] * work.force[i]).sum();
             for row in 0..n {
@@ -783,14 +784,14 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), OMEGA);
+        let excitation = HarmonicExcitation::new(&system, &mechanics.part_joints(), OMEGA);
         let pattern = Pattern::new(&mechanics, &[contact == Contact::Stick]).unwrap();
-        let driven = pattern.drive(&mechanics, &drive);
-        let mut work = PatternScratch::new(&mechanics, drive.rates.len());
+        let driven = pattern.excitation(&mechanics, &excitation);
+        let mut work = PatternScratch::new(&mechanics, excitation.rates.len());
         let mut signal = vec![ZERO; driven.basis.len()];
         let mut speed = signal.clone();
         let beginning = SegmentStart { driven: &driven, contacts: &[contact], time: TIME, state };
-        pattern.displacement(&mechanics, &drive, beginning, &mut work, &mut signal);
+        pattern.displacement(&mechanics, &excitation, beginning, &mut work, &mut signal);
         driven.basis.differentiate(&signal, &mut speed);
         let mut values = signal.clone();
         driven.basis.evaluate(LENGTH, &mut values);

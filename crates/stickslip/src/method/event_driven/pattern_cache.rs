@@ -47,7 +47,7 @@ impl PatternCache {
     pub fn pattern(
         &mut self,
         mechanics: &Mechanics,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         contacts: &[Contact],
     ) -> Result<(Arc<Pattern>, Arc<ForcedResponse>), DefectiveModes> {
         self.stuck.clear();
@@ -65,7 +65,7 @@ impl PatternCache {
             }
             None => Arc::new(Pattern::new(mechanics, &stuck)?),
         };
-        let driven = Arc::new(pattern.drive(mechanics, drive));
+        let driven = Arc::new(pattern.excitation(mechanics, excitation));
         let bytes = pattern.bytes() + driven.bytes();
         if self.bytes + bytes > self.limit {
             self.evict(self.limit / 2);
@@ -125,8 +125,8 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), 3.0);
-        (mechanics, drive)
+        let excitation = HarmonicExcitation::new(&system, &mechanics.part_joints(), 3.0);
+        (mechanics, excitation)
     }
 
     fn contacts(n: usize, number: usize) -> Vec<Contact> {
@@ -139,14 +139,14 @@ mod tests {
     #[test]
     fn memory_stays_below_its_limit() {
         let n = 8;
-        let (mechanics, drive) = chain(n);
+        let (mechanics, excitation) = chain(n);
         let mut memory = PatternCache::default();
-        let (first, _) = memory.pattern(&mechanics, &drive, &contacts(n, 0)).unwrap();
+        let (first, _) = memory.pattern(&mechanics, &excitation, &contacts(n, 0)).unwrap();
         let one = memory.bytes;
         assert!(one > 16 * n * n && one < 16 * 40 * n * n, "{one} bytes for a pattern of {n} places");
         memory.limit = 20 * one;
         for number in 0..1 << n {
-            memory.pattern(&mechanics, &drive, &contacts(n, number)).unwrap();
+            memory.pattern(&mechanics, &excitation, &contacts(n, number)).unwrap();
             assert!(memory.bytes <= memory.limit, "{} bytes", memory.bytes);
             assert_eq!(memory.bytes, memory.slots.values().map(|slot| slot.bytes).sum::<usize>());
         }
@@ -155,7 +155,7 @@ mod tests {
         let stuck = |number: usize| contacts(n, number).iter().map(|c| *c == Contact::Stick).collect::<Vec<_>>();
         assert!((246..256).all(|number| memory.slots.contains_key(&stuck(number))), "the last ten are there");
         assert!(!memory.slots.contains_key(&stuck(0)));
-        let (again, _) = memory.pattern(&mechanics, &drive, &contacts(n, 0)).unwrap();
+        let (again, _) = memory.pattern(&mechanics, &excitation, &contacts(n, 0)).unwrap();
         assert_eq!(again.lambda, first.lambda);
         assert_eq!(again.shape, first.shape);
     }
@@ -164,13 +164,13 @@ mod tests {
     /// response.
     #[test]
     fn directions_share_a_pattern() {
-        let (mechanics, drive) = chain(3);
+        let (mechanics, excitation) = chain(3);
         let mut memory = PatternCache::default();
-        let (forward, driven) = memory.pattern(&mechanics, &drive, &[Contact::SlipForward; 3]).unwrap();
-        let (backward, _) = memory.pattern(&mechanics, &drive, &[Contact::SlipBackward; 3]).unwrap();
+        let (forward, driven) = memory.pattern(&mechanics, &excitation, &[Contact::SlipForward; 3]).unwrap();
+        let (backward, _) = memory.pattern(&mechanics, &excitation, &[Contact::SlipBackward; 3]).unwrap();
         assert!(Arc::ptr_eq(&forward, &backward));
         memory.change_drive();
-        let (again, other) = memory.pattern(&mechanics, &drive, &[Contact::SlipForward; 3]).unwrap();
+        let (again, other) = memory.pattern(&mechanics, &excitation, &[Contact::SlipForward; 3]).unwrap();
         assert!(Arc::ptr_eq(&forward, &again) && !Arc::ptr_eq(&driven, &other));
         assert_eq!(memory.bytes, memory.slots.values().map(|slot| slot.bytes).sum::<usize>());
     }

@@ -105,7 +105,7 @@ impl ExactPath {
                 PathSegment { velocity: derivative(basis, &segment.displacement), segment: segment.clone() }
             })
             .collect();
-        let (rates, omega) = (flow.drive.rates.clone(), flow.drive.omega);
+        let (rates, omega) = (flow.excitation.rates.clone(), flow.excitation.omega);
         let (parts, shares) = (flow.mechanics.parts.clone(), flow.mechanics.shares.clone());
         ExactPath { system, pieces, parts, shares, symmetry, period, rates, omega }
     }

@@ -66,7 +66,7 @@ impl Segment {
 /// Computes the motion; stores patterns, scratch memory and the segments of the last run.
 pub(crate) struct SegmentedMotion {
     pub mechanics: Mechanics,
-    pub drive: HarmonicExcitation,
+    pub excitation: HarmonicExcitation,
     /// Square root of an energy that the loads can cause, √J.
     pub energy_scale: f64,
     /// A velocity well below those of the moving structure, m/s: the velocity scale near rest.
@@ -102,12 +102,12 @@ pub(crate) struct SegmentedMotion {
 const PRELOADED: f64 = 10.0;
 
 impl SegmentedMotion {
-    pub fn new(mechanics: Mechanics, drive: HarmonicExcitation) -> Self {
-        let (work, decision) = (PatternScratch::new(&mechanics, drive.rates.len()), Transition::new(&mechanics));
+    pub fn new(mechanics: Mechanics, excitation: HarmonicExcitation) -> Self {
+        let (work, decision) = (PatternScratch::new(&mechanics, excitation.rates.len()), Transition::new(&mechanics));
         let states = mechanics.states();
         SegmentedMotion {
             mechanics,
-            drive,
+            excitation,
             energy_scale: 0.0,
             moving: 0.0,
             memory: PatternCache::default(),
@@ -160,14 +160,14 @@ impl SegmentedMotion {
         let end = start + duration;
         let mut time = start;
         let (mut at_once, mut idle, mut bytes) = (0, 0, 0);
-        if !self.decision.determine(&self.mechanics, &self.drive, time, state, velocity_scale) {
+        if !self.decision.determine(&self.mechanics, &self.excitation, time, state, velocity_scale) {
             return Err(IntegrationError::NoContactState { time });
         }
         loop {
             interrupt::check();
             let (pattern, driven) = self
                 .memory
-                .pattern(&self.mechanics, &self.drive, &self.decision.contacts)
+                .pattern(&self.mechanics, &self.excitation, &self.decision.contacts)
                 .map_err(|defective| match defective.lambda.norm() {
                     lambda if lambda.is_finite() => IntegrationError::Defective { time, lambda },
                     _ => IntegrationError::OutOfRange { time },
@@ -200,7 +200,7 @@ impl SegmentedMotion {
                 return Err(IntegrationError::Chatter { time, switches: self.switches, joint });
             }
             self.set_to_limit(part, state);
-            if !self.decision.determine(&self.mechanics, &self.drive, time, state, velocity_scale) {
+            if !self.decision.determine(&self.mechanics, &self.excitation, time, state, velocity_scale) {
                 return Err(IntegrationError::NoContactState { time });
             }
             if let Some(sensitivity) = sensitivity.as_deref_mut() {
@@ -213,7 +213,7 @@ impl SegmentedMotion {
     fn moved(&self, state: &[f64]) -> f64 {
         let n = self.mechanics.n;
         let far = |range: std::ops::Range<usize>| range.map(|i| (state[i] - self.from[i]).abs()).fold(0.0, f64::max);
-        far(n..2 * n).max(far(0..n) * self.drive.omega.max(self.mechanics.fastest))
+        far(n..2 * n).max(far(0..n) * self.excitation.omega.max(self.mechanics.fastest))
     }
 
     /// Returns the largest expected relative velocity, from the state, the imposed motion and
@@ -223,13 +223,13 @@ impl SegmentedMotion {
         let fastest = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         // displacements count times a frequency, so that a start at a reversal has a scale too
         let widest =
-            state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.drive.omega.max(self.mechanics.fastest);
+            state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs())) * self.excitation.omega.max(self.mechanics.fastest);
         fastest.max(widest).max(self.moving).max(f64::MIN_POSITIVE)
     }
 
     /// Changes the excitation; patterns stay.
-    pub fn set_drive(&mut self, drive: HarmonicExcitation) {
-        self.work.set_harmonics(drive.rates.len());
+    pub fn set_excitation(&mut self, excitation: HarmonicExcitation) {
+        self.work.set_harmonics(excitation.rates.len());
         let mechanics = &self.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
             PartKind::Rigid { .. } => None,
@@ -237,13 +237,13 @@ impl SegmentedMotion {
             // its force in the initial position
             PartKind::Stop { stiffness, gap } => Some((-gap).max(0.0) * stiffness.sqrt()),
         });
-        let loads = drive.energy_scale(&mechanics.mass, &mechanics.stiffness);
+        let loads = excitation.energy_scale(&mechanics.mass, &mechanics.stiffness);
         // a limit that the loads never reach does not affect the motion
         let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
         self.energy_scale = loads + springs.map(|energy| energy.min(most)).sum::<f64>();
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
-        self.moving = drive.imposed_velocity().max(REST_FRACTION * self.energy_scale * mobility);
-        self.drive = drive;
+        self.moving = excitation.imposed_velocity().max(REST_FRACTION * self.energy_scale * mobility);
+        self.excitation = excitation;
         self.memory.change_drive();
     }
 
@@ -259,7 +259,7 @@ impl SegmentedMotion {
         segment.displacement.resize(n * nb, ZERO);
         segment.force.resize(parts * nb, ZERO);
         let beginning = SegmentStart { driven, contacts: &segment.contacts, time, state };
-        shape.displacement(&self.mechanics, &self.drive, beginning, &mut self.work, &mut segment.displacement);
+        shape.displacement(&self.mechanics, &self.excitation, beginning, &mut self.work, &mut segment.displacement);
         self.velocity.resize(n * nb, ZERO);
         self.acceleration.resize(n * nb, ZERO);
         for row in 0..n {
@@ -282,7 +282,7 @@ impl SegmentedMotion {
             let (kt, begins) = match (contacts[i], part.kind) {
                 (Contact::Stick, PartKind::Rigid { .. }) => continue,
                 (Contact::Stick, PartKind::Elastic { stiffness, state: s, .. }) => {
-                    let stretch = part.along(&state[..n]) + self.drive.imposed_at(i, time, 0);
+                    let stretch = part.along(&state[..n]) + self.excitation.imposed_at(i, time, 0);
                     (stiffness, state[2 * n + s] - stiffness * stretch)
                 }
                 (contact @ Contact::Stick, PartKind::Stop { stiffness, .. }) => {
@@ -296,7 +296,7 @@ impl SegmentedMotion {
                     add(row, &displacement[k * nb..(k + 1) * nb], kt * part.direction[k]);
                 }
                 for (h, turn) in turns.iter().enumerate() {
-                    row[modes + h] += self.drive.imposed[h][i] * turn * kt;
+                    row[modes + h] += self.excitation.imposed[h][i] * turn * kt;
                 }
             }
         }
@@ -348,7 +348,7 @@ impl SegmentedMotion {
         for (i, part) in self.mechanics.parts.iter().enumerate() {
             let contact = segment.contacts[i];
             if part.is_slider() && contact == Contact::Stick {
-                if shape.immobile[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
+                if shape.immobile[i] && self.excitation.imposed.iter().all(|g| g[i] == ZERO) {
                     continue; // its force is constant; rounding must not cause a switch
                 }
                 let force = &segment.force[i * nb..(i + 1) * nb];
@@ -364,7 +364,7 @@ impl SegmentedMotion {
                 }
                 continue;
             }
-            if !part.is_slider() && shape.immobile[i] && self.drive.imposed.iter().all(|g| g[i] == ZERO) {
+            if !part.is_slider() && shape.immobile[i] && self.excitation.imposed.iter().all(|g| g[i] == ZERO) {
                 continue;
             }
             if !self.nearest[i][usize::from(contact == Contact::SlipBackward)] {
@@ -382,7 +382,7 @@ impl SegmentedMotion {
                         &segment.displacement,
                         sign,
                         0,
-                        self.mechanics.contact_tolerance(part, self.drive.omega, velocity_scale),
+                        self.mechanics.contact_tolerance(part, self.excitation.omega, velocity_scale),
                     )
                 }
                 _ => (&self.velocity, contact.sign(), 1, ZERO_VELOCITY * velocity_scale),
@@ -391,8 +391,9 @@ impl SegmentedMotion {
                 add(signal, &motion[k * nb..(k + 1) * nb], sign * part.direction[k]);
             }
             for (h, turn) in self.work.turn.iter().enumerate() {
-                let rate = if order == 1 { Complex64::new(0.0, self.drive.rates[h]) } else { Complex64::new(1.0, 0.0) };
-                signal[modes + h] += self.drive.imposed[h][i] * turn * rate * sign;
+                let rate =
+                    if order == 1 { Complex64::new(0.0, self.excitation.rates[h]) } else { Complex64::new(1.0, 0.0) };
+                signal[modes + h] += self.excitation.imposed[h][i] * turn * rate * sign;
             }
             let now = real_dot(signal, &self.values);
             self.begins.push(begin(&mut signal[constant], now, zero, eased));
@@ -465,7 +466,7 @@ impl SegmentedMotion {
         }
         for (i, other) in self.mechanics.parts.iter().enumerate() {
             if let PartKind::Elastic { stiffness: kt, state: s, .. } = other.kind {
-                let velocity = other.along(&state[n..2 * n]) + self.drive.imposed_at(i, time, 1);
+                let velocity = other.along(&state[n..2 * n]) + self.excitation.imposed_at(i, time, 1);
                 let rate = |contact: Contact| if contact == Contact::Stick { kt * velocity } else { 0.0 };
                 self.before[2 * n + s] = rate(contacts[i]);
                 self.after[2 * n + s] = rate(self.decision.contacts[i]);
@@ -510,7 +511,7 @@ impl SegmentedMotion {
                 for k in 0..n {
                     self.row[n + k] = body.direction[k];
                 }
-                body.direction.dot(&self.before.rows(n, n)) + self.drive.imposed_at(part, time, 2)
+                body.direction.dot(&self.before.rows(n, n)) + self.excitation.imposed_at(part, time, 2)
             }
         };
         if slope == 0.0 {
@@ -608,9 +609,9 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), 0.7);
+        let excitation = HarmonicExcitation::new(&system, &mechanics.part_joints(), 0.7);
         let mut flow = SegmentedMotion::new(mechanics, HarmonicExcitation::default());
-        flow.set_drive(drive);
+        flow.set_excitation(excitation);
         flow
     }
 

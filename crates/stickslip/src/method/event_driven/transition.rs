@@ -149,7 +149,7 @@ impl Transition {
     pub fn determine(
         &mut self,
         mechanics: &Mechanics,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         time: f64,
         state: &[f64],
         velocity_scale: f64,
@@ -161,7 +161,7 @@ impl Transition {
         self.dropped.clear();
         let mut springs_undecided = false;
         for (i, part) in mechanics.parts.iter().enumerate() {
-            let velocity = part.along(v) + drive.imposed_at(i, time, 1);
+            let velocity = part.along(v) + excitation.imposed_at(i, time, 1);
             self.contacts[i] = match part.kind {
                 PartKind::Rigid { .. } if velocity.abs() > still => Contact::slip(velocity),
                 PartKind::Rigid { .. } => {
@@ -180,8 +180,8 @@ impl Transition {
                     }
                 }
                 PartKind::Stop { gap, .. } => {
-                    let depth = part.along(x) + drive.imposed_at(i, time, 0) - gap;
-                    if depth.abs() > mechanics.contact_tolerance(part, drive.omega, velocity_scale) {
+                    let depth = part.along(x) + excitation.imposed_at(i, time, 0) - gap;
+                    if depth.abs() > mechanics.contact_tolerance(part, excitation.omega, velocity_scale) {
                         closed(depth)
                     } else if velocity.abs() > still {
                         closed(velocity)
@@ -194,14 +194,14 @@ impl Transition {
         }
         // each round releases sliders or returns one to stick
         for _ in 0..=2 * self.resting.len() {
-            self.accelerate(mechanics, drive, time, state);
+            self.accelerate(mechanics, excitation, time, state);
             self.at_rest.clone_from(&self.resting);
-            if !self.decide_rigid(mechanics, drive, time, state) {
+            if !self.decide_rigid(mechanics, excitation, time, state) {
                 return false;
             }
-            if !self.release(mechanics, drive, time) {
+            if !self.release(mechanics, excitation, time) {
                 if springs_undecided {
-                    self.decide_springs(mechanics, drive, time, state, velocity_scale);
+                    self.decide_springs(mechanics, excitation, time, state, velocity_scale);
                 }
                 return true;
             }
@@ -210,18 +210,18 @@ impl Transition {
     }
 
     /// Computes the accelerations without the forces of rigid sliders at zero velocity.
-    fn accelerate(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) {
+    fn accelerate(&mut self, mechanics: &Mechanics, excitation: &HarmonicExcitation, time: f64, state: &[f64]) {
         let n = mechanics.n;
         let (x, v) = (&state[..n], &state[n..2 * n]);
         self.free.fill(0.0);
-        drive.add_force(time, 0, &mut self.free);
+        excitation.add_force(time, 0, &mut self.free);
         subtract_product(&mechanics.damping, v, &mut self.free);
         subtract_product(&mechanics.stiffness, x, &mut self.free);
         for (i, part) in mechanics.parts.iter().enumerate() {
             let force = match (part.kind, self.contacts[i]) {
                 (PartKind::Elastic { state: s, .. }, _) => state[2 * n + s],
                 (PartKind::Stop { stiffness, gap }, Contact::Stick) => {
-                    stiffness * (part.along(x) + drive.imposed_at(i, time, 0) - gap)
+                    stiffness * (part.along(x) + excitation.imposed_at(i, time, 0) - gap)
                 }
                 (_, contact) => part.constant_force(contact),
             };
@@ -235,14 +235,14 @@ impl Transition {
 
     /// Moves sliders whose force drops from `resting` to `dropped`, or returns one slider that
     /// is driven backwards. Returns whether anything changed.
-    fn release(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64) -> bool {
+    fn release(&mut self, mechanics: &Mechanics, excitation: &HarmonicExcitation, time: f64) -> bool {
         let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].force_drops();
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
         }
-        let terms = self.terms(mechanics, drive);
+        let terms = self.terms(mechanics, excitation);
         let back = self.dropped.iter().position(|&i| {
-            let relative = mechanics.parts[i].direction.dot(&self.acceleration) + drive.imposed_at(i, time, 2);
+            let relative = mechanics.parts[i].direction.dot(&self.acceleration) + excitation.imposed_at(i, time, 2);
             relative * self.contacts[i].sign() < -ZERO_ACCELERATION * terms.size(i, &self.response, 2)
         });
         let contacts = &mut self.contacts;
@@ -270,11 +270,17 @@ impl Transition {
 
     /// Decides on rigid sliders at zero velocity: by accelerations first, then by higher
     /// derivatives for those at their limit.
-    fn decide_rigid(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) -> bool {
+    fn decide_rigid(
+        &mut self,
+        mechanics: &Mechanics,
+        excitation: &HarmonicExcitation,
+        time: f64,
+        state: &[f64],
+    ) -> bool {
         if self.at_rest.is_empty() {
             return true;
         }
-        self.set_up_problem(mechanics, drive, time, 2, None);
+        self.set_up_problem(mechanics, excitation, time, 2, None);
         let problem = &mut self.problem;
         for (k, &i) in self.at_rest.iter().enumerate() {
             let limit = mechanics.parts[i].static_limit();
@@ -300,23 +306,23 @@ impl Transition {
             self.acceleration.axpy(-lambda, &self.response.column(i), 1.0);
         }
         if !self.undecided.is_empty() {
-            self.settle_derivatives(mechanics, drive, time, state);
+            self.settle_derivatives(mechanics, excitation, time, state);
         }
         true
     }
 
     /// Returns the magnitude of the terms of accelerations, for all parts together.
-    fn terms<'a>(&self, mechanics: &'a Mechanics, drive: &HarmonicExcitation) -> AccelerationScale<'a> {
+    fn terms<'a>(&self, mechanics: &'a Mechanics, excitation: &HarmonicExcitation) -> AccelerationScale<'a> {
         let limit = mechanics.parts.iter().filter(|p| p.is_slider()).map(JointPart::static_limit).fold(0.0, f64::max);
-        let imposed = drive
+        let imposed = excitation
             .rates
             .iter()
-            .zip(&drive.imposed)
+            .zip(&excitation.imposed)
             .map(|(rate, g)| rate * rate * g.iter().map(|g| g.norm()).fold(0.0, f64::max));
         AccelerationScale {
             force: self.pushed + limit,
             imposed: imposed.sum(),
-            omega: drive.omega,
+            omega: excitation.omega,
             fastest: &mechanics.fastest_along,
         }
     }
@@ -329,7 +335,7 @@ impl Transition {
     fn set_up_problem(
         &mut self,
         mechanics: &Mechanics,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         time: f64,
         order: u32,
         derivative: Option<usize>,
@@ -341,7 +347,7 @@ impl Transition {
             for (b, &j) in self.at_rest.iter().enumerate() {
                 problem.delassus[(a, b)] = self.delassus[(i, j)];
             }
-            problem.push[a] = mechanics.parts[i].direction.dot(motion) + drive.imposed_at(i, time, order);
+            problem.push[a] = mechanics.parts[i].direction.dot(motion) + excitation.imposed_at(i, time, order);
         }
     }
 
@@ -354,15 +360,15 @@ impl Transition {
 
     /// Decides on sliders exactly at their limit with zero acceleration. `undecided` contains
     /// them with the sign of their force.
-    fn settle_derivatives(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, state: &[f64]) {
+    fn settle_derivatives(&mut self, mechanics: &Mechanics, excitation: &HarmonicExcitation, time: f64, state: &[f64]) {
         self.begin_derivatives(mechanics.n, state);
-        let terms = self.terms(mechanics, drive);
+        let terms = self.terms(mechanics, excitation);
         for level in 1..MAX_DERIVATIVES {
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
-            self.free_derivative(mechanics, drive, time, level);
+            self.free_derivative(mechanics, excitation, time, level);
             let next = level as usize + 2;
             multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
-            self.set_up_problem(mechanics, drive, time, level + 2, Some(next));
+            self.set_up_problem(mechanics, excitation, time, level + 2, Some(next));
             let problem = &mut self.problem;
             for (k, i) in self.at_rest.iter().enumerate() {
                 // a force at its limit can only decrease
@@ -394,15 +400,15 @@ impl Transition {
 
     /// Computes the `level`-th derivative of all forces except those of rigid sliders at zero
     /// velocity, in `self.free`.
-    fn free_derivative(&mut self, mechanics: &Mechanics, drive: &HarmonicExcitation, time: f64, level: u32) {
+    fn free_derivative(&mut self, mechanics: &Mechanics, excitation: &HarmonicExcitation, time: f64, level: u32) {
         let (l, derivatives) = (level as usize, &self.derivatives);
         self.free.fill(0.0);
-        drive.add_force(time, level, &mut self.free);
+        excitation.add_force(time, level, &mut self.free);
         subtract_product(&mechanics.damping, derivatives[l + 1].as_slice(), &mut self.free);
         subtract_product(&mechanics.stiffness, derivatives[l].as_slice(), &mut self.free);
         for (i, part) in mechanics.parts.iter().enumerate() {
             if let (Some(kt), Contact::Stick) = (part.stiffness(), self.contacts[i]) {
-                let force = kt * (part.direction.dot(&derivatives[l]) + drive.imposed_at(i, time, level));
+                let force = kt * (part.direction.dot(&derivatives[l]) + excitation.imposed_at(i, time, level));
                 self.free.axpy(-force, &part.direction, 1.0);
             }
         }
@@ -413,7 +419,7 @@ impl Transition {
     fn decide_springs(
         &mut self,
         mechanics: &Mechanics,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         time: f64,
         state: &[f64],
         velocity_scale: f64,
@@ -423,7 +429,7 @@ impl Transition {
         let mut undecided: Vec<(usize, f64)> = (0..mechanics.parts.len())
             .filter_map(|i| {
                 let part = &mechanics.parts[i];
-                let velocity = part.along(&state[n..2 * n]) + drive.imposed_at(i, time, 1);
+                let velocity = part.along(&state[n..2 * n]) + excitation.imposed_at(i, time, 1);
                 let (at_border, sign) = match part.kind {
                     PartKind::Rigid { .. } => return None,
                     PartKind::Elastic { limit, state: s, .. } => {
@@ -431,21 +437,22 @@ impl Transition {
                         (force.abs() >= limit * (1.0 - AT_LIMIT), force.signum())
                     }
                     PartKind::Stop { gap, .. } => {
-                        let depth = part.along(&state[..n]) + drive.imposed_at(i, time, 0) - gap;
-                        (depth.abs() <= mechanics.contact_tolerance(part, drive.omega, velocity_scale), 1.0)
+                        let depth = part.along(&state[..n]) + excitation.imposed_at(i, time, 0) - gap;
+                        (depth.abs() <= mechanics.contact_tolerance(part, excitation.omega, velocity_scale), 1.0)
                     }
                 };
                 (at_border && velocity.abs() <= still).then_some((i, sign))
             })
             .collect();
         self.begin_derivatives(n, state);
-        let terms = self.terms(mechanics, drive);
+        let terms = self.terms(mechanics, excitation);
         for level in 1..=MAX_DERIVATIVES {
             let order = level + 1;
             undecided.retain(|&(i, sign)| {
                 let size = terms.size(i, &self.response, order);
                 let part = &mechanics.parts[i];
-                let slope = part.direction.dot(&self.derivatives[order as usize]) + drive.imposed_at(i, time, order);
+                let slope =
+                    part.direction.dot(&self.derivatives[order as usize]) + excitation.imposed_at(i, time, order);
                 if slope.abs() <= ZERO_ACCELERATION * size {
                     return true;
                 }
@@ -460,11 +467,11 @@ impl Transition {
             // the next derivative with the present contacts: rigid sliders at zero velocity
             // stick
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
-            self.free_derivative(mechanics, drive, time, level);
+            self.free_derivative(mechanics, excitation, time, level);
             let next = level as usize + 2;
             multiply(&mechanics.inverse_mass, &self.free, &mut self.derivatives[next]);
             if !self.at_rest.is_empty() {
-                self.set_up_problem(mechanics, drive, time, level + 2, Some(next));
+                self.set_up_problem(mechanics, excitation, time, level + 2, Some(next));
                 self.problem.low.fill(f64::NEG_INFINITY);
                 self.problem.high.fill(f64::INFINITY);
                 if !self.problem.solve() {
@@ -521,9 +528,9 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = HarmonicExcitation::new(&system, &mechanics.part_joints(), 1.0);
+        let excitation = HarmonicExcitation::new(&system, &mechanics.part_joints(), 1.0);
         let mut decision = Transition::new(&mechanics);
-        assert!(decision.determine(&mechanics, &drive, 0.0, &[0.0; 4], 1.0));
+        assert!(decision.determine(&mechanics, &excitation, 0.0, &[0.0; 4], 1.0));
         (decision.contacts.clone(), [decision.acceleration[0], decision.acceleration[1]])
     }
 

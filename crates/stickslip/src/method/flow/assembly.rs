@@ -138,30 +138,30 @@ impl Assembly {
     }
 
     /// Returns the relative displacement and velocity along an axis.
-    pub fn relative(&self, axis: usize, state: &[f64], drive: &HarmonicExcitation, time: f64) -> (f64, f64) {
-        let (g, speed) = drive.relative_at(axis, time);
+    pub fn relative(&self, axis: usize, state: &[f64], excitation: &HarmonicExcitation, time: f64) -> (f64, f64) {
+        let (g, speed) = excitation.relative_at(axis, time);
         let (x, v) = state.split_at(self.n);
         (self.axes[axis].component(x) + g, self.axes[axis].component(v) + speed)
     }
 
-    /// Computes the acceleration (length n) of a state under loads and joint forces. `left`
+    /// Computes the acceleration (length n) of a state under loads and joint forces. `net_force`
     /// enters as the loads and leaves as the resulting forces on the masses.
-    pub fn accelerate(&self, state: &[f64], left: &mut [f64], force: &[f64], out: &mut [f64]) {
+    pub fn accelerate(&self, state: &[f64], net_force: &mut [f64], force: &[f64], out: &mut [f64]) {
         let n = self.n;
         let (x, v) = state.split_at(n);
         let Matrices { stiffness, damping, .. } = &*self.matrices;
         for i in 0..n {
             for k in 0..n {
-                left[i] -= stiffness[(i, k)] * x[k] + damping[(i, k)] * v[k];
+                net_force[i] -= stiffness[(i, k)] * x[k] + damping[(i, k)] * v[k];
             }
         }
         for (axis, force) in self.axes.iter().zip(force) {
             for &(i, w) in axis.rows() {
-                left[i] -= w * force;
+                net_force[i] -= w * force;
             }
         }
         for i in 0..n {
-            out[i] = (0..n).map(|k| self.inverse_mass[(i, k)] * left[k]).sum();
+            out[i] = (0..n).map(|k| self.inverse_mass[(i, k)] * net_force[k]).sum();
         }
     }
 
@@ -173,22 +173,22 @@ impl Assembly {
 
     /// Returns the excitation at `omega` (rad/s) along the axes; at zero, only the constant
     /// forces.
-    pub fn drive(&self, system: &System, omega: f64) -> HarmonicExcitation {
+    pub fn excitation(&self, system: &System, omega: f64) -> HarmonicExcitation {
         let axes: Vec<usize> = (0..self.axes.len()).collect();
         HarmonicExcitation::at(system, &axes, omega)
     }
 
     /// Returns the square root of an energy that the loads can supply, √J.
-    pub fn energy_scale(&self, drive: &HarmonicExcitation) -> f64 {
-        drive.energy_scale(&self.mass, &self.stiffness)
+    pub fn energy_scale(&self, excitation: &HarmonicExcitation) -> f64 {
+        excitation.energy_scale(&self.mass, &self.stiffness)
     }
 
     /// Returns the weights of the energy norm.
     ///
     /// A displacement is weighted by the larger of its stiffness and its inertia, an internal
     /// state by the scale of the motion.
-    pub fn weights(&self, drive: &HarmonicExcitation) -> Vec<f64> {
-        let (n, omega, rest) = (self.n, drive.omega, NEAR_REST * self.energy_scale(drive));
+    pub fn weights(&self, excitation: &HarmonicExcitation) -> Vec<f64> {
+        let (n, omega, rest) = (self.n, excitation.omega, NEAR_REST * self.energy_scale(excitation));
         let mut weights = vec![1.0; self.states()];
         for i in 0..n {
             let inertia = omega * omega * self.mass[(i, i)];
@@ -204,16 +204,16 @@ impl Assembly {
 
     /// Returns the scales of displacement and velocity for error norms. They cover the state,
     /// the imposed motion and the response to the loads.
-    pub fn scales(&self, state: &[f64], drive: &HarmonicExcitation) -> (f64, f64) {
+    pub fn scales(&self, state: &[f64], excitation: &HarmonicExcitation) -> (f64, f64) {
         let n = self.n;
         let natural = (0..n).map(|i| (self.stiffness[(i, i)] / self.mass[(i, i)]).sqrt());
         // without excitation, the structure's natural frequencies set the time scale
-        let rate = if drive.omega > 0.0 { drive.omega } else { natural.fold(f64::MIN_POSITIVE, f64::max) };
+        let rate = if excitation.omega > 0.0 { excitation.omega } else { natural.fold(f64::MIN_POSITIVE, f64::max) };
         let x = state[..n].iter().fold(0.0f64, |a, x| a.max(x.abs()));
         let v = state[n..2 * n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         let mobility = if n == 0 { 0.0 } else { self.inverse_mass.amax().sqrt() };
-        let loads = self.energy_scale(drive) * mobility;
-        let velocity = v.max(x * rate).max(drive.imposed_velocity()).max(NEAR_REST * loads).max(f64::MIN_POSITIVE);
+        let loads = self.energy_scale(excitation) * mobility;
+        let velocity = v.max(x * rate).max(excitation.imposed_velocity()).max(NEAR_REST * loads).max(f64::MIN_POSITIVE);
         (velocity / rate, velocity)
     }
 }

@@ -26,10 +26,10 @@ impl Flow for ExactFlow {
     }
     fn set_excitation(&mut self, system: &System, omega: f64) {
         let owners = self.segments.mechanics.part_joints();
-        self.segments.set_drive(HarmonicExcitation::at(system, &owners, omega));
+        self.segments.set_excitation(HarmonicExcitation::at(system, &owners, omega));
     }
     fn weights(&self) -> Vec<f64> {
-        self.segments.mechanics.weights(self.segments.drive.omega)
+        self.segments.mechanics.weights(self.segments.excitation.omega)
     }
     fn energy_scale(&self) -> f64 {
         self.segments.energy_scale

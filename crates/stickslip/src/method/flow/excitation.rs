@@ -59,11 +59,11 @@ impl HarmonicExcitation {
 
     /// Collects the constant forces alone.
     fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
-        let mut drive = HarmonicExcitation::new(system, contacts, 0.0);
-        drive.rates.clear();
-        drive.forces.clear();
-        drive.imposed.clear();
-        drive
+        let mut excitation = HarmonicExcitation::new(system, contacts, 0.0);
+        excitation.rates.clear();
+        excitation.forces.clear();
+        excitation.imposed.clear();
+        excitation
     }
 
     /// Returns the excitation with all harmonics multiplied by `share`; the constant parts stay.

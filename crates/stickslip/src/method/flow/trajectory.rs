@@ -22,7 +22,7 @@ const BISECTIONS: usize = 20;
 pub(crate) struct Trajectory {
     steps: StepRecord,
     assembly: Assembly,
-    drive: HarmonicExcitation,
+    excitation: HarmonicExcitation,
     system: Arc<System>,
     symmetry: Symmetry,
     period: f64,
@@ -32,14 +32,14 @@ impl Trajectory {
     /// Makes the path of a recorded run that repeats after `period`.
     pub fn new(
         (system, assembly): (&Arc<System>, &Assembly),
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         steps: &StepRecord,
         (symmetry, period): (Symmetry, f64),
     ) -> Self {
         Trajectory {
             steps: steps.clone(),
             assembly: assembly.clone(),
-            drive: drive.clone(),
+            excitation: excitation.clone(),
             system: system.clone(),
             symmetry,
             period,
@@ -57,9 +57,9 @@ impl Trajectory {
     fn relative_ends(&self, step: usize, axis: usize) -> [[f64; 3]; 2] {
         let (start, length) = self.steps.spans[step];
         let end = |instant: RecordedInstant, time: f64| {
-            let (g, speed) = self.drive.relative_at(axis, time);
+            let (g, speed) = self.excitation.relative_at(axis, time);
             let along = &self.assembly.axes[axis];
-            let acceleration = along.component(instant.acceleration) + self.drive.imposed_at(axis, time, 2);
+            let acceleration = along.component(instant.acceleration) + self.excitation.imposed_at(axis, time, 2);
             [along.component(instant.displacement) + g, along.component(instant.velocity) + speed, acceleration]
         };
         let [from, to] = self.steps.ends(step);
@@ -161,7 +161,8 @@ impl Trajectory {
         let sample = |(q, joint): (usize, &IndexedLaw)| {
             let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
+                (motion.displacement[d], motion.velocity[d]) =
+                    self.assembly.relative(axis, state, &self.excitation, time);
             }
             let mut force = self.forces(joint, (step, s), &motion);
             for values in [&mut motion.displacement, &mut motion.velocity, &mut force] {
@@ -203,7 +204,7 @@ impl Path for Trajectory {
             .flat_map(|(sample, joint)| sample.force[..joint.directions].iter().map(|f| sign * f))
             .collect();
         let (x, v) = state.split_at(n);
-        let moved = reactions(&self.system, self.drive.omega, time, [x, v, &acceleration, &forces]);
+        let moved = reactions(&self.system, self.excitation.omega, time, [x, v, &acceleration, &forces]);
         let signed = |values: &[f64]| values.iter().map(|value| sign * value).collect();
         Sample {
             displacement: signed(x),

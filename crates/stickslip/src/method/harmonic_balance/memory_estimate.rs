@@ -39,10 +39,10 @@ pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usi
 /// It includes the Jacobians of the ports, the receptances and the preconditioners. With
 /// uncoupled modes it includes the modes along the axes and their factor instead. `always`
 /// states that the Jacobian is always a matrix; otherwise it is counted if its size allows one.
-pub(super) fn unbanded_memory(ports: &Ports, rest: &LinearDynamics, harmonics: usize, always: bool) -> f64 {
+pub(super) fn unbanded_memory(ports: &Ports, dynamics: &LinearDynamics, harmonics: usize, always: bool) -> f64 {
     let (axes, pair) = (ports.count() as f64, 2.0 * harmonics as f64);
     let size = pair * axes;
-    let structure = match rest.modes_for(ports).filter(|_| !always) {
+    let structure = match dynamics.modes_for(ports).filter(|_| !always) {
         Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
         None => {
             // the matrices; their copies for products and for the longer series, if they stay
@@ -66,12 +66,12 @@ pub(super) fn unbanded_memory(ports: &Ports, rest: &LinearDynamics, harmonics: u
 pub(super) fn level_memory(
     banded: Option<&BandedForm>,
     ports: &Ports,
-    rest: &LinearDynamics,
+    dynamics: &LinearDynamics,
     (harmonics, samples): (usize, usize),
 ) -> f64 {
     let equations = match banded {
         Some(banded) => jacobian_memory(ports, harmonics) + banded.memory(harmonics),
-        None => unbanded_memory(ports, rest, harmonics, false),
+        None => unbanded_memory(ports, dynamics, harmonics, false),
     };
     equations + time_stepping_memory(ports, harmonics, samples)
 }
@@ -124,20 +124,20 @@ mod tests {
         for (joints, law) in [(20, &plane), (70, &plane), (30, &rigid)] {
             let system = row(joints, law);
             let ports = Ports::new(&system).unwrap();
-            let rest = LinearDynamics::new(&system, &ports);
+            let dynamics = LinearDynamics::new(&system, &ports);
             let harmonics = [1, 3, 5, 7, 9, 11, 13];
-            let mut level = Discretization::new(harmonics.to_vec(), 128, &ports, None);
-            level.set_frequency(&system, &ports, &rest, 0.9).unwrap();
-            let start = level.initial_guess(&system, &ports, None, 0.9);
-            level.solve(&ports, 0.9, start).unwrap();
-            let Receptance::Formed(formed) = &level.receptance else { panic!("receptances are matrices") };
-            let coupled = level.newton_krylov.as_ref().expect("by products");
+            let mut discretization = Discretization::new(harmonics.to_vec(), 128, &ports, None);
+            discretization.set_frequency(&system, &ports, &dynamics, 0.9).unwrap();
+            let start = discretization.initial_guess(&system, &ports, None, 0.9);
+            discretization.solve(&ports, 0.9, start).unwrap();
+            let Receptance::Formed(formed) = &discretization.receptance else { panic!("receptances are matrices") };
+            let coupled = discretization.newton_krylov.as_ref().expect("by products");
             assert!(coupled.bytes() > 0, "{joints}: none is kept");
-            let kept = formed.bytes() + rest.bytes() + coupled.bytes() + size_of_val(&level.tangents[..]);
+            let kept = formed.bytes() + dynamics.bytes() + coupled.bytes() + size_of_val(&discretization.tangents[..]);
             // the estimate also counts a matrix that may be formed
-            let size = level.residual.len() as f64;
+            let size = discretization.residual.len() as f64;
             let formed = if size <= super::newton_krylov::FORMED_UNKNOWNS as f64 { 8.0 * size * size } else { 0.0 };
-            let counted = unbanded_memory(&ports, &rest, harmonics.len(), false) - formed;
+            let counted = unbanded_memory(&ports, &dynamics, harmonics.len(), false) - formed;
             assert!((1.0..1.5).contains(&(counted / kept as f64)), "{joints}: {counted:.1e} of {kept:.1e}");
         }
     }

@@ -139,23 +139,23 @@ impl Discretization {
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
-        ease: Homotopy,
+        homotopy: Homotopy,
         (most, goal): (usize, StopCriterion),
     ) -> Result<(), SolveError> {
         if !self.uses_coarse || self.coarse.is_none() {
-            return self.search(ports, omega, motion, ease, (most, goal));
+            return self.search(ports, omega, motion, homotopy, (most, goal));
         }
         let start = motion.clone();
         let taken = (self.evaluations, self.eliminations, self.products);
         self.exchange_samples();
-        let rough = self.search(ports, omega, motion, ease, (most, StopCriterion::Rough(self.coarse_tolerance())));
+        let rough = self.search(ports, omega, motion, homotopy, (most, StopCriterion::Rough(self.coarse_tolerance())));
         if rough.is_ok() {
             // the periodic state is known on these samples
-            self.complete_derivatives(ports, omega, motion, (ease, false));
+            self.complete_derivatives(ports, omega, motion, (homotopy, false));
             self.keeps_tangents = true;
         }
         self.exchange_samples();
-        if rough.is_ok() && self.search(ports, omega, motion, ease, (most, goal)).is_ok() {
+        if rough.is_ok() && self.search(ports, omega, motion, homotopy, (most, goal)).is_ok() {
             return Ok(());
         }
         // this retry happens once per search and gets the full work limit again
@@ -164,7 +164,7 @@ impl Discretization {
         self.work_before.multiplications += before - self.work_used(ports).multiplications;
         self.uses_coarse = false;
         *motion = HarmonicSolution { iterations: motion.iterations, ..start };
-        self.search(ports, omega, motion, ease, (most, goal))
+        self.search(ports, omega, motion, homotopy, (most, goal))
     }
 
     /// Returns the residual at which a search on coarse samples ends, see [`COARSE_TOLERANCE`].
@@ -182,13 +182,13 @@ impl Discretization {
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
-        ease: Homotopy,
+        homotopy: Homotopy,
         (most, goal): (usize, StopCriterion),
     ) -> Result<(), SolveError> {
         let rough = matches!(goal, StopCriterion::Rough(_));
         let mut length = self.motion_scale(motion);
         self.reuses_states = self.uses_coarse;
-        let mut residual = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap);
+        let mut residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
         let solved = match goal {
             StopCriterion::Solved => RESIDUAL_TOLERANCE,
             StopCriterion::Rough(solved) => solved,
@@ -200,25 +200,25 @@ impl Discretization {
         let mut recent = [residual; NONMONOTONE_MEMORY];
         let mut least = f64::INFINITY;
         // residual that must be halved, and iterations since it was set
-        let (mut mark, mut waited) = (residual, 0);
+        let (mut to_halve, mut stagnating) = (residual, 0);
         // the proximal point method finds forces that do not settle
-        let hope = if ports.has_forces() { STAGNATION_ITERATIONS } else { most };
+        let most_stagnating = if ports.has_forces() { STAGNATION_ITERATIONS } else { most };
         for _ in 0..most {
             interrupt::check();
-            let found = residual <= solved || (waited > STAGNATION_ITERATIONS && least <= STAGNATION_TOLERANCE);
-            if found || self.is_budget_used(ports) || (waited > hope && least < f64::INFINITY) {
+            let found = residual <= solved || (stagnating > STAGNATION_ITERATIONS && least <= STAGNATION_TOLERANCE);
+            if found || self.is_budget_used(ports) || (stagnating > most_stagnating && least < f64::INFINITY) {
                 break;
             }
             if !kept {
-                rough_slopes = self.complete_derivatives(ports, omega, motion, (ease, sketched));
+                rough_slopes = self.complete_derivatives(ports, omega, motion, (homotopy, sketched));
             }
             let near = StepStart { length, residual, coarse: rough_slopes || rough, same_derivatives: kept };
             self.previous.copy_from(motion);
-            if !self.regularized_step(ports, (omega, ease), motion, near) {
+            if !self.regularized_step(ports, (omega, homotopy), motion, near) {
                 break;
             }
             motion.iterations += 1;
-            let beaten = if rough { recent.iter().fold(residual, |most, r| most.max(*r)) } else { residual };
+            let reference = if rough { recent.iter().fold(residual, |most, r| most.max(*r)) } else { residual };
             let mut fraction = 1.0;
             let mut after = f64::INFINITY;
             let settles = self.can_eliminate(ports);
@@ -227,13 +227,15 @@ impl Discretization {
                     fraction = 1.0;
                 }
                 self.apply_step(ports, motion, fraction, length);
-                after = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap);
-                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * beaten || self.is_budget_used(ports) {
+                after = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
+                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * reference || self.is_budget_used(ports) {
                     break;
                 }
                 if settles && halving == 0 && after.is_finite() {
                     // the step may be right for most contacts; solve for the others separately
-                    if let Some(settled) = self.eliminate_nonlinear(ports, (omega, ease), motion, (length, beaten)) {
+                    if let Some(settled) =
+                        self.eliminate_nonlinear(ports, (omega, homotopy), motion, (length, reference))
+                    {
                         after = settled;
                         break;
                     }
@@ -251,12 +253,12 @@ impl Discretization {
                 least = residual;
                 self.best.copy_from(motion);
             }
-            (mark, waited) = if least < 0.5 * mark { (least, 0) } else { (mark, waited + 1) };
+            (to_halve, stagnating) = if least < 0.5 * to_halve { (least, 0) } else { (to_halve, stagnating + 1) };
             let now = self.motion_scale(motion);
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from its initial guess; rescale with its own size
                 length = now;
-                residual = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap);
+                residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
                 recent = [residual; NONMONOTONE_MEMORY];
                 least = f64::INFINITY;
             }
@@ -266,12 +268,12 @@ impl Discretization {
             motion.c.clone_from(&self.best.c);
             motion.force.clone_from(&self.best.force);
             motion.iterations = iterations;
-            residual = self.evaluate(ports, omega, motion, ease, length, DerivativeScope::None);
+            residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::None);
         }
         self.reuses_states = false;
         self.keeps_tangents = false;
         motion.residual = residual;
-        if residual <= solved || (waited > STAGNATION_ITERATIONS && residual <= STAGNATION_TOLERANCE) {
+        if residual <= solved || (stagnating > STAGNATION_ITERATIONS && residual <= STAGNATION_TOLERANCE) {
             Ok(())
         } else {
             Err(SolveError {
@@ -291,11 +293,11 @@ impl Discretization {
     fn regularized_step(
         &mut self,
         ports: &Ports,
-        (omega, ease): (f64, Homotopy),
+        (omega, homotopy): (f64, Homotopy),
         motion: &mut HarmonicSolution,
         at: StepStart,
     ) -> bool {
-        if !self.newton_step(ports, omega, ease, at) {
+        if !self.newton_step(ports, omega, homotopy, at) {
             return false;
         }
         let extent = self.extent(motion);
@@ -309,17 +311,17 @@ impl Discretization {
                 // restore the residual at the start of the step; evaluations without
                 // derivatives keep the tangents
                 motion.copy_from(&self.previous);
-                self.evaluate(ports, omega, motion, ease, at.length, DerivativeScope::None);
+                self.evaluate(ports, omega, motion, homotopy, at.length, DerivativeScope::None);
                 for (p, port) in ports.iter().enumerate() {
                     self.add_springs(p, port, share - held);
                 }
                 held = share;
-                if !self.newton_step(ports, omega, ease, StepStart { same_derivatives: false, ..at }) {
+                if !self.newton_step(ports, omega, homotopy, StepStart { same_derivatives: false, ..at }) {
                     break;
                 }
             }
             self.apply_step(ports, motion, 1.0, at.length);
-            let after = self.evaluate(ports, omega, motion, ease, at.length, DerivativeScope::None);
+            let after = self.evaluate(ports, omega, motion, homotopy, at.length, DerivativeScope::None);
             // a step that moves the mean far must lead almost to the solution
             let near =
                 self.mean_change(ports, at.length) <= LEFT_CONTACTS * extent || after <= NEAR_SOLUTION * at.residual;
@@ -368,7 +370,7 @@ impl Discretization {
         };
         let evaluated = (self.all_samples() * self.evaluations) as f64 * ports.iter().map(of_port).sum::<f64>();
         let (taken, one, fewest) = match self.banded {
-            Some(ref sparse) => (self.eliminations, sparse.work(self.harmonics().len()), LEAST_ELIMINATIONS),
+            Some(ref banded) => (self.eliminations, banded.work(self.harmonics().len()), LEAST_ELIMINATIONS),
             // GMRES counts its products; the line search takes none
             None if self.newton_krylov.is_some() => {
                 (self.products, product_work(ports, self.harmonics().len()), LEAST_ELIMINATIONS * PRODUCTS_PER_STEP)
@@ -400,15 +402,15 @@ impl Discretization {
     }
 
     /// Solves for the Newton step into `self.step`, in units of the unknowns.
-    pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
+    pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
         self.eliminations += 1;
-        if let Some(sparse) = &mut self.banded {
-            let along = StepParameters { penalty: &self.penalty, homotopy: ease };
-            if !sparse.linearise(ports, &along, &self.tangents) {
+        if let Some(banded) = &mut self.banded {
+            let along = StepParameters { penalty: &self.penalty, homotopy: homotopy };
+            if !banded.linearise(ports, &along, &self.tangents) {
                 return false;
             }
         }
-        self.newton_step_same_jacobian(ports, omega, ease, near)
+        self.newton_step_same_jacobian(ports, omega, homotopy, near)
     }
 
     /// Solves for the step of another residual with the Jacobian of the last step. The banded
@@ -417,14 +419,14 @@ impl Discretization {
         &mut self,
         ports: &Ports,
         omega: f64,
-        ease: Homotopy,
+        homotopy: Homotopy,
         near: StepStart,
     ) -> bool {
         let pair = 2 * self.harmonics().len();
         self.step.copy_from_slice(&self.residual);
         match &mut self.banded {
-            Some(sparse) => {
-                if !sparse.step(ports, &self.tangents, &mut self.step) {
+            Some(banded) => {
+                if !banded.step(ports, &self.tangents, &mut self.step) {
                     return false;
                 }
                 for port in ports.iter() {
@@ -437,14 +439,15 @@ impl Discretization {
                 for (d, unit) in self.step.iter_mut().zip(&self.units) {
                     *d /= unit;
                 }
-                if self.newton_krylov.is_some() && self.krylov_step(ports, omega, ease, near) {
+                if self.newton_krylov.is_some() && self.krylov_step(ports, omega, homotopy, near) {
                     return true;
                 }
                 let size = self.step.len();
                 if self.newton_krylov.is_some() && size > FORMED_UNKNOWNS {
                     return false;
                 }
-                self.assemble(ports, omega, ease, near.length) && dense::solve(&mut self.jacobian, size, &mut self.step)
+                self.assemble(ports, omega, homotopy, near.length)
+                    && dense::solve(&mut self.jacobian, size, &mut self.step)
             }
         }
     }
@@ -531,7 +534,7 @@ impl Discretization {
             motion = HarmonicSolution { iterations: motion.iterations, ..start };
             match self.proximal_point_method(ports, omega, &mut motion) {
                 Ok(()) => return Ok(HarmonicSolution { found_by: FoundBy::ProximalPoints, ..motion }),
-                Err(lost) => nearest = lost.residual,
+                Err(error) => nearest = error.residual,
             }
         }
         let away = self.left_contacts(&motion);
@@ -542,10 +545,10 @@ impl Discretization {
             Ok(()) => {
                 Err(SolveError { left_contacts: true, ..SolveError::not_converged(motion.iterations, motion.residual) })
             }
-            Err(lost) => Err(SolveError {
-                left_contacts: away || lost.left_contacts,
-                residual: lost.residual.min(nearest),
-                ..lost
+            Err(error) => Err(SolveError {
+                left_contacts: away || error.left_contacts,
+                residual: error.residual.min(nearest),
+                ..error
             }),
         }
     }
@@ -560,7 +563,7 @@ impl Discretization {
         let mut good = HarmonicSolution { iterations: motion.iterations, ..self.frictionless_motion() };
         let mut limits: f64 = 1.0;
         // with all joints stuck, the equations are linear
-        let mut held = Err(SolveError::not_converged(good.iterations, f64::INFINITY));
+        let mut raised = Err(SolveError::not_converged(good.iterations, f64::INFINITY));
         for attempt in 0..60 {
             limits *= 4.0;
             if attempt == 1 {
@@ -574,18 +577,18 @@ impl Discretization {
                 false => HarmonicSolution { iterations, ..self.frictionless_motion() },
             };
             let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { ITERATIONS };
-            held = self.newton(
+            raised = self.newton(
                 ports,
                 omega,
                 &mut good,
                 Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS },
                 (most, StopCriterion::Solved),
             );
-            if held.is_ok() || self.is_budget_used(ports) || good.iterations - motion.iterations > MOST_RAISING {
+            if raised.is_ok() || self.is_budget_used(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;
             }
         }
-        held?;
+        raised?;
         let mut factor: f64 = 0.5;
         while limits > 1.0 {
             motion.copy_from(&good);
@@ -603,10 +606,10 @@ impl Discretization {
                     good.copy_from(motion);
                     limits = next;
                 }
-                Err(lost) => {
+                Err(error) => {
                     factor = factor.sqrt();
                     if factor > 0.995 || self.is_budget_used(ports) || good.iterations > MOST_ITERATIONS {
-                        return Err(lost);
+                        return Err(error);
                     }
                 }
             }

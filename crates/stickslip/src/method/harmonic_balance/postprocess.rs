@@ -25,29 +25,30 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// # Errors
 /// A resonance without damping, rad/s.
 pub(super) fn places(
-    level: &mut Discretization,
-    rest: &LinearDynamics,
+    discretization: &mut Discretization,
+    dynamics: &LinearDynamics,
     omega: f64,
     motion: &HarmonicSolution,
 ) -> Result<Vec<DVector<Complex64>>, f64> {
-    let nh = level.harmonics().len();
-    let acting = level.structure_forces(motion).to_vec();
+    let nh = discretization.harmonics().len();
+    let acting = discretization.structure_forces(motion).to_vec();
     (0..nh)
         .map(|k| {
-            let h = level.harmonics()[k];
+            let h = discretization.harmonics()[k];
             let along = |q: usize| acting[q * nh + k];
-            let Some(sparse) = &mut level.banded else {
+            let Some(banded) = &mut discretization.banded else {
                 let singular = |_| h as f64 * omega;
-                let mut x = &level.free_response[k] - rest.respond_along(h, omega, along).map_err(singular)?;
+                let mut x =
+                    &discretization.free_response[k] - dynamics.respond_along(h, omega, along).map_err(singular)?;
                 if h == 0 {
-                    rest.correct_mean(omega, &mut x, |q| level.mean(q, motion)).map_err(singular)?;
+                    dynamics.correct_mean(omega, &mut x, |q| discretization.mean(q, motion)).map_err(singular)?;
                 }
                 return Ok(x);
             };
-            let forces = rest.force_on_places(h, along);
-            let mut x = level.free_response[k].clone();
+            let forces = dynamics.force_on_places(h, along);
+            let mut x = discretization.free_response[k].clone();
             let mut moved = x.clone();
-            sparse.respond(k, |i| forces[i], moved.as_mut_slice());
+            banded.respond(k, |i| forces[i], moved.as_mut_slice());
             x -= moved;
             Ok(x)
         })
@@ -64,12 +65,12 @@ const ROUNDING: f64 = 1e3;
 /// directions.
 pub(super) fn mean_forces_balance(
     setting: &OrbitInput,
-    level: &Discretization,
+    discretization: &Discretization,
     motion: &HarmonicSolution,
     x: &[DVector<Complex64>],
 ) -> bool {
-    let (system, nh) = (setting.system, level.harmonics().len());
-    if level.harmonics()[0] != 0 {
+    let (system, nh) = (setting.system, discretization.harmonics().len());
+    if discretization.harmonics()[0] != 0 {
         return true;
     }
     let excitation = system.excitation(setting.omega);
@@ -125,25 +126,25 @@ pub(super) struct OrbitInput<'a> {
     pub truncation: Option<f64>,
     /// Tolerance of the truncation error.
     pub tolerance: f64,
-    pub judge: Option<&'a mut OrbitCheck>,
+    pub orbit_check: Option<&'a mut OrbitCheck>,
 }
 
 /// Makes the orbit of a solution. Returns `None` if its mean forces do not balance.
 pub(super) fn orbit(
     setting: OrbitInput,
-    level: &mut Discretization,
+    discretization: &mut Discretization,
     motion: &HarmonicSolution,
     x: Vec<DVector<Complex64>>,
 ) -> Option<Orbit> {
     if let (Some(wave), Some(ports)) = (setting.ports.wave(), setting.ring_ports) {
-        let (mut level, motion) = level.over_ring(wave, ports, motion);
-        return orbit(OrbitInput { ports, ring_ports: None, ..setting }, &mut level, &motion, x);
+        let (mut discretization, motion) = discretization.over_ring(wave, ports, motion);
+        return orbit(OrbitInput { ports, ring_ports: None, ..setting }, &mut discretization, &motion, x);
     }
-    if !mean_forces_balance(&setting, level, motion, &x) {
+    if !mean_forces_balance(&setting, discretization, motion, &x) {
         return None;
     }
-    let harmonics = level.harmonics().to_vec();
-    let JointSamples { force, contact, states } = sample_joints(&setting, level, motion, &x);
+    let harmonics = discretization.harmonics().to_vec();
+    let JointSamples { force, contact, states } = sample_joints(&setting, discretization, motion, &x);
     let OrbitInput {
         system,
         ports,
@@ -152,7 +153,7 @@ pub(super) fn orbit(
         half_period: odd,
         truncation,
         tolerance,
-        judge,
+        orbit_check,
         ring_ports: _,
     } = setting;
     let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };
@@ -166,7 +167,7 @@ pub(super) fn orbit(
         contact: &contact,
         omega,
         returns_per_period: if odd { 2 } else { 1 },
-        level: RefCell::new(level),
+        discretization: RefCell::new(discretization),
     };
     let Ok(mut measured) = results(system, &measuring, omega, (symmetry, period));
     for (place, axis) in measured.places.iter_mut().zip(system.place_axes()) {
@@ -176,11 +177,11 @@ pub(super) fn orbit(
     let mut start: Vec<f64> = (0..n).map(|i| x.iter().map(|x| x[i].re).sum()).collect();
     start.extend((0..n).map(|i| x.iter().zip(&harmonics).map(|(x, &h)| -x[i].im * h as f64 * omega).sum::<f64>()));
     start.extend(states);
-    let contracts = judge.as_ref().is_some_and(|judge| judge.proves());
+    let contracts = orbit_check.as_ref().is_some_and(|orbit_check| orbit_check.proves());
     let top = harmonics.last().copied();
     let path = FourierPath { system: system.clone(), omega, harmonics, x, force, contact };
-    let ReturnEvidence { derivative, defect } = judge.map_or_else(ReturnEvidence::default, |judge| {
-        judge.judge(system, omega, (&path, symmetry), &start, &path.stuck())
+    let ReturnEvidence { derivative, defect } = orbit_check.map_or_else(ReturnEvidence::default, |orbit_check| {
+        orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck())
     });
     // Where a normal force changes the slip limit, or vanishes, a series with twice the harmonics
     // may be as wrong as the shorter one. The return defect shows it, except on an unstable
@@ -234,50 +235,50 @@ struct JointSamples {
 
 fn sample_joints(
     setting: &OrbitInput,
-    level: &mut Discretization,
+    discretization: &mut Discretization,
     motion: &HarmonicSolution,
     x: &[DVector<Complex64>],
 ) -> JointSamples {
     let OrbitInput { system, ports, omega, .. } = *setting;
-    let harmonics = level.harmonics().to_vec();
-    let samples = level.aft.samples();
+    let harmonics = discretization.harmonics().to_vec();
+    let samples = discretization.aft.samples();
     let mut force = vec![vec![[0.0; MAX_DIRECTIONS]; samples]; system.joints().len()];
     let mut contact = vec![vec![Contact::Stick; samples]; system.joints().len()];
     let mut states = Vec::new();
     for (j, joint) in system.joints().iter().enumerate() {
         let (axes, force, contact) = (joint.axes(), &mut force[j], &mut contact[j]);
         // without a port the joint carries no force and slips permanently
-        let mut told = false;
+        let mut has_slip_states = false;
         for (p, port) in ports.iter().enumerate() {
             let Some(&PortMember { force_ratio: share, .. }) = port.member(j) else { continue };
-            level.sample(ports, p, omega, motion);
-            let alternation = &level.aft;
-            for (a, own) in alternation.force.iter().enumerate().take(port.axes) {
+            discretization.sample(ports, p, omega, motion);
+            let aft = &discretization.aft;
+            for (a, own) in aft.force.iter().enumerate().take(port.axes) {
                 force.iter_mut().zip(own).for_each(|(force, own)| force[a] += share * own);
             }
             if port.samples_slip() {
-                let slips = alternation.slips.iter().zip(&alternation.force[0]);
+                let slips = aft.slips.iter().zip(&aft.force[0]);
                 for (contact, (slips, force)) in contact.iter_mut().zip(slips) {
                     if *slips {
                         *contact = Contact::slip(share * force);
                     }
                 }
             }
-            told |= port.samples_slip();
+            has_slip_states |= port.samples_slip();
             match joint.law().rate() {
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
                     // the sampled force is within the bounds of the law; the truncated series
                     // may exceed them
-                    let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| share * alternation.force[a][0]);
+                    let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| share * aft.force[a][0]);
                     rate.state_from_force(&now[..port.axes], &mut z);
                     states.extend(z);
                 }
                 _ if port.is_force() => {}
-                _ => states.extend(&alternation.state),
+                _ => states.extend(&aft.state),
             }
         }
-        if told {
+        if has_slip_states {
             continue;
         }
         let velocity: Vec<Vec<f64>> = axes
@@ -286,8 +287,8 @@ fn sample_joints(
                 let u = relative(axis, &harmonics, x);
                 let velocity: Vec<_> =
                     harmonics.iter().zip(u).map(|(&h, c)| (h, Complex64::new(0.0, h as f64 * omega) * c)).collect();
-                level.aft.fourier.synthesize(&velocity, &mut level.aft.signal);
-                level.aft.signal.clone()
+                discretization.aft.fourier.synthesize(&velocity, &mut discretization.aft.signal);
+                discretization.aft.signal.clone()
             })
             .collect();
         for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
@@ -335,7 +336,7 @@ struct SolutionSignals<'a> {
     /// Number of returns per period.
     returns_per_period: usize,
     /// Scratch memory of the transforms.
-    level: RefCell<&'a mut Discretization>,
+    discretization: RefCell<&'a mut Discretization>,
 }
 
 impl SolutionSignals<'_> {
@@ -345,7 +346,7 @@ impl SolutionSignals<'_> {
     }
 
     fn range_of(&self, signal: &[Complex64]) -> (f64, f64) {
-        self.level.borrow_mut().aft.range(signal)
+        self.discretization.borrow_mut().aft.range(signal)
     }
 
     fn derivative(&self, mut signal: Vec<Complex64>) -> Vec<Complex64> {
@@ -561,7 +562,7 @@ impl Path for FourierPath {
     }
 
     fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
-        let judged = OrbitCheck::of_any_size(&self.system).judge(
+        let judged = OrbitCheck::of_any_size(&self.system).check(
             &self.system,
             self.omega,
             (self, symmetry),

@@ -62,7 +62,7 @@ pub(super) struct HarmonicBalanceSolver {
     /// True once a law was met whose force jumps between two samples.
     pub(super) steep: bool,
     /// Check of orbits by time integration.
-    pub(super) judge: OrbitCheck,
+    pub(super) orbit_check: OrbitCheck,
     /// State in static equilibrium: displacements, velocities (zero), internal states of the
     /// joints.
     pub(super) static_state: Option<Vec<f64>>,
@@ -100,19 +100,19 @@ impl HarmonicBalanceSolver {
             return Err(error);
         }
         let (mut ports, mut around) = Ports::for_sector(&system)?;
-        let rest = LinearDynamics::new(&system, &ports);
+        let dynamics = LinearDynamics::new(&system, &ports);
         let system = Arc::new(system);
         let first = (FIRST_HARMONICS * kept.count_factor).max(kept.highest);
         let harmonics = kept.up_to(method.harmonics.unwrap_or(first));
         let banded = BandedForm::new(&system, &ports, &[1]);
         let steep = ports.has_steep();
         let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports, steep);
-        let bytes = level_memory(banded.as_ref(), &ports, &rest, (harmonics.len(), samples));
+        let bytes = level_memory(banded.as_ref(), &ports, &dynamics, (harmonics.len(), samples));
         check_memory(bytes, &ports, (harmonics.len(), periods))?;
         let mut static_start = None;
         if kept.contains(0)
             && let Some(SolvedEquilibrium { orbit, states }) =
-                static_equilibrium(&system, (&ports, around.as_ref()), &rest)
+                static_equilibrium(&system, (&ports, around.as_ref()), &dynamics)
         {
             ports.set_static_states(&states);
             around.iter_mut().for_each(|around| around.set_static_states(&states));
@@ -124,12 +124,12 @@ impl HarmonicBalanceSolver {
             excitation_frequency: 0.0,
             ports,
             ring_ports: around,
-            receptance: rest,
+            receptance: dynamics,
             banded,
             harmonic_set: kept,
             first,
             steep,
-            judge: OrbitCheck::new(&system),
+            orbit_check: OrbitCheck::new(&system),
             system,
             static_state: static_start,
             discretizations: BTreeMap::new(),
@@ -151,21 +151,23 @@ impl HarmonicBalanceSolver {
         let harmonics = self.harmonic_set.up_to(top);
         let samples = self.method.samples_at(top, &self.ports, self.steep);
         let (system, ports) = (&self.system, &self.ports);
-        let level = self.discretizations.entry(top).or_insert_with(|| {
-            let sparse = BandedForm::new(system, ports, &harmonics);
-            Discretization::new(harmonics, samples, ports, sparse)
+        let discretization = self.discretizations.entry(top).or_insert_with(|| {
+            let banded = BandedForm::new(system, ports, &harmonics);
+            Discretization::new(harmonics, samples, ports, banded)
         });
-        level.set_frequency(&self.system, &self.ports, &self.receptance, omega).map_err(SolveError::resonance)?;
+        discretization
+            .set_frequency(&self.system, &self.ports, &self.receptance, omega)
+            .map_err(SolveError::resonance)?;
         let elsewhere = self.work_used(Some(top));
         let allowed = self.work_limit();
-        let level = self.discretizations.get_mut(&top).expect("made above");
-        (level.work_elsewhere, level.work_limit) = (elsewhere, allowed);
-        Ok(level)
+        let discretization = self.discretizations.get_mut(&top).expect("made above");
+        (discretization.work_elsewhere, discretization.work_limit) = (elsewhere, allowed);
+        Ok(discretization)
     }
 
     /// Resets the work counters for a new point.
-    pub(super) fn begin_point(&mut self, drive: f64) {
-        self.excitation_frequency = drive;
+    pub(super) fn begin_point(&mut self, excitation: f64) {
+        self.excitation_frequency = excitation;
         self.limit = None;
         self.discretizations.values_mut().for_each(Discretization::begin_point);
     }
@@ -174,7 +176,9 @@ impl HarmonicBalanceSolver {
     /// `but`.
     pub(super) fn work_used(&self, but: Option<usize>) -> WorkShare {
         let counted = self.discretizations.iter().filter(|(top, _)| but != Some(**top));
-        counted.map(|(_, level)| level.point_work_used(&self.ports)).fold(WorkShare::default(), WorkShare::and)
+        counted
+            .map(|(_, discretization)| discretization.point_work_used(&self.ports))
+            .fold(WorkShare::default(), WorkShare::and)
     }
 
     /// Returns the work limit of the point.
@@ -276,23 +280,23 @@ impl HarmonicBalanceSolver {
                 self.guess_by_integration(top, omega, guess.as_ref()).unwrap_or(begun)
             }
         };
-        let level = self.discretizations.get_mut(&top).expect("made above");
-        level.solve(&self.ports, omega, start)
+        let discretization = self.discretizations.get_mut(&top).expect("made above");
+        discretization.solve(&self.ports, omega, start)
     }
 
     /// Converts the failure of a search to the error of the method.
-    pub(super) fn solve_error(&self, lost: SolveError) -> OrbitError {
-        if let Some(resonance) = lost.resonance {
+    pub(super) fn solve_error(&self, error: SolveError) -> OrbitError {
+        if let Some(resonance) = error.resonance {
             return OrbitError::Resonance { method: NAME, omega: self.excitation_frequency, resonance };
         }
-        if lost.left_contacts {
+        if error.left_contacts {
             return OrbitError::drift(NAME, self.excitation_frequency);
         }
         OrbitError::NotConverged {
             method: NAME,
             omega: self.excitation_frequency,
-            iterations: lost.iterations,
-            residual: lost.residual,
+            iterations: error.iterations,
+            residual: error.residual,
             work_limit_reached: self.is_budget_used(),
             advice: String::new(),
         }
@@ -347,14 +351,14 @@ impl HarmonicBalanceSolver {
             half_period: self.harmonic_set.has_half_period_symmetry(),
             truncation,
             tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
-            judge: Some(&mut self.judge),
+            orbit_check: Some(&mut self.orbit_check),
         };
-        let level = self.discretizations.get_mut(&top).expect("solved");
-        let orbit =
-            postprocess::orbit(setting, level, motion, x).ok_or(OrbitError::drift(NAME, self.excitation_frequency))?;
+        let discretization = self.discretizations.get_mut(&top).expect("solved");
+        let orbit = postprocess::orbit(setting, discretization, motion, x)
+            .ok_or(OrbitError::drift(NAME, self.excitation_frequency))?;
         if !postprocess::energies_balance(&self.system, &orbit) {
-            let lost = SolveError::not_converged(motion.iterations, orbit.evidence.energy_gap);
-            return Err(self.solve_error(lost));
+            let error = SolveError::not_converged(motion.iterations, orbit.evidence.energy_gap);
+            return Err(self.solve_error(error));
         }
         Ok(Orbit { omega: self.excitation_frequency, periods: self.periods, ..orbit })
     }
@@ -371,15 +375,15 @@ impl HarmonicBalanceSolver {
     ) -> Result<Orbit, OrbitError> {
         self.discretization(top, omega).map(|_| ()).map_err(|l| self.solve_error(l))?;
         let mut motion = HarmonicSolution { iterations: 0, ..near.clone() };
-        let level = self.discretizations.get_mut(&top).expect("made above");
-        let mut found = level.newton_from(&self.ports, omega, &mut motion, WARM_ITERATIONS);
+        let discretization = self.discretizations.get_mut(&top).expect("made above");
+        let mut found = discretization.newton_from(&self.ports, omega, &mut motion, WARM_ITERATIONS);
         if found.is_err() && self.ports.has_forces() {
             motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
-            found = level.interior_point_method(&self.ports, omega, &mut motion);
+            found = discretization.interior_point_method(&self.ports, omega, &mut motion);
             motion.found_by = FoundBy::InteriorPoints;
             if found.is_err() {
                 motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
-                found = level.proximal_point_method(&self.ports, omega, &mut motion);
+                found = discretization.proximal_point_method(&self.ports, omega, &mut motion);
                 motion.found_by = FoundBy::ProximalPoints;
             }
         }
@@ -408,7 +412,7 @@ impl HarmonicBalanceSolver {
     /// motions separate, because every initial guess then leads to the same orbit. With rigid
     /// friction the set of slipping samples changes abruptly, and extrapolation does not help.
     pub(super) fn extrapolates(&self, top: usize) -> bool {
-        let unique = self.judge.proves() && !self.ports.has_forces();
+        let unique = self.orbit_check.proves() && !self.ports.has_forces();
         unique || self.discretizations.get(&top).is_some_and(Discretization::uses_krylov)
     }
 

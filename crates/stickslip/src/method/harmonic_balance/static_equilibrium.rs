@@ -37,9 +37,9 @@ const SAMPLES: usize = 8;
 /// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     let (ports, around) = Ports::for_sector(system).ok()?;
-    let rest = LinearDynamics::new(system, &ports);
+    let dynamics = LinearDynamics::new(system, &ports);
     let system = Arc::new(system.clone());
-    static_equilibrium(&system, (&ports, around.as_ref()), &rest).map(|found| found.orbit)
+    static_equilibrium(&system, (&ports, around.as_ref()), &dynamics).map(|found| found.orbit)
 }
 
 /// Static equilibrium of a system.
@@ -55,25 +55,29 @@ pub(super) struct SolvedEquilibrium {
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, around): (&Ports, Option<&Ports>),
-    rest: &LinearDynamics,
+    dynamics: &LinearDynamics,
 ) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
     let omega = characteristic_rate(system);
-    let sparse = BandedForm::new(system, ports, &harmonics);
-    let mut level = Discretization::new(harmonics, SAMPLES, ports, sparse);
-    level.set_frequency(system, ports, rest, omega).ok()?;
-    let start = if level.is_held_by_contacts() { level.static_solution(1.0) } else { level.frictionless_motion() };
+    let banded = BandedForm::new(system, ports, &harmonics);
+    let mut discretization = Discretization::new(harmonics, SAMPLES, ports, banded);
+    discretization.set_frequency(system, ports, dynamics, omega).ok()?;
+    let start = if discretization.is_held_by_contacts() {
+        discretization.static_solution(1.0)
+    } else {
+        discretization.frictionless_motion()
+    };
     let mut solution = start;
-    solve_static(&mut level, ports, omega, &mut solution)?;
+    solve_static(&mut discretization, ports, omega, &mut solution)?;
     let mut states = vec![StaticState::default(); ports.len()];
     for (p, port) in ports.iter().enumerate() {
-        level.sample(ports, p, omega, &solution);
-        states[p].states.clone_from(&level.aft.state);
+        discretization.sample(ports, p, omega, &solution);
+        states[p].states.clone_from(&discretization.aft.state);
         for (to, c) in states[p].displacement.iter_mut().zip(&solution.c[port.range()]) {
             *to = c.re;
         }
     }
-    let x = postprocess::places(&mut level, rest, omega, &solution).ok()?;
+    let x = postprocess::places(&mut discretization, dynamics, omega, &solution).ok()?;
     let setting = postprocess::OrbitInput {
         system,
         ports,
@@ -83,9 +87,9 @@ pub(super) fn static_equilibrium(
         half_period: false,
         truncation: None,
         tolerance: 0.0,
-        judge: None,
+        orbit_check: None,
     };
-    let orbit = postprocess::orbit(setting, &mut level, &solution, x)?;
+    let orbit = postprocess::orbit(setting, &mut discretization, &solution, x)?;
     Some(SolvedEquilibrium { orbit, states })
 }
 
@@ -98,22 +102,27 @@ pub(super) fn static_equilibrium(
 /// structure that sinks under its load.
 ///
 /// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
-fn solve_static(level: &mut Discretization, ports: &Ports, omega: f64, solution: &mut HarmonicSolution) -> Option<()> {
+fn solve_static(
+    discretization: &mut Discretization,
+    ports: &Ports,
+    omega: f64,
+    solution: &mut HarmonicSolution,
+) -> Option<()> {
     let begin = solution.clone();
-    if level.newton_from(ports, omega, solution, ITERATIONS).is_ok() {
+    if discretization.newton_from(ports, omega, solution, ITERATIONS).is_ok() {
         return Some(());
     }
-    if !level.is_held_by_contacts() {
+    if !discretization.is_held_by_contacts() {
         return None;
     }
     *solution = begin;
     let (mut share, mut softer) = (FIRST_STIFFNESS, 0.1f64);
     for _ in 0..POINTS {
         let anchor = solution.c.iter().map(|c| c.re).collect();
-        level.tether = Some(ProximalSprings { relative_stiffness: share, anchor });
+        discretization.tether = Some(ProximalSprings { relative_stiffness: share, anchor });
         let mut next = solution.clone();
-        let tied = level.newton_from(ports, omega, &mut next, ITERATIONS).is_ok();
-        level.tether = None;
+        let tied = discretization.newton_from(ports, omega, &mut next, ITERATIONS).is_ok();
+        discretization.tether = None;
         if !tied {
             if share >= FIRST_STIFFNESS {
                 return None;
@@ -123,7 +132,7 @@ fn solve_static(level: &mut Discretization, ports: &Ports, omega: f64, solution:
             continue;
         }
         *solution = next.clone();
-        if level.newton_from(ports, omega, &mut next, ITERATIONS).is_ok() {
+        if discretization.newton_from(ports, omega, &mut next, ITERATIONS).is_ok() {
             *solution = next;
             return Some(());
         }

@@ -63,8 +63,8 @@ pub fn evidence_steps(system: &System) -> Option<(usize, bool)> {
     if system.dofs() > LARGEST || IntegratorKind::of(system, None) != IntegratorKind::Incremental {
         return None;
     }
-    let judge = OrbitCheck::new(system);
-    judge.flow.as_ref().map(|_| (STEPS, !judge.proven))
+    let orbit_check = OrbitCheck::new(system);
+    orbit_check.flow.as_ref().map(|_| (STEPS, !orbit_check.proven))
 }
 
 /// Integrates a system over one return and compares the end with the start.
@@ -147,7 +147,7 @@ impl OrbitCheck {
 
     /// Checks the return of a path from its state at t = 0, which begins with `start`. The
     /// joints `stuck` are permanently stuck.
-    pub fn judge(
+    pub fn check(
         &mut self,
         system: &System,
         omega: f64,
@@ -443,7 +443,7 @@ mod tests {
         let orbit = method.solver(&wave).unwrap().orbit(omega, None).unwrap();
         let judged = |system: &System| {
             let path = (orbit.path.as_ref(), Symmetry::FullPeriod);
-            OrbitCheck::new(system).judge(system, omega, path, &orbit.initial_state, &[])
+            OrbitCheck::new(system).check(system, omega, path, &orbit.initial_state, &[])
         };
         let (part, all) = (judged(&wave), judged(&whole));
         let largest = |judged: &ReturnEvidence| eigen::largest_modulus(judged.derivative.as_ref().unwrap()).unwrap();
@@ -468,10 +468,10 @@ mod tests {
         let system = couple(Arc::new(Jenkins { stiffness: 2e4, limit: 4.0 }));
         let omega = TAU * 120.75;
         let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
-        let mut judge = OrbitCheck::new(&system);
-        assert!(judge.proves());
+        let mut orbit_check = OrbitCheck::new(&system);
+        assert!(orbit_check.proves());
         let mut defect =
-            |start: &[f64]| judge.judge(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;
+            |start: &[f64]| orbit_check.check(&system, omega, (orbit.path.as_ref(), orbit.symmetry), start, &[]).defect;
         assert!(defect(&orbit.initial_state).unwrap() < 1e-11);
         let wrong: Vec<f64> = orbit.initial_state.iter().map(|z| 1.5 * z).collect();
         // a transient decays by 1 % per return at a Q of some hundreds; friction adds to that

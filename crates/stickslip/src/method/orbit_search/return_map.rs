@@ -417,10 +417,10 @@ pub(crate) fn newton_with_line_search(
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     // a single increase is allowed only for cheap maps: an integration may take forever from a
     // remote state
-    let (mut state, mut bold) = (start.to_vec(), beyond == LargeIncrease::Ends || aim.distance.is_finite());
+    let (mut state, mut may_increase) = (start.to_vec(), beyond == LargeIncrease::Ends || aim.distance.is_finite());
     let mut derivative = DMatrix::identity(n, n);
     let mut gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
-    let mut left = None; // state before the single increase, until the residual is below that again
+    let mut before_increase = None; // state before the single increase, until the residual is below that again
     let mut shares = [1.0; 2]; // residual ratios of the last two steps
     loop {
         *iterations += 1;
@@ -453,11 +453,11 @@ pub(crate) fn newton_with_line_search(
                 if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
                     let after = norm(map.weights(), trial_gap.as_slice());
                     let less = after <= enough * before;
-                    if less || (bold && fraction == 1.0 && after <= LARGEST_INCREASE * before) {
+                    if less || (may_increase && fraction == 1.0 && after <= LARGEST_INCREASE * before) {
                         if !less {
-                            (bold, left) = (false, Some((state, before, gap, derivative)));
-                        } else if left.as_ref().is_some_and(|(_, least, ..)| after <= *least) {
-                            left = None;
+                            (may_increase, before_increase) = (false, Some((state, before, gap, derivative)));
+                        } else if before_increase.as_ref().is_some_and(|(_, least, ..)| after <= *least) {
+                            before_increase = None;
                         }
                         (state, gap, derivative) = (trial, trial_gap, trial_derivative);
                         shares = [shares[1], if fraction == 1.0 { after / before } else { 1.0 }];
@@ -475,7 +475,7 @@ pub(crate) fn newton_with_line_search(
             if residual > aim.residual
                 && *iterations < ITERATIONS
                 && beyond == LargeIncrease::Shortens
-                && let Some((from, _, its_gap, its_derivative)) = left.take()
+                && let Some((from, _, its_gap, its_derivative)) = before_increase.take()
             {
                 (state, gap, derivative) = (from, its_gap, its_derivative);
                 continue;

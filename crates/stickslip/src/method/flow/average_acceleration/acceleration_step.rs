@@ -113,11 +113,11 @@ impl AccelerationStep {
     }
 
     /// Starts a run with the forces of the initial state.
-    pub fn start(&mut self, assembly: &Assembly, state: &[f64], drive: &HarmonicExcitation) {
+    pub fn start(&mut self, assembly: &Assembly, state: &[f64], excitation: &HarmonicExcitation) {
         let n = assembly.n;
-        drive.load(0.0, &mut self.loads[1]);
+        excitation.load(0.0, &mut self.loads[1]);
         for (q, joint) in assembly.joints.iter().enumerate() {
-            self.to[q] = relative(assembly, q, state, drive, 0.0);
+            self.to[q] = relative(assembly, q, state, excitation, 0.0);
             let internal = joint.internal();
             let at = LawInstant { motion: self.to[q], z: &state[2 * n + internal.start..2 * n + internal.end] };
             let law = &mut self.laws[q];
@@ -132,7 +132,7 @@ impl AccelerationStep {
         &mut self,
         assembly: &Assembly,
         eliminated: &AccelerationElimination,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         (time, state): (f64, &mut [f64]),
         scale: f64,
     ) -> bool {
@@ -142,7 +142,7 @@ impl AccelerationStep {
         std::mem::swap(&mut self.from, &mut self.to);
         let [old, new] = &mut self.loads;
         std::mem::swap(old, new);
-        drive.load(time + h, new);
+        excitation.load(time + h, new);
         self.load.iter_mut().zip(&*old).zip(&*new).for_each(|((load, old), new)| *load = old + new);
         let linear = nalgebra::DVectorView::from_slice(&state[..2 * n], 2 * n);
         self.sum.gemv(1.0, &eliminated.from_state, &linear, 0.0);
@@ -161,7 +161,7 @@ impl AccelerationStep {
         let mut previous = f64::INFINITY;
         for iteration in 0..ITERATIONS {
             interrupt::check();
-            if !self.evaluate(assembly, eliminated, drive, (time, &state[n..2 * n])) || !self.lu.factor() {
+            if !self.evaluate(assembly, eliminated, excitation, (time, &state[n..2 * n])) || !self.lu.factor() {
                 return false;
             }
             if converged {
@@ -205,7 +205,7 @@ impl AccelerationStep {
         &mut self,
         assembly: &Assembly,
         eliminated: &AccelerationElimination,
-        drive: &HarmonicExcitation,
+        excitation: &HarmonicExcitation,
         (time, v): (f64, &[f64]),
     ) -> bool {
         let (j, h) = (assembly.axes.len(), eliminated.length);
@@ -216,8 +216,8 @@ impl AccelerationStep {
         }
         for (q, joint) in assembly.joints.iter().enumerate() {
             for (d, axis) in joint.axes().enumerate() {
-                let (g, speed) = drive.relative_at(axis, time + h);
-                let (before, _) = drive.relative_at(axis, time);
+                let (g, speed) = excitation.relative_at(axis, time + h);
+                let (before, _) = excitation.relative_at(axis, time);
                 let travel = 0.5 * h * (assembly.axes[axis].component(v) + self.unknown[axis]);
                 self.to[q].displacement[d] = self.from[q].displacement[d] + travel + g - before;
                 self.to[q].velocity[d] = self.unknown[axis] + speed;
@@ -247,12 +247,12 @@ fn relative(
     assembly: &Assembly,
     q: usize,
     state: &[f64],
-    drive: &HarmonicExcitation,
+    excitation: &HarmonicExcitation,
     time: f64,
 ) -> RelativeMotion<f64> {
     let mut motion = RelativeMotion::along(0.0, 0.0);
     for (d, axis) in assembly.joints[q].axes().enumerate() {
-        (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, drive, time);
+        (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, excitation, time);
     }
     motion
 }
@@ -291,13 +291,14 @@ mod tests {
         (h, count): (f64, usize),
         start: &[f64],
     ) -> (Vec<f64>, DMatrix<f64>) {
-        let (eliminated, drive) = (AccelerationElimination::new(assembly, h).unwrap(), assembly.drive(system, 1.0));
+        let (eliminated, excitation) =
+            (AccelerationElimination::new(assembly, h).unwrap(), assembly.excitation(system, 1.0));
         let (mut step, mut state) = (AccelerationStep::new(assembly), start.to_vec());
         let mut derivative = DMatrix::identity(start.len(), start.len());
-        step.start(assembly, &state, &drive);
+        step.start(assembly, &state, &excitation);
         let mut carried = Sensitivity::new(assembly, &step.laws, &derivative);
         for k in 0..count {
-            assert!(step.advance(assembly, &eliminated, &drive, (k as f64 * h, &mut state), 1.0));
+            assert!(step.advance(assembly, &eliminated, &excitation, (k as f64 * h, &mut state), 1.0));
             carried.advance(assembly, &eliminated, &step.laws, &step.lu);
         }
         carried.write(&mut derivative);

@@ -38,7 +38,7 @@ const DROPS: &str =
 /// Flow of a structure with any laws except rigid sliders.
 pub(crate) struct AverageAccelerationFlow {
     pub assembly: Assembly,
-    pub drive: HarmonicExcitation,
+    pub excitation: HarmonicExcitation,
     /// Number of steps of a run; the run uses the fraction `share` of it.
     pub count: usize,
     share: f64,
@@ -82,7 +82,7 @@ impl AverageAccelerationFlow {
             }
         })?;
         Ok(AverageAccelerationFlow {
-            drive: HarmonicExcitation::default(),
+            excitation: HarmonicExcitation::default(),
             count: INITIAL_STEPS,
             share: 1.0,
             keep: false,
@@ -118,7 +118,7 @@ impl AverageAccelerationFlow {
 
     /// Sets the excitation at a frequency (rad/s) with all harmonics multiplied by `share`.
     pub fn set_scaled_drive(&mut self, system: &System, omega: f64, share: f64) {
-        self.drive = self.assembly.drive(system, omega).scaled(share);
+        self.excitation = self.assembly.excitation(system, omega).scaled(share);
     }
 
     /// Runs from `state` and returns the end state with the record of the run.
@@ -131,7 +131,7 @@ impl AverageAccelerationFlow {
 
     fn keep_instant(&mut self, state: &[f64], time: f64) {
         let force = self.step.force.as_slice();
-        self.drive.load(time, &mut self.load);
+        self.excitation.load(time, &mut self.load);
         let acceleration = self.steps.push_instant(state, force);
         self.assembly.accelerate(state, &mut self.load, force, acceleration);
     }
@@ -139,7 +139,7 @@ impl AverageAccelerationFlow {
     fn keep_step(&mut self, state: &[f64], (time, h): (f64, f64)) {
         let n = self.assembly.n;
         let velocity: Vec<f64> = (0..self.assembly.axes.len())
-            .map(|axis| self.assembly.relative(axis, state, &self.drive, time + h).1)
+            .map(|axis| self.assembly.relative(axis, state, &self.excitation, time + h).1)
             .collect();
         let laws = self.assembly.joints.iter().zip(&self.step.laws);
         let contact = laws.map(|(joint, law)| law.contact(&joint.law, &velocity[joint.axes()]));
@@ -151,7 +151,7 @@ impl AverageAccelerationFlow {
 
     /// Returns the path of the last stored run, which repeats after `period`.
     pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
-        Trajectory::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
+        Trajectory::new((system, &self.assembly), &self.excitation, &self.steps, (symmetry, period))
     }
 }
 
@@ -161,15 +161,15 @@ impl Flow for AverageAccelerationFlow {
     }
 
     fn set_excitation(&mut self, system: &System, omega: f64) {
-        self.drive = self.assembly.drive(system, omega);
+        self.excitation = self.assembly.excitation(system, omega);
     }
 
     fn weights(&self) -> Vec<f64> {
-        self.assembly.weights(&self.drive)
+        self.assembly.weights(&self.excitation)
     }
 
     fn energy_scale(&self) -> f64 {
-        self.assembly.energy_scale(&self.drive)
+        self.assembly.energy_scale(&self.excitation)
     }
 
     fn set_step_fraction(&mut self, share: f64) {
@@ -189,18 +189,18 @@ impl Flow for AverageAccelerationFlow {
         }
         let eliminated = self.eliminated.take().ok_or(IntegrationError::OutOfRange { time: 0.0 })?;
         self.steps.clear();
-        self.step.start(&self.assembly, state, &self.drive);
+        self.step.start(&self.assembly, state, &self.excitation);
         let mut carried =
             sensitivity.as_deref().map(|sensitivity| Sensitivity::new(&self.assembly, &self.step.laws, sensitivity));
         // a preloaded joint can start the motion of a system at rest without loads
         let pushed = NEAR_REST * duration * self.assembly.largest_acceleration(self.step.force.as_slice());
-        let scale = self.assembly.scales(state, &self.drive).1.max(pushed);
+        let scale = self.assembly.scales(state, &self.excitation).1.max(pushed);
         if self.keep {
             self.keep_instant(state, 0.0);
         }
         for i in 0..count as usize {
             let time = i as f64 * h;
-            if !self.step.advance(&self.assembly, &eliminated, &self.drive, (time, state), scale) {
+            if !self.step.advance(&self.assembly, &eliminated, &self.excitation, (time, state), scale) {
                 return Err(match self.step.without_number(&self.assembly) {
                     Some(joint) => joint.not_finite_error(time),
                     None => IntegrationError::Stalled { time, step: h },

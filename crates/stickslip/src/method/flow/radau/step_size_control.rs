@@ -57,7 +57,7 @@ pub(crate) enum StepSizes {
 /// Flow of a structure with smooth laws.
 pub(crate) struct RadauFlow {
     pub assembly: Assembly,
-    pub drive: HarmonicExcitation,
+    pub excitation: HarmonicExcitation,
     /// Relative error per step.
     pub tolerance: f64,
     keep: bool,
@@ -101,7 +101,7 @@ impl RadauFlow {
         let (states, n, j) = (assembly.states(), assembly.n, assembly.axes.len());
         let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
         RadauFlow {
-            drive: HarmonicExcitation::default(),
+            excitation: HarmonicExcitation::default(),
             tolerance,
             keep: false,
             steps: StepRecord::new(nodes, &assembly),
@@ -133,7 +133,7 @@ impl RadauFlow {
 
     /// Returns the scales of displacement and velocity for the error norm.
     fn scales(&self, state: &[f64]) -> (f64, f64) {
-        self.assembly.scales(state, &self.drive)
+        self.assembly.scales(state, &self.excitation)
     }
 
     fn set_loads(&mut self, time: f64, h: f64) {
@@ -144,9 +144,9 @@ impl RadauFlow {
         self.loads.stage.clear();
         for (i, c) in NODES.iter().enumerate() {
             let at = time + c * h;
-            self.drive.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
+            self.excitation.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
             for axis in 0..j {
-                self.loads.stage.push(self.drive.relative_at(axis, at));
+                self.loads.stage.push(self.excitation.relative_at(axis, at));
             }
         }
     }
@@ -159,7 +159,7 @@ impl RadauFlow {
         let Some((level, length)) = last else {
             for i in 0..STAGES {
                 for axis in 0..j {
-                    unknown[i * j + axis] = self.assembly.relative(axis, state, &self.drive, time).1;
+                    unknown[i * j + axis] = self.assembly.relative(axis, state, &self.excitation, time).1;
                 }
                 let first = STAGES * j + i * internal;
                 unknown[first..first + internal].copy_from_slice(&state[2 * n..]);
@@ -184,7 +184,8 @@ impl RadauFlow {
         for (joint, point) in self.assembly.joints.iter().zip(&mut self.laws) {
             let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
+                (motion.displacement[d], motion.velocity[d]) =
+                    self.assembly.relative(axis, state, &self.excitation, time);
             }
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
@@ -234,7 +235,7 @@ impl RadauFlow {
             &self.assembly,
             (&shifted, &mut self.load, &mut self.force),
             &self.laws,
-            &self.drive,
+            &self.excitation,
             time,
             &mut self.error,
         );
@@ -270,7 +271,7 @@ impl RadauFlow {
         for (joint, point) in self.assembly.joints.iter().zip(&self.laws) {
             for (d, axis) in joint.axes().enumerate() {
                 let power = |k: usize| self.step.unknown[k * j + axis] * self.step.force[k * j + axis];
-                let mut raw = point.force[d] * self.drive.relative_at(axis, time).1;
+                let mut raw = point.force[d] * self.excitation.relative_at(axis, time).1;
                 for (weight, row) in ERROR_WEIGHTS.iter().zip(BUTCHER_MATRIX) {
                     raw += weight * row.iter().enumerate().map(|(k, a)| a * power(k)).sum::<f64>();
                 }
@@ -287,7 +288,7 @@ impl RadauFlow {
 
     fn keep_instant(&mut self, state: &[f64], time: f64) {
         forces(&self.assembly, &self.laws, &mut self.force);
-        self.drive.load(time, &mut self.load);
+        self.excitation.load(time, &mut self.load);
         let acceleration = self.steps.push_instant(state, &self.force);
         self.assembly.accelerate(state, &mut self.load, &self.force, acceleration);
     }
@@ -389,12 +390,12 @@ pub(in crate::method) fn time_derivative(
     assembly: &Assembly,
     (state, load, force): (&[f64], &mut [f64], &mut [f64]),
     laws: &[RatePoint],
-    drive: &HarmonicExcitation,
+    excitation: &HarmonicExcitation,
     time: f64,
     out: &mut [f64],
 ) {
     let n = assembly.n;
-    drive.load(time, load);
+    excitation.load(time, load);
     forces(assembly, laws, force);
     let (x, rest) = out.split_at_mut(n);
     let (v, internal) = rest.split_at_mut(n);
@@ -411,15 +412,15 @@ impl Flow for RadauFlow {
     }
 
     fn set_excitation(&mut self, system: &System, omega: f64) {
-        self.drive = self.assembly.drive(system, omega);
+        self.excitation = self.assembly.excitation(system, omega);
     }
 
     fn weights(&self) -> Vec<f64> {
-        self.assembly.weights(&self.drive)
+        self.assembly.weights(&self.excitation)
     }
 
     fn energy_scale(&self) -> f64 {
-        self.assembly.energy_scale(&self.drive)
+        self.assembly.energy_scale(&self.excitation)
     }
 
     fn set_tolerance(&mut self, tolerance: f64) {
@@ -460,7 +461,7 @@ impl Flow for RadauFlow {
             &self.assembly,
             (state, &mut self.load, &mut self.force),
             &self.laws,
-            &self.drive,
+            &self.excitation,
             0.0,
             &mut self.slope,
         );
@@ -510,7 +511,7 @@ impl Flow for RadauFlow {
             self.laws.swap_with_slice(&mut self.step.points[(STAGES - 1) * joints..]);
             if lengths != StepSizes::Repeated {
                 let work = (self.next.as_slice(), self.load.as_mut_slice(), self.force.as_mut_slice());
-                time_derivative(&self.assembly, work, &self.laws, &self.drive, time + h, &mut self.next_slope);
+                time_derivative(&self.assembly, work, &self.laws, &self.excitation, time + h, &mut self.next_slope);
                 std::mem::swap(&mut self.slope, &mut self.next_slope);
             }
             state.copy_from_slice(&self.next);
@@ -559,6 +560,6 @@ impl Flow for RadauFlow {
 impl RadauFlow {
     /// Returns the path of the last stored run, which repeats after `period`.
     pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
-        Trajectory::new((system, &self.assembly), &self.drive, &self.steps, (symmetry, period))
+        Trajectory::new((system, &self.assembly), &self.excitation, &self.steps, (symmetry, period))
     }
 }

@@ -97,7 +97,7 @@ pub(crate) struct SetValuedFlow {
     pub assembly: Assembly,
     /// The assembly with the original laws.
     plain: Assembly,
-    pub drive: HarmonicExcitation,
+    pub excitation: HarmonicExcitation,
     /// Relative error per step.
     pub tolerance: f64,
     keep: bool,
@@ -148,7 +148,7 @@ impl SetValuedFlow {
         let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
         Ok(SetValuedFlow {
             assembly: plain.clone(),
-            drive: HarmonicExcitation::default(),
+            excitation: HarmonicExcitation::default(),
             tolerance,
             keep: false,
             steps: StepRecord::with_jumps(nodes, &plain),
@@ -174,18 +174,18 @@ impl SetValuedFlow {
 
     /// Returns the path of the last stored run, which repeats after `period`.
     pub fn stepped(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
-        Trajectory::new((system, &self.plain), &self.drive, &self.steps, (symmetry, period))
+        Trajectory::new((system, &self.plain), &self.excitation, &self.steps, (symmetry, period))
     }
 
     /// Returns the relative velocity along an axis.
     fn velocity(&self, axis: usize, state: &[f64], time: f64) -> f64 {
-        self.assembly.relative(axis, state, &self.drive, time).1
+        self.assembly.relative(axis, state, &self.excitation, time).1
     }
 
     /// Returns the relative acceleration along an axis for the present time derivative, m/s².
     fn acceleration(&self, axis: usize, time: f64) -> f64 {
         let n = self.assembly.n;
-        self.assembly.axes[axis].component(&self.slope[n..2 * n]) + self.drive.imposed_at(axis, time, 2)
+        self.assembly.axes[axis].component(&self.slope[n..2 * n]) + self.excitation.imposed_at(axis, time, 2)
     }
 
     fn held(&self) -> impl Iterator<Item = &FrictionJoint> {
@@ -233,7 +233,8 @@ impl SetValuedFlow {
         for (q, (joint, point)) in self.assembly.joints.iter().zip(&mut self.laws).enumerate() {
             let mut motion = RelativeMotion::along(0.0, 0.0);
             for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) = self.assembly.relative(axis, state, &self.drive, time);
+                (motion.displacement[d], motion.velocity[d]) =
+                    self.assembly.relative(axis, state, &self.excitation, time);
             }
             let holds = |friction: &FrictionJoint| friction.joint == q && friction.mode == FrictionMode::Stick;
             if self.frictions.iter().any(holds) {
@@ -250,7 +251,7 @@ impl SetValuedFlow {
     /// Computes the time derivative of a state under the present forces of the laws.
     fn set_motion(&mut self, state: &[f64], time: f64) {
         let work = (state, self.load.as_mut_slice(), self.force.as_mut_slice());
-        time_derivative(&self.assembly, work, &self.laws, &self.drive, time, &mut self.slope);
+        time_derivative(&self.assembly, work, &self.laws, &self.excitation, time, &mut self.slope);
     }
 
     /// Determines the modes at the start of a run: moving joints slip, and joints at rest are
@@ -286,7 +287,7 @@ impl SetValuedFlow {
         }
         self.enter_modes();
         let held: Vec<usize> = self.held().map(|friction| friction.axis).collect();
-        let imposed: Vec<f64> = held.iter().map(|&axis| self.drive.relative_at(axis, time).1).collect();
+        let imposed: Vec<f64> = held.iter().map(|&axis| self.excitation.relative_at(axis, time).1).collect();
         let n = self.assembly.n;
         let stopped = remove_velocity(&self.assembly, &held, &imposed, (&mut state[n..2 * n], 1));
         if stopped && self.set_slope(state, time) { Ok(()) } else { Err(self.redundant(time)) }
@@ -313,9 +314,9 @@ impl SetValuedFlow {
         self.loads.stage.clear();
         for (i, c) in NODES.iter().enumerate() {
             let at = time + c * h;
-            self.drive.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
+            self.excitation.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
             for axis in 0..j {
-                self.loads.stage.push(self.drive.relative_at(axis, at));
+                self.loads.stage.push(self.excitation.relative_at(axis, at));
             }
         }
     }
@@ -704,15 +705,15 @@ impl Flow for SetValuedFlow {
     }
 
     fn set_excitation(&mut self, system: &System, omega: f64) {
-        self.drive = self.assembly.drive(system, omega);
+        self.excitation = self.assembly.excitation(system, omega);
     }
 
     fn weights(&self) -> Vec<f64> {
-        self.assembly.weights(&self.drive)
+        self.assembly.weights(&self.excitation)
     }
 
     fn energy_scale(&self) -> f64 {
-        self.assembly.energy_scale(&self.drive)
+        self.assembly.energy_scale(&self.excitation)
     }
 
     fn set_tolerance(&mut self, tolerance: f64) {
@@ -731,7 +732,7 @@ impl Flow for SetValuedFlow {
         }
         self.steps.clear();
         (self.level, self.tried) = (FIRST_LEVEL, 0);
-        let scale = self.assembly.scales(state, &self.drive);
+        let scale = self.assembly.scales(state, &self.excitation);
         let columns = sensitivity.as_deref().map_or(0, |matrix| matrix.ncols());
         if let Some(sensitivity) = sensitivity.as_deref() {
             self.derivative.clear();

@@ -52,8 +52,8 @@ impl HarmonicBalanceSolver {
         motion: &HarmonicSolution,
     ) -> Option<Vec<DVector<Complex64>>> {
         let mut other = HarmonicSolution { iterations: 0, ..motion.clone() };
-        let level = self.discretizations.get_mut(&top)?;
-        level.newton_from(&self.ports, omega, &mut other, ITERATIONS).ok()?;
+        let discretization = self.discretizations.get_mut(&top)?;
+        discretization.newton_from(&self.ports, omega, &mut other, ITERATIONS).ok()?;
         self.places(top, omega, &other).ok()
     }
 

@@ -66,7 +66,7 @@ impl HarmonicBalanceSolver {
         let start = self.refined_guess(top, motion);
         let (few, many) = (self.harmonic_set.up_to(top), self.harmonic_set.up_to(double));
         let coarse = equations::with_harmonics(motion, &few, &many);
-        let states = self.discretizations.get(&top).map(|level| level.states.clone());
+        let states = self.discretizations.get(&top).map(|discretization| discretization.states.clone());
         self.discretization(double, omega)?;
         let finer = self.discretizations.get_mut(&double).expect("made above");
         finer.extends_shorter = true;
@@ -182,7 +182,7 @@ impl HarmonicBalanceSolver {
                     break;
                 }
                 Err(_) if top > first && !self.is_budget_used() => break,
-                Err(lost) => return Err(self.solve_error(lost)),
+                Err(error) => return Err(self.solve_error(error)),
             };
             if (self.ports.has_forces() || self.steep) && top > first {
                 error = error.max(LEAST_ERROR_RATIO * estimate);

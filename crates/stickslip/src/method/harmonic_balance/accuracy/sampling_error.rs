@@ -201,20 +201,20 @@ mod tests {
         for (bodies, share) in [(3, 0.01), (22, 0.03)] {
             let system = row(bodies);
             let ports = Ports::new(&system).unwrap();
-            let rest = LinearDynamics::new(&system, &ports);
+            let dynamics = LinearDynamics::new(&system, &ports);
             let (few, many, omega) = (vec![1, 3, 5], vec![1, 3, 5, 7, 9, 11], 110.0);
-            let level = |harmonics: &[usize], samples: usize| {
-                let mut level = Discretization::new(harmonics.to_vec(), samples, &ports, None);
-                level.set_frequency(&system, &ports, &rest, omega).unwrap();
-                level
+            let discretization = |harmonics: &[usize], samples: usize| {
+                let mut discretization = Discretization::new(harmonics.to_vec(), samples, &ports, None);
+                discretization.set_frequency(&system, &ports, &dynamics, omega).unwrap();
+                discretization
             };
-            let solve = |mut level: Discretization| {
-                let start = level.initial_guess(&system, &ports, None, omega);
-                level.solve(&ports, omega, start).unwrap()
+            let solve = |mut discretization: Discretization| {
+                let start = discretization.initial_guess(&system, &ports, None, omega);
+                discretization.solve(&ports, omega, start).unwrap()
             };
-            let coarse = with_harmonics(&solve(level(&few, 1024)), &few, &many);
-            let whole = solve(level(&many, 2048));
-            let mut near = level(&many, 1024);
+            let coarse = with_harmonics(&solve(discretization(&few, 1024)), &few, &many);
+            let whole = solve(discretization(&many, 2048));
+            let mut near = discretization(&many, 1024);
             assert_eq!(near.has_coarse_sampling(), bodies > 20);
             let found = near.solve_twice_the_samples(&ports, omega, &coarse, &coarse, None).unwrap();
             let apart = |a: &HarmonicSolution, b: &HarmonicSolution| near.distance(&ports, a, b, 1.0);
@@ -237,19 +237,19 @@ mod tests {
     fn the_previous_correction_gives_the_same_distance() {
         let system = row(22);
         let ports = Ports::new(&system).unwrap();
-        let rest = LinearDynamics::new(&system, &ports);
+        let dynamics = LinearDynamics::new(&system, &ports);
         let harmonics = |top: usize| -> Vec<usize> { (1..=top).step_by(2).collect() };
         let (few, many) = (harmonics(9), harmonics(19));
         let [mut short, mut long, mut whole] =
             [(&few, 1024), (&many, 1024), (&many, 2048)].map(|(h, n)| Discretization::new(h.clone(), n, &ports, None));
         let mut added = vec![Complex64::new(0.0, 0.0); ports.count() * many.len()];
         for omega in [110.0, 110.2] {
-            for level in [&mut short, &mut long, &mut whole] {
-                level.set_frequency(&system, &ports, &rest, omega).unwrap();
+            for discretization in [&mut short, &mut long, &mut whole] {
+                discretization.set_frequency(&system, &ports, &dynamics, omega).unwrap();
             }
-            let solve = |level: &mut Discretization| {
-                let start = level.initial_guess(&system, &ports, None, omega);
-                level.solve(&ports, omega, start).unwrap()
+            let solve = |discretization: &mut Discretization| {
+                let start = discretization.initial_guess(&system, &ports, None, omega);
+                discretization.solve(&ports, omega, start).unwrap()
             };
             let coarse = with_harmonics(&solve(&mut short), &few, &many);
             let whole = solve(&mut whole);

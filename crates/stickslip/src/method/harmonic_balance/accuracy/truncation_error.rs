@@ -39,12 +39,12 @@ pub(crate) struct ComparedSolution<'a> {
 pub(crate) fn truncation_error(
     seen: &[Axis],
     ports: &Ports,
-    rest: &LinearDynamics,
-    (kept, omega, steep): (HarmonicSet, f64, bool),
+    dynamics: &LinearDynamics,
+    (harmonic_set, omega, steep): (HarmonicSet, f64, bool),
     coarse: &ComparedSolution,
     (finer, better, places): (&mut Discretization, &HarmonicSolution, &[DVector<Complex64>]),
 ) -> f64 {
-    let above = missing_resonances(finer, rest, ports, kept, omega, better);
+    let above = missing_resonances(finer, dynamics, ports, harmonic_set, omega, better);
     let fine = ComparedSolution { harmonics: finer.harmonics(), places, along: &better.c };
     let unhindered = |place: &Axis| {
         let moving = fine.harmonics.iter().zip(&finer.free_response).filter(|(h, _)| **h > 0);
@@ -88,21 +88,21 @@ fn length(place: &Axis, motion: &DVector<Complex64>) -> Complex64 {
 /// Returns the motions of the places at the resonances above the harmonics of a solution, under
 /// its forces.
 fn missing_resonances(
-    level: &mut Discretization,
-    rest: &LinearDynamics,
+    discretization: &mut Discretization,
+    dynamics: &LinearDynamics,
     ports: &Ports,
-    kept: HarmonicSet,
+    harmonic_set: HarmonicSet,
     omega: f64,
     motion: &HarmonicSolution,
 ) -> Vec<DVector<Complex64>> {
-    let top = *level.harmonics().last().expect("a series has harmonics");
-    let mut wanted = rest.resonances_above(top, omega);
-    wanted.retain(|h| kept.contains(*h));
+    let top = *discretization.harmonics().last().expect("a series has harmonics");
+    let mut wanted = dynamics.resonances_above(top, omega);
+    wanted.retain(|h| harmonic_set.contains(*h));
     if wanted.is_empty() {
         return Vec::new();
     }
-    let forces = level.forces_at(ports, omega, motion, &wanted);
-    let infinite = || DVector::from_element(level.free_response[0].len(), Complex64::new(f64::INFINITY, 0.0));
-    let respond = |h: usize, forces: &[Complex64]| rest.respond_along(h, omega, |q| forces[q]);
+    let forces = discretization.forces_at(ports, omega, motion, &wanted);
+    let infinite = || DVector::from_element(discretization.free_response[0].len(), Complex64::new(f64::INFINITY, 0.0));
+    let respond = |h: usize, forces: &[Complex64]| dynamics.respond_along(h, omega, |q| forces[q]);
     wanted.iter().zip(&forces).map(|(h, forces)| respond(*h, forces).unwrap_or_else(|_| infinite())).collect()
 }

@@ -178,7 +178,7 @@ fn derivatives_agree_with_differences() {
         let ports = ports_of(&law);
         for (harmonics, size) in [(vec![1, 3, 5], 0.6), (vec![0, 1, 2, 3], 0.6), (vec![0, 1, 2], 0.01)] {
             let nh = harmonics.len();
-            let mut alternation = FrequencyTime::new(harmonics.clone(), 512);
+            let mut aft = FrequencyTime::new(harmonics.clone(), 512);
             let port = &ports[0];
             let count = nh * port.axes;
             let is_real = |i: usize| harmonics[i % nh] == 0;
@@ -189,9 +189,9 @@ fn derivatives_agree_with_differences() {
                 let mut force = vec![ZERO; count];
                 if port.is_force() {
                     // without motion the argument of the image is the force alone
-                    alternation.force_port_image(port, (omega, 1.0, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
+                    aft.force_port_image(port, (omega, 1.0, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
                 } else {
-                    alternation.motion_port_force(port, (omega, 1.0), c, &mut force, tangent);
+                    aft.motion_port_force(port, (omega, 1.0), c, &mut force, tangent);
                 }
                 force
             };
@@ -347,10 +347,10 @@ fn round_a_circle_the_loss_is_the_closed_form() {
     let ports = ports_of(&(Arc::new(Plane::Masing) as SharedLaw));
     let radius = 0.5;
     let work = |samples: usize| {
-        let mut alternation = FrequencyTime::new(vec![1], samples);
+        let mut aft = FrequencyTime::new(vec![1], samples);
         let c = [Complex64::new(radius, 0.0), Complex64::new(0.0, -radius)];
         let mut force = [ZERO; 2];
-        alternation.motion_port_force(&ports[0], (1.0, 1.0), &c, &mut force, None);
+        aft.motion_port_force(&ports[0], (1.0, 1.0), &c, &mut force, None);
         (0..2).map(|a| -PI * (force[a].conj() * c[a]).im).sum::<f64>()
     };
     let lead = (LIMIT / (STIFFNESS * radius)).asin();
@@ -410,14 +410,14 @@ fn banded_and_dense_agree_in_a_plane() {
     }
     let system = builder.build().unwrap();
     let ports = Ports::new(&system).unwrap();
-    let rest = LinearDynamics::new(&system, &ports);
+    let dynamics = LinearDynamics::new(&system, &ports);
     let (harmonics, omega) = (vec![1, 3, 5], 1.2);
     let solve = |banded: bool| {
-        let sparse = banded.then(|| BandedForm::new(&system, &ports, &harmonics).unwrap());
-        let mut level = Discretization::new(harmonics.clone(), 256, &ports, sparse);
-        level.set_frequency(&system, &ports, &rest, omega).unwrap();
-        let start = level.initial_guess(&system, &ports, None, omega);
-        level.solve(&ports, omega, start).unwrap()
+        let banded = banded.then(|| BandedForm::new(&system, &ports, &harmonics).unwrap());
+        let mut discretization = Discretization::new(harmonics.clone(), 256, &ports, banded);
+        discretization.set_frequency(&system, &ports, &dynamics, omega).unwrap();
+        let start = discretization.initial_guess(&system, &ports, None, omega);
+        discretization.solve(&ports, omega, start).unwrap()
     };
     let (dense, banded) = (solve(false), solve(true));
     assert!(dense.force.iter().any(|f| f.norm() > 0.5 * LIMIT), "{:?}", dense.force);

@@ -57,9 +57,9 @@ impl BarrierSample {
 
 impl InteriorPort {
     /// Creates the initial iterate from the harmonics of `y` without the force.
-    pub fn new(limit: f64, alternation: &mut FrequencyTime, y: &[Complex64]) -> Self {
-        alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
-        let largest = alternation.signal.iter().fold(limit, |most, y| most.max(y.abs()));
+    pub fn new(limit: f64, aft: &mut FrequencyTime, y: &[Complex64]) -> Self {
+        aft.synthesise(y, |_| Complex64::new(1.0, 0.0));
+        let largest = aft.signal.iter().fold(limit, |most, y| most.max(y.abs()));
         let begin = |y: &f64| {
             let force = INITIAL_FORCE_SHARE * limit * (y / (INITIAL_FORCE_SHARE * largest)).tanh();
             let held = y - force;
@@ -69,7 +69,7 @@ impl InteriorPort {
             let (upper, lower) = if held > 0.0 { (more, less) } else { (less, more) };
             BarrierSample { force, multiplier_upper: upper, multiplier_lower: lower, ..BarrierSample::default() }
         };
-        let samples = alternation.signal.iter().map(begin).collect();
+        let samples = aft.signal.iter().map(begin).collect();
         InteriorPort { limit, unit: limit * largest, samples }
     }
 
@@ -91,46 +91,41 @@ impl InteriorPort {
 
     /// Linearises the conditions at the argument with the harmonics `y`. Writes the derivative
     /// of the harmonics of `f` by those of the argument into `tangent`.
-    pub fn linearise(&mut self, alternation: &mut FrequencyTime, y: &[Complex64], tangent: &mut [f64]) {
-        alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
-        alternation.reserve_slopes(1);
+    pub fn linearise(&mut self, aft: &mut FrequencyTime, y: &[Complex64], tangent: &mut [f64]) {
+        aft.synthesise(y, |_| Complex64::new(1.0, 0.0));
+        aft.reserve_slopes(1);
         for (i, s) in self.samples.iter_mut().enumerate() {
             let [above, below] = s.distances_to_limits(self.limit);
-            s.argument = alternation.signal[i];
+            s.argument = aft.signal[i];
             s.slope = 1.0 / (1.0 + s.multiplier_upper / above + s.multiplier_lower / below);
-            alternation.slopes[0][i] = s.slope;
+            aft.slopes[0][i] = s.slope;
         }
         tangent.fill(0.0);
-        if alternation.slope_spectrum(0, 0) {
-            alternation.add_slope(tangent, (0, 0), 1, |_| Complex64::new(1.0, 0.0));
+        if aft.slope_spectrum(0, 0) {
+            aft.add_slope(tangent, (0, 0), 1, |_| Complex64::new(1.0, 0.0));
         }
     }
 
     /// Sets the targets of the products to `gap`. With `corrected`, the targets include the
     /// second-order terms of the last step (Mehrotra's corrector). Writes the harmonics of the
     /// force after a step with an unchanged argument into `image`.
-    pub fn set_targets(
-        &mut self,
-        (gap, corrected): (f64, bool),
-        alternation: &mut FrequencyTime,
-        image: &mut [Complex64],
-    ) {
+    pub fn set_targets(&mut self, (gap, corrected): (f64, bool), aft: &mut FrequencyTime, image: &mut [Complex64]) {
         let product = gap * self.unit;
-        for (s, force) in self.samples.iter_mut().zip(&mut alternation.force[0]) {
+        for (s, force) in self.samples.iter_mut().zip(&mut aft.force[0]) {
             let [step, upper, lower] = if corrected { s.step } else { [0.0; 3] };
             s.targets = [product + upper * step, product - lower * step];
             *force = s.force + s.slope * s.reduced_residual(self.limit);
         }
         image.fill(Complex64::default());
-        alternation.add_force(0, image);
+        aft.add_force(0, image);
     }
 
     /// Computes the step to the argument with the harmonics `y`. Returns the
     /// share of it, at most 1, that stays inside all bounds.
-    pub fn step(&mut self, alternation: &mut FrequencyTime, y: &[Complex64]) -> f64 {
-        alternation.synthesise(y, |_| Complex64::new(1.0, 0.0));
+    pub fn step(&mut self, aft: &mut FrequencyTime, y: &[Complex64]) -> f64 {
+        aft.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let mut most = 1.0 / STEP_TO_BOUNDARY;
-        for (s, y) in self.samples.iter_mut().zip(&alternation.signal) {
+        for (s, y) in self.samples.iter_mut().zip(&aft.signal) {
             let [above, below] = s.distances_to_limits(self.limit);
             let force = s.slope * (y - s.argument + s.reduced_residual(self.limit));
             let upper = (s.targets[0] + s.multiplier_upper * force) / above - s.multiplier_upper;
@@ -167,14 +162,14 @@ mod tests {
     fn the_path_ends_at_the_projection() {
         let limit = 0.7;
         for y in [-30.0, -0.71, -0.2, 0.0, 0.69, 5.0f64] {
-            let mut alternation = FrequencyTime::new(vec![0], 16);
+            let mut aft = FrequencyTime::new(vec![0], 16);
             let (argument, mut image, mut tangent) = ([Complex64::new(y, 0.0)], [Complex64::default()], [0.0; 4]);
-            let mut barrier = InteriorPort::new(limit, &mut alternation, &argument);
+            let mut barrier = InteriorPort::new(limit, &mut aft, &argument);
             while barrier.remaining_gap() > 1e-10 {
                 let gap = barrier.gap(0.0);
-                barrier.linearise(&mut alternation, &argument, &mut tangent);
-                barrier.set_targets((0.1 * gap, false), &mut alternation, &mut image);
-                let share = barrier.step(&mut alternation, &argument);
+                barrier.linearise(&mut aft, &argument, &mut tangent);
+                barrier.set_targets((0.1 * gap, false), &mut aft, &mut image);
+                let share = barrier.step(&mut aft, &argument);
                 assert!(share > 0.0 && share <= 1.0);
                 barrier.advance(share);
             }

@@ -387,9 +387,9 @@ mod tests {
     }
 
     fn respond(law: &Iwan, harmonics: &[usize], c: &[Complex64], slopes: Option<&mut [f64]>) -> Vec<Complex64> {
-        let mut alternation = FrequencyTime::new(harmonics.to_vec(), 256);
+        let mut aft = FrequencyTime::new(harmonics.to_vec(), 256);
         let mut force = vec![ZERO; c.len()];
-        alternation.masing(law, &StaticState::default(), c, &mut force, slopes);
+        aft.masing(law, &StaticState::default(), c, &mut force, slopes);
         force
     }
 
@@ -487,15 +487,15 @@ mod tests {
         let far = law.slip_displacement();
         let c = [0.1 * far, 0.5 * far, 0.3 * far, 0.4 * far].map(|x| Complex64::new(x, 0.3 * x));
         let c = [c[0].re.into(), c[1], c[2], c[3]];
-        let mut alternation = FrequencyTime::new(harmonics, 256);
-        alternation.sample_masing(&law, &StaticState::default(), &c);
-        let mut z = alternation.state.clone();
-        let at = [alternation.signal[0], 0.0, 0.0];
-        let to = [alternation.signal[1], 0.0, 0.0];
+        let mut aft = FrequencyTime::new(harmonics, 256);
+        aft.sample_masing(&law, &StaticState::default(), &c);
+        let mut z = aft.state.clone();
+        let at = [aft.signal[0], 0.0, 0.0];
+        let to = [aft.signal[1], 0.0, 0.0];
         let force: f64 = law.advance(&at, &at, &mut z)[0];
-        assert!((force - alternation.force[0][0]).abs() < 1e-14);
+        assert!((force - aft.force[0][0]).abs() < 1e-14);
         let force: f64 = law.advance(&at, &to, &mut z)[0];
-        assert!((force - alternation.force[0][1]).abs() < 1e-14);
+        assert!((force - aft.force[0][1]).abs() < 1e-14);
     }
 
     /// Orbits of a mass of 1 kg on 1e4 N/m and 2 N s/m with Iwan's law (5 kN/m,

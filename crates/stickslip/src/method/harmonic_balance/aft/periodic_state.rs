@@ -55,7 +55,7 @@ pub(super) trait StepSequence {
     /// `angle` is the length of a step.
     fn input_factors(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
     /// Returns these factors for the initial step.
-    fn first_waves(&self, h: usize) -> [Complex64; 4];
+    fn initial_input_factors(&self, h: usize) -> [Complex64; 4];
     /// Takes all steps of a period: from sample 0 to sample 1, and at last from
     /// the last sample to sample 0. Replaces the states `z` at sample 0 by
     /// those after the period, and writes the forces at the samples.
@@ -74,18 +74,18 @@ impl FrequencyTime {
     /// NaN if no periodic states are found.
     pub(super) fn periodic_response(
         &mut self,
-        march: &mut dyn StepSequence,
+        sequence: &mut dyn StepSequence,
         force: &mut [Complex64],
         tangent: Option<&mut [f64]>,
     ) {
         let nh = self.harmonics.len();
         let mut memory = std::mem::take(&mut self.workspace);
-        if let Some(product) = self.find_periodic_state(march, &mut memory, tangent.is_some()) {
-            for a in 0..march.axes() {
+        if let Some(product) = self.find_periodic_state(sequence, &mut memory, tangent.is_some()) {
+            for a in 0..sequence.axes() {
                 self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
             }
             if let Some(tangent) = tangent
-                && !self.march_tangent(march, &mut memory, &product, tangent)
+                && !self.memory_tangent(sequence, &mut memory, &product, tangent)
             {
                 force.fill(Complex64::new(f64::NAN, 0.0));
             }
@@ -101,12 +101,12 @@ impl FrequencyTime {
     /// an arbitrary matrix. `None` if no periodic states are found.
     fn find_periodic_state(
         &mut self,
-        march: &mut dyn StepSequence,
+        sequence: &mut dyn StepSequence,
         memory: &mut StepWorkspace,
         linear: bool,
     ) -> Option<DMatrix<f64>> {
-        let m = march.states();
-        let scale = march.state_scale();
+        let m = sequence.states();
+        let scale = sequence.state_scale();
         let known = std::mem::take(&mut self.known_state);
         let mut z = DVector::zeros(m);
         let begun = m > 0 && known.state.len() == m;
@@ -114,13 +114,13 @@ impl FrequencyTime {
             z.copy_from_slice(&known.state);
         } else {
             let mut force = [0.0; MAX_DIRECTIONS];
-            if !march.initial_step(z.as_mut_slice(), &mut force, None) {
+            if !sequence.initial_step(z.as_mut_slice(), &mut force, None) {
                 return None;
             }
         }
         if m > 0 && !linear && known.forgetting_inverse.len() == m * m {
             let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
-            if self.broyden(march, &mut z, inverse)? {
+            if self.broyden(sequence, &mut z, inverse)? {
                 return Some(DMatrix::zeros(m, m));
             }
         } else if linear
@@ -130,13 +130,13 @@ impl FrequencyTime {
             // known states from other samples: one period without derivatives brings them near
             // enough, at a third of the cost of one with derivatives
             let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
-            let change = self.period(march, &z, None)? - &z;
+            let change = self.period(sequence, &z, None)? - &z;
             z += inverse * change;
         } else if !begun {
             // a law that slips forgets its initial states in a few periods without derivatives
             let mut last = f64::INFINITY;
             for _ in 0..PLAIN_PERIODS {
-                let after = self.period(march, &z, None)?;
+                let after = self.period(sequence, &z, None)?;
                 let gap = (&after - &z).amax() / scale;
                 z = after;
                 if gap <= PERIODICITY_TOLERANCE && !linear {
@@ -152,7 +152,7 @@ impl FrequencyTime {
         }
         let mut last = f64::INFINITY;
         for _ in 0..PERIODS {
-            let (after, product) = self.linear_period(march, &z, memory)?;
+            let (after, product) = self.linear_period(sequence, &z, memory)?;
             let gap = (&after - &z).amax() / scale;
             if m == 0 || gap <= self.periodicity_tolerance || (gap <= ROUNDED && gap >= 0.5 * last) {
                 self.state.clear();
@@ -179,18 +179,18 @@ impl FrequencyTime {
     /// equations" (1965), his good method.
     fn broyden(
         &mut self,
-        march: &mut dyn StepSequence,
+        sequence: &mut dyn StepSequence,
         z: &mut DVector<f64>,
         mut inverse: DMatrix<f64>,
     ) -> Option<bool> {
-        let scale = march.state_scale();
-        let mut change = self.period(march, z, None)? - &*z;
+        let scale = sequence.state_scale();
+        let mut change = self.period(sequence, z, None)? - &*z;
         let mut best = change.amax() / scale;
         let mut waited = 0;
         while best > PERIODICITY_TOLERANCE {
             let step = &inverse * &change;
             *z += &step;
-            let after = self.period(march, z, None)? - &*z;
+            let after = self.period(sequence, z, None)? - &*z;
             let gap = after.amax() / scale;
             (best, waited) = if gap < BROYDEN_REDUCTION * best { (gap, 0) } else { (best.min(gap), waited + 1) };
             if waited > 1 || !gap.is_finite() {
@@ -212,46 +212,46 @@ impl FrequencyTime {
     /// Integrates one period and returns the states after it. `None` if a step has no solution.
     fn period(
         &mut self,
-        march: &mut dyn StepSequence,
+        sequence: &mut dyn StepSequence,
         z: &DVector<f64>,
         mut rows: Option<&mut Vec<f64>>,
     ) -> Option<DVector<f64>> {
         interrupt::check();
         let n = self.samples();
-        let (m, d) = (march.states(), march.axes());
-        let size = (m + d) * width(march);
+        let (m, d) = (sequence.states(), sequence.axes());
+        let size = (m + d) * width(sequence);
         if let Some(rows) = rows.as_deref_mut() {
             rows.resize(n * size, 0.0);
         }
         let mut z = z.clone();
         self.law_steps += n;
-        march.period(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
+        sequence.period(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
     }
 
     /// Integrates one period with derivatives. Returns the states after it and Π, and writes
     /// the derivatives of the forces by the initial states.
     fn linear_period(
         &mut self,
-        march: &mut dyn StepSequence,
+        sequence: &mut dyn StepSequence,
         z: &DVector<f64>,
         memory: &mut StepWorkspace,
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let after = self.period(march, z, Some(&mut memory.rows))?;
+        let after = self.period(sequence, z, Some(&mut memory.rows))?;
         let n = self.samples();
-        memory.by_state.resize(n * march.axes() * march.states(), 0.0);
-        Some((after, PeriodDerivatives::new(march, &memory.rows, n).product(&mut memory.by_state)))
+        memory.by_state.resize(n * sequence.axes() * sequence.states(), 0.0);
+        Some((after, PeriodDerivatives::new(sequence, &memory.rows, n).product(&mut memory.by_state)))
     }
 
     /// Adds the derivative of the forces. Returns false if the first period has no solution.
-    fn march_tangent(
+    fn memory_tangent(
         &mut self,
-        march: &mut dyn StepSequence,
+        sequence: &mut dyn StepSequence,
         memory: &mut StepWorkspace,
         product: &DMatrix<f64>,
         tangent: &mut [f64],
     ) -> bool {
         let (n, nh) = (self.samples(), self.harmonics.len());
-        let (m, d) = (march.states(), march.axes());
+        let (m, d) = (sequence.states(), sequence.axes());
         let size = 2 * nh * d;
         let open = DMatrix::identity(m, m) - product;
         let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL_SINGULAR_VALUE;
@@ -263,7 +263,7 @@ impl FrequencyTime {
         // states that are never forgotten have the derivative of the first period
         let beginning = if neutral {
             let mut first = std::mem::take(&mut memory.first);
-            let rows = self.first_period(march, &mut first);
+            let rows = self.first_period(sequence, &mut first);
             memory.first = first;
             match rows {
                 Some(rows) => Some(rows),
@@ -282,23 +282,23 @@ impl FrequencyTime {
         }
         // a force that depends only on the end of the step has a slope at every sample
         let one = Complex64::new(1.0, 0.0);
-        let ends = |h: &usize| march.inputs() == 2 && march.input_factors(*h, TAU / n as f64, one)[1] == one;
+        let ends = |h: &usize| sequence.inputs() == 2 && sequence.input_factors(*h, TAU / n as f64, one)[1] == one;
         let by_ends = few && self.harmonics.iter().all(ends);
-        let own = if by_ends { d - PeriodDerivatives::new(march, &memory.rows, n).momentary() } else { d };
+        let own = if by_ends { d - PeriodDerivatives::new(sequence, &memory.rows, n).momentary() } else { d };
         for a in own..d {
-            self.momentary_tangent(march, &memory.rows, a, tangent);
+            self.momentary_tangent(sequence, &memory.rows, a, tangent);
         }
         // few harmonics: all axes at once; a long series: one axis and a group
         // of harmonics at a time
         let (together, count) = if few { (d, nh) } else { (1, derivative_batch(d, n, nh).0) };
         let moved = if own == 0 { 0 } else { d };
         for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
-            self.fill_waves(march, memory, range.clone());
+            self.fill_input_factors(sequence, memory, range.clone());
             for first in (0..moved).step_by(together.max(1)) {
                 let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
                 let tall = together * wide_here;
                 self.differentiate_forces(
-                    march,
+                    sequence,
                     memory,
                     steps,
                     (DerivativeVariable::Solution { first }, together, wide_here, own),
@@ -336,9 +336,9 @@ impl FrequencyTime {
                 }
             }
         }
-        if march.knows_frequency() {
+        if sequence.knows_frequency() {
             self.differentiate_forces(
-                march,
+                sequence,
                 memory,
                 (beginning.as_deref(), &inverse),
                 (DerivativeVariable::Frequency, 1, 1, d),
@@ -357,8 +357,8 @@ impl FrequencyTime {
 
     /// Adds the derivative of the force along axis `a` by the displacement at
     /// the end of the step, at every sample.
-    fn momentary_tangent(&mut self, march: &dyn StepSequence, rows: &[f64], a: usize, tangent: &mut [f64]) {
-        let (m, d, width) = (march.states(), march.axes(), width(march));
+    fn momentary_tangent(&mut self, sequence: &dyn StepSequence, rows: &[f64], a: usize, tangent: &mut [f64]) {
+        let (m, d, width) = (sequence.states(), sequence.axes(), width(sequence));
         self.reserve_slopes(1);
         for b in 0..d {
             let slopes = rows.chunks_exact((m + d) * width).map(|rows| rows[(m + a) * width + d + b]);
@@ -387,17 +387,18 @@ impl FrequencyTime {
 
     /// Fills the derivatives of the inputs by the parts of some harmonics of a motion:
     /// [sample][kind][part], followed by those of the initial step.
-    fn fill_waves(
+    fn fill_input_factors(
         &self,
-        march: &dyn StepSequence,
+        sequence: &dyn StepSequence,
         StepWorkspace { input_factors: waves, steps, .. }: &mut StepWorkspace,
         range: Range<usize>,
     ) {
-        let (n, kinds, harmonics) = (self.samples(), march.inputs(), &self.harmonics[range]);
+        let (n, kinds, harmonics) = (self.samples(), sequence.inputs(), &self.harmonics[range]);
         // all steps have these factors, rotated on the unit circle
         let one = Complex64::new(1.0, 0.0);
-        let each = harmonics.iter().map(|&h| march.input_factors(h, TAU / n as f64, one));
-        let fixed: Vec<[Complex64; 4]> = each.chain(harmonics.iter().map(|&h| march.first_waves(h))).collect();
+        let each = harmonics.iter().map(|&h| sequence.input_factors(h, TAU / n as f64, one));
+        let fixed: Vec<[Complex64; 4]> =
+            each.chain(harmonics.iter().map(|&h| sequence.initial_input_factors(h))).collect();
         if waves.len() == 2 * (n + 1) * kinds * harmonics.len() && *steps == fixed {
             return;
         }
@@ -429,16 +430,16 @@ impl FrequencyTime {
     /// forgotten; the states at t = 0 then change with the inputs.
     fn differentiate_forces(
         &self,
-        march: &dyn StepSequence,
+        sequence: &dyn StepSequence,
         memory: &mut StepWorkspace,
         (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
         (input, count, wide, own): (DerivativeVariable, usize, usize, usize),
     ) {
         let n = self.samples();
-        let (m, d) = (march.states(), march.axes());
-        let width = width(march);
+        let (m, d) = (sequence.states(), sequence.axes());
+        let width = width(sequence);
         let size = (m + d) * width;
-        let by = InputLayout { input, kinds: march.inputs(), axes: d, width, wide, tall: count * wide };
+        let by = InputLayout { input, kinds: sequence.inputs(), axes: d, width, wide, tall: count * wide };
         let tall = by.tall;
         let (mut start, mut next) = (vec![0.0; m * tall], vec![0.0; m * tall]);
         let table = &memory.input_factors;
@@ -484,17 +485,17 @@ impl FrequencyTime {
 
     /// Computes the derivatives of the steps of the first period, and of the
     /// initial step into `first`. Restores `self.force`.
-    fn first_period(&mut self, march: &mut dyn StepSequence, first: &mut Vec<f64>) -> Option<Vec<f64>> {
-        let (m, d) = (march.states(), march.axes());
-        first.resize((m + d) * width(march), 0.0);
+    fn first_period(&mut self, sequence: &mut dyn StepSequence, first: &mut Vec<f64>) -> Option<Vec<f64>> {
+        let (m, d) = (sequence.states(), sequence.axes());
+        first.resize((m + d) * width(sequence), 0.0);
         let mut z = DVector::zeros(m);
         let mut force = [0.0; MAX_DIRECTIONS];
-        if !march.initial_step(z.as_mut_slice(), &mut force, Some(first)) {
+        if !sequence.initial_step(z.as_mut_slice(), &mut force, Some(first)) {
             return None;
         }
         let forces = self.force.clone();
         let mut rows = Vec::new();
-        let run = self.period(march, &z, Some(&mut rows));
+        let run = self.period(sequence, &z, Some(&mut rows));
         self.force = forces;
         run.map(|_| rows)
     }
@@ -524,9 +525,9 @@ struct PeriodDerivatives<'a> {
 }
 
 impl<'a> PeriodDerivatives<'a> {
-    fn new(march: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
-        let (states, axes) = (march.states(), march.axes());
-        PeriodDerivatives { rows, width: width(march), before: march.inputs() * axes, states, axes, samples }
+    fn new(sequence: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
+        let (states, axes) = (sequence.states(), sequence.axes());
+        PeriodDerivatives { rows, width: width(sequence), before: sequence.inputs() * axes, states, axes, samples }
     }
 
     /// Returns the number of trailing forces that depend only on the end of the step at every
@@ -589,8 +590,8 @@ impl<'a> PeriodDerivatives<'a> {
 
 /// Returns the number of derivatives of a step: by its inputs, by the states
 /// before it, and by ω if that is known.
-fn width(march: &dyn StepSequence) -> usize {
-    march.inputs() * march.axes() + march.states() + usize::from(march.knows_frequency())
+fn width(sequence: &dyn StepSequence) -> usize {
+    sequence.inputs() * sequence.axes() + sequence.states() + usize::from(sequence.knows_frequency())
 }
 
 /// The variables of a derivative.

@@ -143,7 +143,7 @@ impl FrequencyTime {
         let displacement = std::mem::take(&mut self.displacement);
         let velocity = std::mem::take(&mut self.velocity);
         let states = rate.states();
-        let mut march = RateStepper {
+        let mut stepper = RateStepper {
             rate,
             axes,
             omega,
@@ -157,7 +157,7 @@ impl FrequencyTime {
             whole: Vec::new(),
             frequency: self.by_frequency.is_some(),
         };
-        self.periodic_response(&mut march, force, tangent);
+        self.periodic_response(&mut stepper, force, tangent);
         (self.displacement, self.velocity) = (displacement, velocity);
     }
 }
@@ -391,7 +391,7 @@ impl StepSequence for RateStepper<'_> {
         let stage = at * Complex64::cis(-FIRST_STAGE_REMAINDER * angle * h as f64);
         [stage, stage * turn, at, at * turn]
     }
-    fn first_waves(&self, _h: usize) -> [Complex64; 4] {
+    fn initial_input_factors(&self, _h: usize) -> [Complex64; 4] {
         let rate = self.omega / (TAU * INITIAL_STEP_SHARE);
         [1.0 - FIRST_STAGE_REMAINDER, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }

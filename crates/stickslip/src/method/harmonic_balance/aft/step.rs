@@ -83,9 +83,9 @@ impl FrequencyTime {
         let mut trail = std::mem::take(&mut self.states_at_samples);
         trail.clear();
         trail.resize(self.samples() * step.states(), f64::NAN);
-        let mut march = ReturnMapStepper { step, axes, samples: &displacement, rest, states, point, trail };
-        self.periodic_response(&mut march, force, tangent);
-        self.states_at_samples = march.trail;
+        let mut stepper = ReturnMapStepper { step, axes, samples: &displacement, rest, states, point, trail };
+        self.periodic_response(&mut stepper, force, tangent);
+        self.states_at_samples = stepper.trail;
         self.displacement = displacement;
     }
 }
@@ -153,7 +153,7 @@ impl StepSequence for ReturnMapStepper<'_> {
         let zero = Complex64::new(0.0, 0.0);
         [at * Complex64::cis(-angle * h as f64), at, zero, zero]
     }
-    fn first_waves(&self, _h: usize) -> [Complex64; 4] {
+    fn initial_input_factors(&self, _h: usize) -> [Complex64; 4] {
         [0.0, 1.0, 0.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
     fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
@@ -207,21 +207,21 @@ mod tests {
                 let c: Vec<Complex64> = (0..axes * nh)
                     .map(|i| Complex64::new(0.12 / (1.0 + i as f64), -imaginary(i % nh) / (2.0 + i as f64)))
                     .collect();
-                let mut alternation = FrequencyTime::new(harmonics, 256);
+                let mut aft = FrequencyTime::new(harmonics, 256);
                 let size = 2 * nh * axes;
                 let mut found = [(); 2].map(|()| (vec![Complex64::new(0.0, 0.0); axes * nh], vec![0.0; size * size]));
                 let [(force, slopes), (sampled, sampled_slopes)] = &mut found;
-                alternation.law_steps = 0;
-                alternation.step(law, port, &c, force, Some(slopes));
-                assert_eq!(alternation.law_steps, 0, "{law:?} was sampled");
-                alternation.step_by_step(law, port, &c, sampled, Some(sampled_slopes));
+                aft.law_steps = 0;
+                aft.step(law, port, &c, force, Some(slopes));
+                assert_eq!(aft.law_steps, 0, "{law:?} was sampled");
+                aft.step_by_step(law, port, &c, sampled, Some(sampled_slopes));
                 assert!(force.iter().zip(&*sampled).all(|(a, b)| (a - b).norm() < 1e-12), "{force:?} {sampled:?}");
                 for (i, (a, b)) in slopes.iter().zip(&*sampled_slopes).enumerate() {
                     assert!((a - b).abs() < 1e-11, "{law:?}, row {}, column {}: {a} {b}", i / size, i % size);
                 }
                 let far: Vec<Complex64> = c.iter().map(|c| c * 9.0).collect();
-                alternation.step(law, port, &far, force, None);
-                assert!(alternation.law_steps > 0, "{law:?} slips");
+                aft.step(law, port, &far, force, None);
+                assert!(aft.law_steps > 0, "{law:?} slips");
             }
         }
     }
@@ -238,21 +238,18 @@ mod tests {
             (0..3 * nh).map(|i| own(i) * (1.0 + change * (i as f64).sin())).collect()
         };
         let none = vec![Complex64::new(0.0, 0.0); 3 * nh];
-        let mut alternation = FrequencyTime::new(harmonics, 512);
+        let mut aft = FrequencyTime::new(harmonics, 512);
         let mut slopes = vec![0.0; (6 * nh).pow(2)];
         let port = port(contact, 3);
-        alternation.step(&contact, &port, &at(0.0), &mut none.clone(), Some(&mut slopes));
-        let known = InitialState {
-            state: alternation.state.clone(),
-            forgetting_inverse: alternation.forgetting_inverse.clone(),
-        };
+        aft.step(&contact, &port, &at(0.0), &mut none.clone(), Some(&mut slopes));
+        let known = InitialState { state: aft.state.clone(), forgetting_inverse: aft.forgetting_inverse.clone() };
         assert!(known.forgetting_inverse.len() == 4, "a contact that slips forgets");
         for change in [1e-6, 1e-2, 0.3] {
             let mut run = |begin: InitialState| {
                 let mut force = none.clone();
-                (alternation.known_state, alternation.law_steps) = (begin, 0);
-                alternation.step(&contact, &port, &at(change), &mut force, None);
-                (force, alternation.law_steps)
+                (aft.known_state, aft.law_steps) = (begin, 0);
+                aft.step(&contact, &port, &at(change), &mut force, None);
+                (force, aft.law_steps)
             };
             let (from_rest, many) = run(InitialState::default());
             let (nearby, few) = run(known.clone());

@@ -125,14 +125,14 @@ impl ClosedContacts {
 
     fn respond(&self, omega: f64, force: &DVector<Complex64>) -> Result<DVector<Complex64>, UndampedResonance> {
         match &self.form {
-            ClosedForm::Rows(rest) => rest.respond(0, omega, force),
+            ClosedForm::Rows(dynamics) => dynamics.respond(0, omega, force),
             ClosedForm::Modes(modes) => modes.respond(omega, force),
         }
     }
 
     fn receptance(&self, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         match &self.form {
-            ClosedForm::Rows(rest) => rest.receptance(0, omega),
+            ClosedForm::Rows(dynamics) => dynamics.receptance(0, omega),
             ClosedForm::Modes(modes) => modes.receptance(omega),
         }
     }
@@ -202,7 +202,7 @@ impl LinearDynamics {
             Some(waves) => Some(TravellingWaves::new(&structure, waves.cyclic)?),
             None => None,
         };
-        let rest = LinearDynamics {
+        let dynamics = LinearDynamics {
             n: self.n,
             modal: None,
             uncoupled: None,
@@ -216,7 +216,7 @@ impl LinearDynamics {
             springs: Vec::new(),
             closed: OnceCell::from(None),
         };
-        Some(ClosedContacts { springs, form: ClosedForm::Rows(Box::new(rest)) })
+        Some(ClosedContacts { springs, form: ClosedForm::Rows(Box::new(dynamics)) })
     }
 
     /// Returns the displacement along each axis at rest under a constant unit
@@ -615,7 +615,7 @@ mod tests {
         let system = chain(n, stiffness, damping);
         assert!(system.structure().is_sparse());
         let ports = Ports::new(&system).unwrap();
-        let rest = LinearDynamics::new(&system, &ports);
+        let dynamics = LinearDynamics::new(&system, &ports);
         let walls = (n + 1) as f64;
         for (h, omega) in [(1, 0.7), (3, 0.7), (1, 2.9), (0, 0.7)] {
             let s = Complex64::new(0.0, h as f64 * omega);
@@ -628,23 +628,23 @@ mod tests {
                 (1..=n).map(one).sum()
             };
             let at = [3.0, (n - 1) as f64];
-            let receptance = rest.receptance(h, omega).unwrap();
+            let receptance = dynamics.receptance(h, omega).unwrap();
             for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 let expected = exact(at[a], at[b]);
                 assert!((receptance[(a, b)] - expected).norm() < 1e-9 * exact(at[0], at[0]).norm(), "{a} {b}: {h}");
             }
             let mut force = DVector::from_element(n, ZERO);
             force[9] = Complex64::new(0.0, 2.0);
-            let x = rest.respond(h, omega, &force).unwrap();
+            let x = dynamics.respond(h, omega, &force).unwrap();
             let pull = [Complex64::new(0.0, 2.0), Complex64::new(-1.0, 0.5)];
-            let pulled = rest.respond_along(h, omega, |q| pull[q]).unwrap();
+            let pulled = dynamics.respond_along(h, omega, |q| pull[q]).unwrap();
             for i in [1, 10, n] {
                 let expected = exact(i as f64, 10.0) * Complex64::new(0.0, 2.0);
                 assert!((x[i - 1] - expected).norm() < 1e-9 * exact(10.0, 10.0).norm());
                 let expected = exact(i as f64, at[0]) * pull[0] + exact(i as f64, at[1]) * pull[1];
                 assert!((pulled[i - 1] - expected).norm() < 1e-9 * exact(at[0], at[0]).norm());
             }
-            assert!(rest.kept_unit_responses(s, omega).is_some());
+            assert!(dynamics.kept_unit_responses(s, omega).is_some());
         }
     }
 

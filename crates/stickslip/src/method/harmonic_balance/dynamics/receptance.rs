@@ -14,7 +14,7 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Number of axes from which products in blocks are faster.
 const BLOCKED: usize = 12;
 
-/// Receptances at the harmonics of a level, m/N.
+/// Receptances at the harmonics of a discretization, m/N.
 #[derive(Debug, Clone)]
 pub(crate) enum Receptance {
     /// One matrix per harmonic, axes × axes.

@@ -38,36 +38,36 @@ impl Discretization {
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
-        (ease, sketched): (Homotopy, bool),
+        (homotopy, sketched): (Homotopy, bool),
     ) -> bool {
         let nh = self.harmonics().len();
-        self.aft.static_share = self.load_factor(ease) / ease.limit_factor;
+        self.aft.static_share = self.load_factor(homotopy) / homotopy.limit_factor;
         let mut any = false;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.has_memory_steps()) {
             let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
             let slot = &mut self.tangents[tangent_range(&self.blocks, p, port, nh)];
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range.clone()]);
-            let mut alternation = &mut self.aft;
+            let mut aft = &mut self.aft;
             let mut rough = false;
-            if let Some(sketch) = self.coarse.as_mut().filter(|_| sketched && port.uses_return_map()) {
+            if let Some(coarse) = self.coarse.as_mut().filter(|_| sketched && port.uses_return_map()) {
                 let image = &mut self.image[..range.len()];
-                sketch.static_share = alternation.static_share;
-                sketch.known_state.clone_from(&self.states[p]);
-                sketch.periodicity_tolerance = COARSE_PERIODICITY;
-                sketch.motion_port_force(port, (omega, ease.limit_factor), c, image, Some(&mut *slot));
-                sketch.periodicity_tolerance = PERIODICITY_TOLERANCE;
+                coarse.static_share = aft.static_share;
+                coarse.known_state.clone_from(&self.states[p]);
+                coarse.periodicity_tolerance = COARSE_PERIODICITY;
+                coarse.motion_port_force(port, (omega, homotopy.limit_factor), c, image, Some(&mut *slot));
+                coarse.periodicity_tolerance = PERIODICITY_TOLERANCE;
                 rough = image.iter().all(|f| f.is_finite());
                 if rough {
-                    alternation = sketch;
+                    aft = coarse;
                 }
             }
             if !rough {
-                alternation.known_state.clone_from(&self.states[p]);
-                alternation.motion_port_force(port, (omega, ease.limit_factor), c, force, Some(slot));
+                aft.known_state.clone_from(&self.states[p]);
+                aft.motion_port_force(port, (omega, homotopy.limit_factor), c, force, Some(slot));
             }
             // a port that sticks throughout was not sampled
-            any |= rough && !alternation.state.is_empty();
-            self.states[p].forgetting_inverse.clone_from(&alternation.forgetting_inverse);
+            any |= rough && !aft.state.is_empty();
+            self.states[p].forgetting_inverse.clone_from(&aft.forgetting_inverse);
             self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
         }
         self.linearised = true;
@@ -76,7 +76,7 @@ impl Discretization {
 
     /// Returns the number of samples of a period, also while the coarse sampling is in use.
     pub fn all_samples(&self) -> usize {
-        self.coarse.iter().map(|sketch| sketch.samples()).fold(self.aft.samples(), usize::max)
+        self.coarse.iter().map(|coarse| coarse.samples()).fold(self.aft.samples(), usize::max)
     }
 
     /// Tells whether there is a coarse sampling.
@@ -87,8 +87,8 @@ impl Discretization {
     /// Exchanges the samplings: forces and their derivatives use the coarse
     /// one, until the next call.
     pub fn exchange_samples(&mut self) {
-        let Some(sketch) = &mut self.coarse else { return };
-        sketch.law_steps = self.aft.law_steps;
-        std::mem::swap(&mut self.aft, sketch);
+        let Some(coarse) = &mut self.coarse else { return };
+        coarse.law_steps = self.aft.law_steps;
+        std::mem::swap(&mut self.aft, coarse);
     }
 }

@@ -25,7 +25,7 @@ impl Discretization {
         &mut self,
         system: &System,
         ports: &Ports,
-        rest: &LinearDynamics,
+        dynamics: &LinearDynamics,
         omega: f64,
     ) -> Result<(), f64> {
         let n = system.dofs();
@@ -34,30 +34,30 @@ impl Discretization {
         for port in ports.iter() {
             self.series[port.range()].fill(port.series_compliance);
         }
-        let closed = if self.aft.harmonics[0] == 0 { rest.closed(omega) } else { None };
+        let closed = if self.aft.harmonics[0] == 0 { dynamics.closed(omega) } else { None };
         self.closed_stiffness.clear();
         self.closed_stiffness.extend(closed.iter().flat_map(|closed| &closed.springs));
         self.free_response.clear();
-        if let Some(sparse) = &mut self.banded {
+        if let Some(banded) = &mut self.banded {
             // at a singular frequency, take the next floating-point number
-            sparse.set_closed_contacts(&self.closed_stiffness);
-            sparse
+            banded.set_closed_contacts(&self.closed_stiffness);
+            banded
                 .factor_dynamic_stiffness(omega)
-                .or_else(|_| sparse.factor_dynamic_stiffness(omega * (1.0 + f64::EPSILON)))?;
+                .or_else(|_| banded.factor_dynamic_stiffness(omega * (1.0 + f64::EPSILON)))?;
         } else {
-            self.receptance = self.receptance(ports, rest, omega)?;
+            self.receptance = self.receptance(ports, dynamics, omega)?;
         }
         for k in 0..nh {
             let h = self.aft.harmonics[k];
             let load = excitation.iter().find(|(number, _)| *number as usize == h);
             let mut free = DVector::from_element(n, ZERO);
-            if let Some(sparse) = &mut self.banded {
+            if let Some(banded) = &mut self.banded {
                 if let Some((_, force)) = load {
-                    sparse.respond(k, |i| force[i], free.as_mut_slice());
+                    banded.respond(k, |i| force[i], free.as_mut_slice());
                 }
             } else {
                 if let Some((_, force)) = load {
-                    free = rest.respond(h, omega, force).map_err(|_| h as f64 * omega)?;
+                    free = dynamics.respond(h, omega, force).map_err(|_| h as f64 * omega)?;
                 }
             }
             for q in 0..ports.count() {
@@ -79,8 +79,8 @@ impl Discretization {
         // at a real rate: the impedance of the highest harmonic without the resonances near it
         let rate = top as f64 * omega;
         let smooth = match &mut self.banded {
-            Some(sparse) => sparse.direct_receptances(rate),
-            None => rest.direct_receptances(rate, omega).map_err(|_| rate)?,
+            Some(banded) => banded.direct_receptances(rate),
+            None => dynamics.direct_receptances(rate, omega).map_err(|_| rate)?,
         };
         for (penalty, port) in self.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             // one penalty for all axes of a port, so that its plane has no preferred direction
@@ -108,15 +108,15 @@ impl Discretization {
 
     /// Computes the receptances of the axes with the springs in series: by modes if there are
     /// many axes and the modes are known, otherwise as matrices.
-    fn receptance(&self, ports: &Ports, rest: &LinearDynamics, omega: f64) -> Result<Receptance, f64> {
+    fn receptance(&self, ports: &Ports, dynamics: &LinearDynamics, omega: f64) -> Result<Receptance, f64> {
         let harmonics = self.harmonics();
-        if let Some(structure) = rest.modes_for(ports).filter(|_| !self.with_matrix) {
-            let closed = if harmonics[0] == 0 { rest.closed(omega) } else { None };
+        if let Some(structure) = dynamics.modes_for(ports).filter(|_| !self.with_matrix) {
+            let closed = if harmonics[0] == 0 { dynamics.closed(omega) } else { None };
             let modal = ModalReceptance::new((structure, closed), (harmonics, omega), &self.series);
             return modal.map(Receptance::Modal).map_err(|_| omega);
         }
         let formed = harmonics.iter().map(|&h| {
-            let mut receptance = rest.receptance(h, omega).map_err(|_| h as f64 * omega)?;
+            let mut receptance = dynamics.receptance(h, omega).map_err(|_| h as f64 * omega)?;
             self.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
             Ok(receptance)
         });

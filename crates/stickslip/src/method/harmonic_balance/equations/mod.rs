@@ -61,7 +61,7 @@ pub(super) struct Discretization {
     /// remains valid if the search fails. With unknown forces, the work limit
     /// then holds without a guaranteed number of steps.
     pub extends_shorter: bool,
-    /// Work of earlier searches of the present point, here and at other levels,
+    /// Work of earlier searches of the present point, here and at other discretizations,
     /// see [`Discretization::work_used`].
     pub work_before: WorkShare,
     pub work_elsewhere: WorkShare,
@@ -189,24 +189,25 @@ pub(super) enum DerivativeScope {
 }
 
 impl Discretization {
-    pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, sparse: Option<BandedForm>) -> Self {
-        let mut level = Discretization::without_solver(FrequencyTime::new(harmonics, samples), ports, sparse);
-        let size = level.residual.len();
-        level.newton_krylov = (level.banded.is_none() && uses_krylov(size, ports)).then(NewtonKrylov::default);
-        if level.newton_krylov.is_some() && !ports.has_forces() {
-            level.create_coarse_sampling();
+    pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, banded: Option<BandedForm>) -> Self {
+        let mut discretization = Discretization::without_solver(FrequencyTime::new(harmonics, samples), ports, banded);
+        let size = discretization.residual.len();
+        discretization.newton_krylov =
+            (discretization.banded.is_none() && uses_krylov(size, ports)).then(NewtonKrylov::default);
+        if discretization.newton_krylov.is_some() && !ports.has_forces() {
+            discretization.create_coarse_sampling();
         }
-        level
+        discretization
     }
 
-    /// Returns the level with a Jacobian that is a matrix, whatever its size.
+    /// Returns the discretization with a Jacobian that is a matrix, whatever its size.
     pub fn with_matrix(self) -> Self {
         Discretization { with_matrix: true, ..self }
     }
 
-    /// Creates the level without the solver for Newton steps.
-    fn without_solver(alternation: FrequencyTime, ports: &Ports, sparse: Option<BandedForm>) -> Self {
-        let (nh, axes) = (alternation.harmonics.len(), ports.count());
+    /// Creates the discretization without the solver for Newton steps.
+    fn without_solver(aft: FrequencyTime, ports: &Ports, banded: Option<BandedForm>) -> Self {
+        let (nh, axes) = (aft.harmonics.len(), ports.count());
         let size = 2 * nh * axes;
         let (blocks, tangents) = tangent_ranges(ports, nh);
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
@@ -217,7 +218,7 @@ impl Discretization {
             work_before: WorkShare::default(),
             work_elsewhere: WorkShare::default(),
             work_limit: POINT_LIMIT,
-            aft: alternation,
+            aft: aft,
             receptance: Receptance::Formed(ReceptanceMatrices::default()),
             penalty: vec![0.0; ports.len()],
             largest_holding_force: 0.0,
@@ -237,7 +238,7 @@ impl Discretization {
             newton_krylov: None,
             with_matrix: false,
             products: 0,
-            banded: sparse,
+            banded: banded,
             residual: vec![0.0; size],
             units: vec![1.0; size],
             previous: HarmonicSolution::zero(nh * axes),
@@ -267,7 +268,7 @@ impl Discretization {
     }
 
     /// Extends a motion of one sector to the whole ring, for postprocessing:
-    /// the returned level cannot be solved. `ports` are those of the ring.
+    /// the returned discretization cannot be solved. `ports` are those of the ring.
     /// Every sector moves with the phase of the travelling wave.
     pub fn over_ring(
         &self,
@@ -281,11 +282,11 @@ impl Discretization {
             (0..cyclic.sectors).flat_map(|s| (0..own).map(move |i| values[i] * lead(s, i))).collect()
         };
         let motion = HarmonicSolution { c: all(&motion.c), force: all(&motion.force), ..*motion };
-        let level = Discretization {
+        let discretization = Discretization {
             penalty: (0..ports.len()).map(|p| self.penalty[p % self.penalty.len()]).collect(),
             ..Discretization::without_solver(self.aft.clone(), ports, None)
         };
-        (level, motion)
+        (discretization, motion)
     }
 
     /// Evaluates forces and residual at the unknowns in `motion`, and updates the other part of
@@ -296,14 +297,14 @@ impl Discretization {
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
-        ease: Homotopy,
+        homotopy: Homotopy,
         length: f64,
         slopes: DerivativeScope,
     ) -> f64 {
         self.evaluations += usize::from(slopes != DerivativeScope::None);
-        self.motion_port_forces(ports, omega, motion, ease, slopes);
-        self.structure_motion(motion, ease);
-        self.force_port_residuals(ports, omega, motion, ease, slopes);
+        self.motion_port_forces(ports, omega, motion, homotopy, slopes);
+        self.structure_motion(motion, homotopy);
+        self.force_port_residuals(ports, omega, motion, homotopy, slopes);
         self.set_residual_units(ports, motion, length);
         // relative to the units of the residual; motions are weighted as velocities
         let nh = self.harmonics().len();
@@ -327,11 +328,11 @@ impl Discretization {
         ports: &Ports,
         omega: f64,
         motion: &mut HarmonicSolution,
-        ease: Homotopy,
+        homotopy: Homotopy,
         slopes: DerivativeScope,
     ) {
         let nh = self.harmonics().len();
-        self.aft.static_share = self.load_factor(ease) / ease.limit_factor;
+        self.aft.static_share = self.load_factor(homotopy) / homotopy.limit_factor;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
             let wanted =
@@ -341,7 +342,7 @@ impl Discretization {
             if port.has_memory_steps() && self.reuses_states {
                 self.aft.known_state = self.states[p].if_forgotten();
             }
-            self.aft.motion_port_force(port, (omega, ease.limit_factor), c, force, slot);
+            self.aft.motion_port_force(port, (omega, homotopy.limit_factor), c, force, slot);
             if wanted {
                 self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
             }
@@ -353,9 +354,9 @@ impl Discretization {
 
     /// Computes the motion of the structure under the forces. Writes the
     /// residual of motion ports, and the motion of force ports.
-    pub(super) fn structure_motion(&mut self, motion: &mut HarmonicSolution, ease: Homotopy) {
+    pub(super) fn structure_motion(&mut self, motion: &mut HarmonicSolution, homotopy: Homotopy) {
         let nh = self.harmonics().len();
-        let share = self.load_factor(ease);
+        let share = self.load_factor(homotopy);
         self.compute_structure_forces(motion, share);
         let acting = if self.closed_stiffness.is_empty() { &motion.force } else { &self.acting };
         if self.banded.is_none() {
@@ -376,8 +377,8 @@ impl Discretization {
                 }
             };
             match &mut self.banded {
-                Some(sparse) => {
-                    sparse.response_along_axes(k, |q| acting[q * nh + k], follow);
+                Some(banded) => {
+                    banded.response_along_axes(k, |q| acting[q * nh + k], follow);
                 }
                 None => {
                     self.moved.chunks_exact(nh).enumerate().for_each(|(q, u)| follow(q, u[k]));
@@ -392,11 +393,11 @@ impl Discretization {
         ports: &Ports,
         omega: f64,
         motion: &HarmonicSolution,
-        ease: Homotopy,
+        homotopy: Homotopy,
         slopes: DerivativeScope,
     ) {
         for p in (0..ports.len()).filter(|p| ports[*p].is_force()) {
-            self.force_port_residual(ports, p, omega, motion, (ease, slopes));
+            self.force_port_residual(ports, p, omega, motion, (homotopy, slopes));
         }
     }
 
@@ -407,7 +408,7 @@ impl Discretization {
         p: usize,
         omega: f64,
         motion: &HarmonicSolution,
-        (ease, slopes): (Homotopy, DerivativeScope),
+        (homotopy, slopes): (Homotopy, DerivativeScope),
     ) {
         let (port, nh) = (&ports[p], self.harmonics().len());
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
@@ -419,11 +420,11 @@ impl Discretization {
             slot.fill(0.0);
             slot
         });
-        self.aft.force_port_image(port, (omega, penalty, ease.limit_factor), (c, force), image, slot);
+        self.aft.force_port_image(port, (omega, penalty, homotopy.limit_factor), (c, force), image, slot);
         for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
             let mut r = force - image;
-            if ease.proximal_weight > 0.0 {
-                r += (force - self.anchor[at]) * ease.proximal_weight;
+            if homotopy.proximal_weight > 0.0 {
+                r += (force - self.anchor[at]) * homotopy.proximal_weight;
             }
             (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
         }
@@ -496,8 +497,8 @@ impl Discretization {
     /// Returns the factor of the constant loads. If contacts carry the loads, these grow with
     /// the slip limits, so that a contact that sticks under all of them sticks during the
     /// homotopy. The excitation is then smaller relative to the loads.
-    fn load_factor(&self, ease: Homotopy) -> f64 {
-        if self.is_held_by_contacts() { ease.limit_factor } else { 1.0 }
+    fn load_factor(&self, homotopy: Homotopy) -> f64 {
+        if self.is_held_by_contacts() { homotopy.limit_factor } else { 1.0 }
     }
 
     /// Computes the forces minus those of the springs in the structure, into
@@ -581,13 +582,13 @@ impl Discretization {
 
     /// Computes the Newton step by GMRES. `self.step` contains the residual in units on entry
     /// and the step on return. Returns false if GMRES does not converge.
-    pub(super) fn krylov_step(&mut self, ports: &Ports, omega: f64, ease: Homotopy, near: StepStart) -> bool {
+    pub(super) fn krylov_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
         let Some(coupled) = &mut self.newton_krylov else { return false };
         let linear = LinearizedEquations {
             ports,
             harmonics: &self.aft.harmonics,
             omega,
-            ease,
+            homotopy,
             length: near.length,
             penalty: &self.penalty,
             tangents: &self.tangents,
@@ -601,13 +602,13 @@ impl Discretization {
 
     /// Assembles the Jacobian from the tangents, rows and columns in units.
     /// Returns false if the receptances are not matrices.
-    pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, ease: Homotopy, length: f64) -> bool {
+    pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, length: f64) -> bool {
         let Receptance::Formed(formed) = &self.receptance else { return false };
         let linear = LinearizedEquations {
             ports,
             harmonics: &self.aft.harmonics,
             omega,
-            ease,
+            homotopy,
             length,
             penalty: &self.penalty,
             tangents: &self.tangents,
@@ -674,23 +675,23 @@ mod tests {
     struct Case {
         system: System,
         ports: Ports,
-        rest: LinearDynamics,
+        dynamics: LinearDynamics,
         omega: f64,
     }
 
     impl Case {
         fn new(system: System, omega: f64) -> Self {
             let ports = Ports::new(&system).unwrap();
-            let rest = LinearDynamics::new(&system, &ports);
-            Case { system, ports, rest, omega }
+            let dynamics = LinearDynamics::new(&system, &ports);
+            Case { system, ports, dynamics, omega }
         }
 
-        fn level(&self, harmonics: Vec<usize>, sparse: bool) -> Discretization {
-            let sparse = sparse.then(|| BandedForm::new(&self.system, &self.ports, &harmonics).unwrap());
+        fn discretization(&self, harmonics: Vec<usize>, banded: bool) -> Discretization {
+            let banded = banded.then(|| BandedForm::new(&self.system, &self.ports, &harmonics).unwrap());
             let samples = 256.max(16 * harmonics[harmonics.len() - 1]);
-            let mut level = Discretization::new(harmonics, samples, &self.ports, sparse);
-            level.set_frequency(&self.system, &self.ports, &self.rest, self.omega).unwrap();
-            level
+            let mut discretization = Discretization::new(harmonics, samples, &self.ports, banded);
+            discretization.set_frequency(&self.system, &self.ports, &self.dynamics, self.omega).unwrap();
+            discretization
         }
     }
 
@@ -705,16 +706,17 @@ mod tests {
     fn the_jacobian_is_the_derivative() {
         for (constant, harmonics) in [(0.0, vec![1, 3, 5]), (0.2, vec![0, 1, 2, 3])] {
             let case = Case::new(mixed(6, constant), 0.9);
-            let mut level = case.level(harmonics, false);
-            let size = level.residual.len();
-            let mut motion = HarmonicSolution::zero(level.linear_motion.len());
+            let mut discretization = case.discretization(harmonics, false);
+            let size = discretization.residual.len();
+            let mut motion = HarmonicSolution::zero(discretization.linear_motion.len());
             // the mean has no imaginary part
-            let real = |i: usize| level.harmonics()[(i / 2) % level.harmonics().len()] == 0 && i % 2 == 1;
+            let real =
+                |i: usize| discretization.harmonics()[(i / 2) % discretization.harmonics().len()] == 0 && i % 2 == 1;
             let x: Vec<f64> = (0..size).map(|i| if real(i) { 0.0 } else { 0.4 * noise(i) }).collect();
             let imaginary: Vec<bool> = (0..size).map(real).collect();
             let (mut r, mut j) = (vec![0.0; size], vec![0.0; size * size]);
             let mut at = |x: &[f64], j: Option<&mut [f64]>| {
-                level.residual_at(&case.ports, case.omega, (x, 1.5), &mut motion, &mut r, j);
+                discretization.residual_at(&case.ports, case.omega, (x, 1.5), &mut motion, &mut r, j);
                 r.clone()
             };
             at(&x, Some(&mut j));
@@ -744,10 +746,10 @@ mod tests {
     #[test]
     fn banded_and_dense_agree() {
         let case = Case::new(mixed(44, 0.0), 0.9);
-        let solve = |sparse: bool| {
-            let mut level = case.level(vec![1, 3, 5], sparse);
-            let start = level.initial_guess(&case.system, &case.ports, None, case.omega);
-            level.solve(&case.ports, case.omega, start).unwrap()
+        let solve = |banded: bool| {
+            let mut discretization = case.discretization(vec![1, 3, 5], banded);
+            let start = discretization.initial_guess(&case.system, &case.ports, None, case.omega);
+            discretization.solve(&case.ports, case.omega, start).unwrap()
         };
         let (dense, banded) = (solve(false), solve(true));
         for (a, b) in dense.c.iter().zip(&banded.c).chain(dense.force.iter().zip(&banded.force)) {
@@ -767,11 +769,11 @@ mod tests {
                 let system = couple.assemble().unwrap();
                 let case = Case::new(system, std::f64::consts::TAU * hertz);
                 let solution = |top: usize, factor: f64| {
-                    let mut level = case.level((1..=top).step_by(2).collect(), false);
-                    level.penalty[0] *= factor;
-                    let start = level.initial_guess(&case.system, &case.ports, None, case.omega);
-                    let motion = level.solve(&case.ports, case.omega, start).unwrap();
-                    postprocess::places(&mut level, &case.rest, case.omega, &motion).unwrap()
+                    let mut discretization = case.discretization((1..=top).step_by(2).collect(), false);
+                    discretization.penalty[0] *= factor;
+                    let start = discretization.initial_guess(&case.system, &case.ports, None, case.omega);
+                    let motion = discretization.solve(&case.ports, case.omega, start).unwrap();
+                    postprocess::places(&mut discretization, &case.dynamics, case.omega, &motion).unwrap()
                 };
                 let distance = |a: &[DVector<Complex64>], b: &[DVector<Complex64>]| {
                     let zero = DVector::from_element(3, ZERO);

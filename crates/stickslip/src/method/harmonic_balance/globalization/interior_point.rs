@@ -43,7 +43,7 @@ const ITERATIONS: usize = 30;
 struct CentralPath {
     /// Barriers of the ports with rigid friction along one axis.
     barriers: Vec<Option<InteriorPort>>,
-    alternation: FrequencyTime,
+    aft: FrequencyTime,
     /// Harmonics of the argument `λ + ε u'` of one barrier.
     argument: Vec<Complex64>,
 }
@@ -100,7 +100,7 @@ impl Discretization {
                 argument((self, p, port), omega, motion, &mut along.argument);
                 match &mut along.barriers[p] {
                     Some(barrier) => {
-                        barrier.linearise(&mut along.alternation, &along.argument, &mut self.tangents[tangent]);
+                        barrier.linearise(&mut along.aft, &along.argument, &mut self.tangents[tangent]);
                     }
                     None => self.force_port_residual(ports, p, omega, motion, (GIVEN_EQUATIONS, DerivativeScope::All)),
                 }
@@ -127,7 +127,7 @@ impl Discretization {
         let samples = (SAMPLES_PER_WAVE * (top + 1)).next_power_of_two();
         let mut along = CentralPath {
             barriers: Vec::with_capacity(ports.len()),
-            alternation: FrequencyTime::new(self.harmonics().to_vec(), samples),
+            aft: FrequencyTime::new(self.harmonics().to_vec(), samples),
             argument: vec![Complex64::default(); nh],
         };
         let limits: Vec<Option<f64>> =
@@ -142,7 +142,7 @@ impl Discretization {
         self.structure_motion(motion, GIVEN_EQUATIONS);
         for (p, (port, limit)) in ports.iter().zip(limits).enumerate() {
             argument((self, p, port), omega, motion, &mut along.argument);
-            along.barriers.push(limit.map(|limit| InteriorPort::new(limit, &mut along.alternation, &along.argument)));
+            along.barriers.push(limit.map(|limit| InteriorPort::new(limit, &mut along.aft, &along.argument)));
         }
         Some(along)
     }
@@ -165,7 +165,7 @@ impl Discretization {
         let corrected = gap > 0.0;
         for (p, port) in ports.iter().enumerate() {
             let Some(barrier) = &mut along.barriers[p] else { continue };
-            barrier.set_targets((gap, corrected), &mut along.alternation, &mut self.image[..nh]);
+            barrier.set_targets((gap, corrected), &mut along.aft, &mut self.image[..nh]);
             let range = port.first_axis * nh..(port.first_axis + 1) * nh;
             for (at, (force, image)) in range.clone().zip(motion.force[range].iter().zip(&self.image)) {
                 let r = force - image;
@@ -189,7 +189,7 @@ impl Discretization {
         for (p, port) in ports.iter().enumerate() {
             if let Some(barrier) = &mut along.barriers[p] {
                 argument((self, p, port), omega, motion, &mut along.argument);
-                share = share.min(barrier.step(&mut along.alternation, &along.argument));
+                share = share.min(barrier.step(&mut along.aft, &along.argument));
             }
         }
         Some(share)
@@ -198,15 +198,15 @@ impl Discretization {
 
 /// Sets `y` to the harmonics of `λ + ε u'` along the axis of a port with one axis.
 fn argument(
-    (level, p, port): (&Discretization, usize, &Port),
+    (discretization, p, port): (&Discretization, usize, &Port),
     omega: f64,
     motion: &HarmonicSolution,
     y: &mut [Complex64],
 ) {
     let at = port.first_axis * y.len();
-    let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(level.harmonics());
+    let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(discretization.harmonics());
     for (y, ((c, force), h)) in y.iter_mut().zip(own) {
-        *y = force + c * Complex64::new(0.0, level.penalty[p] * *h as f64 * omega);
+        *y = force + c * Complex64::new(0.0, discretization.penalty[p] * *h as f64 * omega);
     }
 }
 
@@ -248,24 +248,24 @@ mod tests {
     }
 
     /// Returns the equations of a ring at a frequency, in banded form if the ring is large.
-    fn level(system: &System, hertz: f64) -> (Discretization, Ports) {
+    fn discretization(system: &System, hertz: f64) -> (Discretization, Ports) {
         let ports = Ports::new(system).unwrap();
         let harmonics: Vec<usize> = (1..=15).step_by(2).collect();
-        let mut level =
+        let mut discretization =
             Discretization::new(harmonics.clone(), 1024, &ports, BandedForm::new(system, &ports, &harmonics));
-        level.set_frequency(system, &ports, &LinearDynamics::new(system, &ports), TAU * hertz).unwrap();
-        (level, ports)
+        discretization.set_frequency(system, &ports, &LinearDynamics::new(system, &ports), TAU * hertz).unwrap();
+        (discretization, ports)
     }
 
     /// The interior point method and the proximal point method find the same solution.
     #[test]
     fn interior_point_and_proximal_point_solutions_agree() {
         let system = ring(12, 0.5);
-        let (mut level, ports) = level(&system, NEAR);
-        let start = level.frictionless_motion();
+        let (mut discretization, ports) = discretization(&system, NEAR);
+        let start = discretization.frictionless_motion();
         let (mut one, mut other) = (start.clone(), start);
-        level.interior_point_method(&ports, TAU * NEAR, &mut one).unwrap();
-        level.proximal_point_method(&ports, TAU * NEAR, &mut other).unwrap();
+        discretization.interior_point_method(&ports, TAU * NEAR, &mut one).unwrap();
+        discretization.proximal_point_method(&ports, TAU * NEAR, &mut other).unwrap();
         let size = other.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
         let apart = one.c.iter().zip(&other.c).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(apart < 1e-6 * size, "{apart:.1e} of {size:.1e}");
@@ -279,9 +279,9 @@ mod tests {
             for limit in [0.1, 0.5, 1.5] {
                 let steps = [12, 96].map(|blades| {
                     let system = ring(blades, limit);
-                    let (mut level, ports) = level(&system, hertz);
-                    let mut motion = level.frictionless_motion();
-                    level.interior_point_method(&ports, TAU * hertz, &mut motion).unwrap();
+                    let (mut discretization, ports) = discretization(&system, hertz);
+                    let mut motion = discretization.frictionless_motion();
+                    discretization.interior_point_method(&ports, TAU * hertz, &mut motion).unwrap();
                     assert!(motion.residual <= RESIDUAL_TOLERANCE);
                     motion.iterations
                 });
@@ -295,8 +295,8 @@ mod tests {
     fn elastic_friction_has_no_central_path() {
         let mut couple = crate::model::example::blade_couple_massless();
         couple.joints[0].law = Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 });
-        let (mut level, ports) = level(&couple.assemble().unwrap(), 121.0);
-        let mut motion = level.frictionless_motion();
-        assert!(level.interior_point_method(&ports, TAU * 121.0, &mut motion).is_err());
+        let (mut discretization, ports) = discretization(&couple.assemble().unwrap(), 121.0);
+        let mut motion = discretization.frictionless_motion();
+        assert!(discretization.interior_point_method(&ports, TAU * 121.0, &mut motion).is_err());
     }
 }

@@ -56,11 +56,11 @@ impl Discretization {
     /// Tells whether nonlinear elimination can follow the next step. Stores the
     /// derivatives of that step.
     pub(crate) fn can_eliminate(&mut self, ports: &Ports) -> bool {
-        let Some(sparse) = self.banded.as_ref().filter(|_| self.closed_stiffness.is_empty()) else { return false };
+        let Some(banded) = self.banded.as_ref().filter(|_| self.closed_stiffness.is_empty()) else { return false };
         if ports.iter().any(|port| port.is_force() || port.has_memory_steps()) {
             return false;
         }
-        let settling = self.elimination.get_or_insert_with(|| NonlinearElimination::new(Adjacency::new(sparse, ports)));
+        let settling = self.elimination.get_or_insert_with(|| NonlinearElimination::new(Adjacency::new(banded, ports)));
         if settling.is_useful {
             settling.tangents.clone_from(&self.tangents);
         }
@@ -73,12 +73,12 @@ impl Discretization {
     pub(crate) fn eliminate_nonlinear(
         &mut self,
         ports: &Ports,
-        (omega, ease): (f64, Homotopy),
+        (omega, homotopy): (f64, Homotopy),
         motion: &mut HarmonicSolution,
         (length, beaten): (f64, f64),
     ) -> Option<f64> {
         let mut settling = self.elimination.take()?;
-        let after = self.eliminate_clusters(&mut settling, ports, (omega, ease), motion, length);
+        let after = self.eliminate_clusters(&mut settling, ports, (omega, homotopy), motion, length);
         settling.is_useful = after.is_some_and(|after| after < USEFUL_SHARE * beaten);
         let after = after.filter(|after| *after < (1.0 - SUFFICIENT_DECREASE) * beaten);
         if after.is_none() {
@@ -92,7 +92,7 @@ impl Discretization {
         &mut self,
         settling: &mut NonlinearElimination,
         ports: &Ports,
-        (omega, ease): (f64, Homotopy),
+        (omega, homotopy): (f64, Homotopy),
         motion: &mut HarmonicSolution,
         length: f64,
     ) -> Option<f64> {
@@ -107,11 +107,11 @@ impl Discretization {
             sums.resize(step.len(), 0.0);
         }
         for cluster in neighbours.clusters(ports, &missed, MOST_AXES) {
-            let sparse = self.banded.as_ref()?;
+            let banded = self.banded.as_ref()?;
             let at = (&*cluster, OVERLAP_LAYERS);
-            let mut window = Subdomain::new(sparse, neighbours, ports, at, (tangents, &self.blocks))?;
+            let mut subdomain = Subdomain::new(banded, neighbours, ports, at, (tangents, &self.blocks))?;
             let along = (&**tangents, &**step, &mut **beyond, &mut **left);
-            self.solve_cluster(ports, &cluster, &mut window, along, (omega, ease, length));
+            self.solve_cluster(ports, &cluster, &mut subdomain, along, (omega, homotopy, length));
         }
         self.eliminations += 1;
         // the step of all contacts with the nonlinear parts of these forces
@@ -120,7 +120,7 @@ impl Discretization {
             *d = step + (moved + left) / length;
         }
         self.apply_step(ports, motion, 1.0, length);
-        Some(self.evaluate(ports, omega, motion, ease, length, DerivativeScope::Cheap))
+        Some(self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap))
     }
 
     /// Returns the size of the residual along a port, weighted as velocities.
@@ -137,9 +137,9 @@ impl Discretization {
         &mut self,
         ports: &Ports,
         cluster: &[usize],
-        window: &mut Subdomain,
+        subdomain: &mut Subdomain,
         (tangents, step, beyond, left): (&[f64], &[f64], &mut [f64], &mut [f64]),
-        (omega, ease, length): (f64, Homotopy, f64),
+        (omega, homotopy, length): (f64, Homotopy, f64),
     ) {
         let pair = 2 * self.harmonics().len();
         let along = |values: &[f64]| -> Vec<f64> {
@@ -159,29 +159,29 @@ impl Discretization {
         };
         let mut trial = TrialStep { step: along(&self.step), ..zero.clone() };
         let mut now = zero;
-        self.measure_cluster(ports, cluster, window, tangents, &mut now);
+        self.measure_cluster(ports, cluster, subdomain, tangents, &mut now);
         let whole = now.size;
-        self.try_cluster(ports, cluster, window, (tangents, &goal), (omega, ease), &mut trial);
+        self.try_cluster(ports, cluster, subdomain, (tangents, &goal), (omega, homotopy), &mut trial);
         if trial.size < now.size {
             std::mem::swap(&mut now, &mut trial);
         }
         let (mut change, mut pull) = (vec![0.0; goal.len()], vec![0.0; goal.len()]);
         for _ in 0..STEPS {
             if now.size < CLUSTER_TOLERANCE * whole
-                || !window.factor_changed(cluster.iter().map(|p| ports[*p].axes), &now.slopes)
+                || !subdomain.factor_changed(cluster.iter().map(|p| ports[*p].axes), &now.slopes)
             {
                 break;
             }
             // (1 + S ΔK)⁻¹ r = r - S' ΔK r
             multiply(ports, cluster, pair, &now.slopes, &now.residual_step, &mut pull);
-            window.solve_changed(&mut pull);
+            subdomain.solve_changed(&mut pull);
             change.iter_mut().zip(now.residual_step.iter().zip(&pull)).for_each(|(d, (r, u))| *d = r - u);
             let mut fraction = 1.0;
             let mut found = false;
             for _ in 0..=HALVINGS {
                 let steps = trial.step.iter_mut().zip(now.step.iter().zip(&change));
                 steps.for_each(|(trial, (now, change))| *trial = now - fraction * change);
-                self.try_cluster(ports, cluster, window, (tangents, &goal), (omega, ease), &mut trial);
+                self.try_cluster(ports, cluster, subdomain, (tangents, &goal), (omega, homotopy), &mut trial);
                 found = trial.size < (1.0 - SUFFICIENT_DECREASE * fraction) * now.size;
                 if found {
                     break;
@@ -207,9 +207,9 @@ impl Discretization {
         &mut self,
         ports: &Ports,
         cluster: &[usize],
-        window: &mut Subdomain,
+        subdomain: &mut Subdomain,
         (tangents, goal): (&[f64], &[f64]),
-        (omega, ease): (f64, Homotopy),
+        (omega, homotopy): (f64, Homotopy),
         trial: &mut TrialStep,
     ) {
         let nh = self.harmonics().len();
@@ -224,7 +224,7 @@ impl Discretization {
             let before = self.previous.c[range.clone()].iter();
             c.extend(before.zip(step.chunks_exact(2)).map(|(c, d)| c - Complex64::new(d[0], d[1])));
             force.clone_from(&c);
-            self.aft.motion_port_force(port, (omega, ease.limit_factor), &c, &mut force, Some(slopes));
+            self.aft.motion_port_force(port, (omega, homotopy.limit_factor), &c, &mut force, Some(slopes));
             let given = &tangents[tangent_range(&self.blocks, p, port, nh)];
             slopes.iter_mut().zip(given).for_each(|(slope, given)| *slope -= given);
             let changed = force
@@ -239,13 +239,13 @@ impl Discretization {
             (at, from) = (at + own, from + own * own);
         }
         trial.residual_step.copy_from_slice(&trial.nonlinear_force);
-        window.solve(&mut trial.residual_step);
+        subdomain.solve(&mut trial.residual_step);
         trial
             .residual_step
             .iter_mut()
             .zip(trial.step.iter().zip(goal))
             .for_each(|(rest, (step, goal))| *rest = step - goal - *rest);
-        self.measure_cluster(ports, cluster, window, tangents, trial);
+        self.measure_cluster(ports, cluster, subdomain, tangents, trial);
     }
 
     /// Computes the size of the residual of a trial, `J (d - d₀ - S φ)`.
@@ -253,7 +253,7 @@ impl Discretization {
         &self,
         ports: &Ports,
         cluster: &[usize],
-        window: &mut Subdomain,
+        subdomain: &mut Subdomain,
         tangents: &[f64],
         trial: &mut TrialStep,
     ) {
@@ -269,7 +269,7 @@ impl Discretization {
             }
             at += own;
         }
-        window.solve_structure(&mut trial.residual);
+        subdomain.solve_structure(&mut trial.residual);
         trial.residual.iter_mut().zip(&trial.residual_step).for_each(|(out, rest)| *out += rest);
         trial.size = self.weighted(&trial.residual);
     }

@@ -15,17 +15,17 @@ pub(crate) struct Adjacency {
 }
 
 impl Adjacency {
-    pub fn new(sparse: &BandedForm, ports: &Ports) -> Self {
-        let (mut at_place, mut links) = (vec![Vec::new(); sparse.places()], vec![Vec::new(); sparse.places()]);
+    pub fn new(banded: &BandedForm, ports: &Ports) -> Self {
+        let (mut at_place, mut links) = (vec![Vec::new(); banded.places()], vec![Vec::new(); banded.places()]);
         let mut of_port = Vec::new();
         for (p, port) in ports.iter().enumerate() {
-            let mut places: Vec<usize> = port.range().flat_map(|q| sparse.ends(q)).map(|(i, _)| *i).collect();
+            let mut places: Vec<usize> = port.range().flat_map(|q| banded.ends(q)).map(|(i, _)| *i).collect();
             places.sort_unstable();
             places.dedup();
             places.iter().for_each(|i| at_place[*i].push(p));
             of_port.push(places);
         }
-        sparse.couplings().for_each(|(i, l)| links[i].push(l));
+        banded.couplings().for_each(|(i, l)| links[i].push(l));
         Adjacency { of_port, at_place, links }
     }
 
@@ -135,16 +135,16 @@ impl Subdomain {
     /// Creates the subdomain around some ports, with the derivatives `tangents`
     /// of all. `None` if the equations are singular.
     pub fn new(
-        sparse: &BandedForm,
+        banded: &BandedForm,
         neighbours: &Adjacency,
         ports: &Ports,
         (cluster, times): (&[usize], usize),
         (tangents, blocks): (&[f64], &[usize]),
     ) -> Option<Self> {
-        let size = sparse.unknowns();
+        let size = banded.unknowns();
         let mut places = neighbours.subdomain_places(cluster, times);
-        places.sort_unstable_by_key(|place| sparse.position(*place));
-        let mut number = vec![None; sparse.places()];
+        places.sort_unstable_by_key(|place| banded.position(*place));
+        let mut number = vec![None; banded.places()];
         places.iter().enumerate().for_each(|(i, place)| number[*place] = Some(i));
         let mut near: Vec<usize> = places.iter().flat_map(|place| &neighbours.at_place[*place]).copied().collect();
         near.sort_unstable();
@@ -159,21 +159,21 @@ impl Subdomain {
             band = coupled.map(|l| i.abs_diff(l)).fold(band, usize::max);
         }
         let mut matrix = BandedMatrix::new(places.len() * size, (band + 1) * size - 1);
-        sparse.add_structure(|place| number[place], &mut matrix);
+        banded.add_structure(|place| number[place], &mut matrix);
         let mut alone = matrix.clone();
         if !alone.factor() {
             return None;
         }
         for &p in &near {
             let port = &ports[p];
-            let ends: Vec<Vec<(usize, f64)>> = port.range().map(|q| here(sparse.ends(q))).collect();
+            let ends: Vec<Vec<(usize, f64)>> = port.range().map(|q| here(banded.ends(q))).collect();
             add_port(&ends, &tangents[tangent_range(blocks, p, port, size / 2)], size, &mut matrix);
         }
         let mut factored = matrix.clone();
         if !factored.factor() {
             return None;
         }
-        let ends = cluster.iter().flat_map(|p| ports[*p].range()).map(|q| here(sparse.ends(q))).collect();
+        let ends = cluster.iter().flat_map(|p| ports[*p].range()).map(|q| here(banded.ends(q))).collect();
         Some(Subdomain {
             ends,
             size,
@@ -281,32 +281,32 @@ mod tests {
         }
         let system = model.assemble().unwrap();
         let ports = Ports::new(&system).unwrap();
-        let mut sparse = BandedForm::new(&system, &ports, &HARMONICS).unwrap();
-        sparse.factor_dynamic_stiffness(2.5).unwrap(); // above all resonances, where motion decays from blade to blade
+        let mut banded = BandedForm::new(&system, &ports, &HARMONICS).unwrap();
+        banded.factor_dynamic_stiffness(2.5).unwrap(); // above all resonances, where motion decays from blade to blade
         let (blocks, size) = tangent_ranges(&ports, HARMONICS.len());
         let tangents: Vec<f64> = (0..size).map(|i| 0.2 * ((i * 7919 + 13) as f64).sin()).collect();
         let along = StepParameters { penalty: &vec![0.0; ports.len()], homotopy: GIVEN_EQUATIONS };
-        assert!(sparse.linearise(&ports, &along, &tangents));
-        (sparse, ports, tangents, blocks)
+        assert!(banded.linearise(&ports, &along, &tangents));
+        (banded, ports, tangents, blocks)
     }
 
     /// A subdomain with all places around it is the whole structure; one with a
     /// few places is nearly the same.
     #[test]
     fn subdomain_agrees_with_whole_structure() {
-        let (mut sparse, ports, tangents, blocks) = ring();
-        let neighbours = Adjacency::new(&sparse, &ports);
+        let (mut banded, ports, tangents, blocks) = ring();
+        let neighbours = Adjacency::new(&banded, &ports);
         let size = 2 * HARMONICS.len();
         let cluster = [7, 8, 9];
         let mut whole = vec![0.0; BLADES * size];
         (0..3 * size).for_each(|i| whole[7 * size + i] = 1.0 + i as f64);
         let forces = whole[7 * size..10 * size].to_vec();
-        sparse.solve_along_axes(&mut whole);
+        banded.solve_along_axes(&mut whole);
         for (around, error) in [(BLADES, 1e-12), (3, 1e-3)] {
             let at = (&cluster[..], around);
-            let mut window = Subdomain::new(&sparse, &neighbours, &ports, at, (&tangents, &blocks)).unwrap();
+            let mut subdomain = Subdomain::new(&banded, &neighbours, &ports, at, (&tangents, &blocks)).unwrap();
             let mut motion = forces.clone();
-            window.solve(&mut motion);
+            subdomain.solve(&mut motion);
             let largest = motion.iter().fold(0.0, |m: f64, u| m.max(u.abs()));
             for (u, v) in motion.iter().zip(&whole[7 * size..]) {
                 assert!((u - v).abs() < error * largest, "{around}: {u} {v}");
@@ -317,8 +317,8 @@ mod tests {
     /// Adjacent marked ports form one cluster, up to the size limit.
     #[test]
     fn clusters_are_neighbours() {
-        let (sparse, ports, ..) = ring();
-        let neighbours = Adjacency::new(&sparse, &ports);
+        let (banded, ports, ..) = ring();
+        let neighbours = Adjacency::new(&banded, &ports);
         let marked: Vec<bool> = (0..BLADES).map(|i| [0, 3, 4, 5, 20, BLADES - 1].contains(&i)).collect();
         assert_eq!(neighbours.clusters(&ports, &marked, 8), [vec![0, BLADES - 1], vec![3, 4, 5], vec![20]]);
         assert_eq!(neighbours.clusters(&ports, &marked, 2).len(), 4);

@@ -38,8 +38,8 @@ impl HarmonicBalanceSolver {
         omega: f64,
         guess: Option<&DescribingGuess>,
     ) -> Option<HarmonicSolution> {
-        let start = guess.filter(|_| self.periods > 1 && !self.judge.proves())?.state(self.system.dofs());
-        let path = self.judge.settle_and_record(&self.system, omega, start, APPROACH)?;
+        let start = guess.filter(|_| self.periods > 1 && !self.orbit_check.proves())?.state(self.system.dofs());
+        let path = self.orbit_check.settle_and_record(&self.system, omega, start, APPROACH)?;
         self.fourier_series(&*path, top, omega)
     }
 
@@ -49,12 +49,12 @@ impl HarmonicBalanceSolver {
     /// the state selects one of several orbits.
     pub(crate) fn guess_from_state(&mut self, start: &[f64], omega: f64) -> Option<(usize, HarmonicSolution)> {
         let dofs = self.system.dofs();
-        if self.judge.proves() || self.periods > 1 || dofs > MOST_DOFS_IN_TIME || start.len() < 2 * dofs {
+        if self.orbit_check.proves() || self.periods > 1 || dofs > MOST_DOFS_IN_TIME || start.len() < 2 * dofs {
             return None;
         }
         let top = self.method.harmonics.unwrap_or(self.first);
         self.discretization(top, omega).ok()?;
-        let path = self.judge.settle_and_record(&self.system, omega, start[..2 * dofs].to_vec(), RETURNS)?;
+        let path = self.orbit_check.settle_and_record(&self.system, omega, start[..2 * dofs].to_vec(), RETURNS)?;
         Some((top, self.fourier_series(&*path, top, omega)?))
     }
 
@@ -70,7 +70,7 @@ impl HarmonicBalanceSolver {
         }
         self.time_integrations += 1;
         self.discretization(top, omega).ok()?;
-        let path = self.judge.settle_and_record(&self.system, omega, self.static_state_or_zero(), APPROACH)?;
+        let path = self.orbit_check.settle_and_record(&self.system, omega, self.static_state_or_zero(), APPROACH)?;
         let motion = self.fourier_series(&*path, top, omega)?;
         self.converge(top, omega, Some((top, motion))).ok()
     }
@@ -82,11 +82,11 @@ impl HarmonicBalanceSolver {
 
     /// Returns the harmonics of a motion that was integrated over a period.
     pub(crate) fn fourier_series(&mut self, path: &dyn Path, top: usize, omega: f64) -> Option<HarmonicSolution> {
-        let level = self.discretizations.get_mut(&top)?;
-        let (nh, n) = (level.harmonics().len(), level.aft.samples());
+        let discretization = self.discretizations.get_mut(&top)?;
+        let (nh, n) = (discretization.harmonics().len(), discretization.aft.samples());
         let mut motion = HarmonicSolution {
             found_by: FoundBy::TimeIntegration,
-            ..HarmonicSolution::zero(level.linear_motion.len())
+            ..HarmonicSolution::zero(discretization.linear_motion.len())
         };
         let samples: Vec<_> = (0..n).map(|i| path.sample(TAU / omega * i as f64 / n as f64).joints).collect();
         for port in self.ports.iter() {
@@ -102,8 +102,8 @@ impl HarmonicBalanceSolver {
                     .zip(&force)
                     .map(|(now, f)| now[joint].displacement[axis] - f * port.series_compliance);
                 let range = q * nh..(q + 1) * nh;
-                level.aft.add_signal(&mut moved.collect::<Vec<f64>>(), &mut motion.c[range.clone()]);
-                level.aft.add_signal(&mut force.clone(), &mut motion.force[range]);
+                discretization.aft.add_signal(&mut moved.collect::<Vec<f64>>(), &mut motion.c[range.clone()]);
+                discretization.aft.add_signal(&mut force.clone(), &mut motion.force[range]);
             }
         }
         Some(motion)
@@ -119,9 +119,9 @@ impl HarmonicBalanceSolver {
         if self.periods > 1 || !vibrates || !self.discretizations.get(&top)?.is_held_by_contacts() {
             return None;
         }
-        let drive = self.excitation_frequency;
+        let excitation = self.excitation_frequency;
         let no_orbit =
-            |course, state| Some(Err(OrbitError::NoOrbit { method: NAME, omega: drive, observed: course, state }));
+            |course, state| Some(Err(OrbitError::NoOrbit { method: NAME, omega: excitation, observed: course, state }));
         if let Some((_, course, state)) = self.failed_frequencies.iter().find(|(at, ..)| *at == omega) {
             return no_orbit(course.clone(), state.clone());
         }

@@ -13,7 +13,7 @@ pub(crate) struct LinearizedEquations<'a> {
     pub ports: &'a Ports,
     pub harmonics: &'a [usize],
     pub omega: f64,
-    pub ease: Homotopy,
+    pub homotopy: Homotopy,
     pub length: f64,
     pub penalty: &'a [f64],
     pub tangents: &'a [f64],
@@ -124,7 +124,7 @@ impl LinearizedEquations<'_> {
                 let line = &mut jacobian[at * size..(at + 1) * size];
                 line[at] += 1.0;
                 if row.is_force() {
-                    line[at] += self.ease.diagonal_term(harmonics[i % pair / 2]);
+                    line[at] += self.homotopy.diagonal_term(harmonics[i % pair / 2]);
                     let slopes = &own[(i / pair * whole + i % pair) * whole * row.axes..][..whole * row.axes];
                     for (a, slopes) in slopes.chunks_exact(whole).enumerate() {
                         let own = &mut line[(row.first_axis + a) * pair..][..pair];

@@ -48,7 +48,7 @@ const KRYLOV_LONG_SERIES: usize = 2048;
 /// step. Measured: with a quarter of the harmonics a step takes 80 products, with an eighth
 /// 150. With none, each harmonic by its mean, it does not converge in hundreds.
 const LOWEST_UNKNOWNS: usize = 1000;
-/// Tells whether a level with `size` unknowns uses GMRES.
+/// Tells whether a discretization with `size` unknowns uses GMRES.
 pub(crate) fn uses_krylov(size: usize, ports: &Ports) -> bool {
     let many = if ports.has_forces() { MANY_OF_FORCES } else { KRYLOV_UNKNOWNS };
     let many = size >= many && ports.count() >= KRYLOV_AXES;
@@ -254,7 +254,7 @@ impl LinearizedEquations<'_> {
                 })
                 .collect();
             for (i, (out, row)) in out.iter_mut().zip(self.tangent(p, port).chunks_exact(wide)).enumerate() {
-                let kept = 1.0 + self.ease.diagonal_term(self.harmonics[i % pair / 2]);
+                let kept = 1.0 + self.homotopy.diagonal_term(self.harmonics[i % pair / 2]);
                 *out = (kept * unit * v[i] - dot(row, &changed)) / units[i];
             }
         }
@@ -313,7 +313,7 @@ impl LinearizedEquations<'_> {
                         self.ports,
                     )?,
                 };
-                split.drive(modal)?;
+                split.excitation(modal)?;
                 Some(Preconditioner::Split(kept.insert(split)))
             }
         }
@@ -366,7 +366,7 @@ impl LinearizedEquations<'_> {
                 }
             }
             for (a, q) in port.range().enumerate() {
-                matrix[q * size + q] += 1.0 + self.ease.diagonal_term(h);
+                matrix[q * size + q] += 1.0 + self.homotopy.diagonal_term(h);
                 for (b, column) in port.range().enumerate() {
                     matrix[column * size + q] -= turn[a * port.axes + b];
                 }
@@ -597,7 +597,7 @@ impl ModalPreconditioner {
     }
 
     /// Prepares the factors for an excitation frequency.
-    fn drive(&mut self, modal: &ModalReceptance) -> Option<()> {
+    fn excitation(&mut self, modal: &ModalReceptance) -> Option<()> {
         if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
             return Some(());
         }
@@ -716,24 +716,24 @@ mod tests {
     /// Returns the solution, the number of products, and the number of steps of laws with memory.
     fn solve(system: &System, omega: f64, harmonics: &[usize], form: SolverForm) -> (HarmonicSolution, usize, usize) {
         let ports = Ports::new(system).unwrap();
-        let rest = LinearDynamics::new(system, &ports);
-        let mut level = Discretization::new(harmonics.to_vec(), 1024, &ports, None);
-        level.newton_krylov = (form != SolverForm::Eliminated).then(NewtonKrylov::default);
+        let dynamics = LinearDynamics::new(system, &ports);
+        let mut discretization = Discretization::new(harmonics.to_vec(), 1024, &ports, None);
+        discretization.newton_krylov = (form != SolverForm::Eliminated).then(NewtonKrylov::default);
         if form == SolverForm::Sketched {
-            level.create_coarse_sampling();
+            discretization.create_coarse_sampling();
         }
-        level.set_frequency(system, &ports, &rest, omega).unwrap();
+        discretization.set_frequency(system, &ports, &dynamics, omega).unwrap();
         if form == SolverForm::Modal {
             let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
             let structure = Arc::new(UncoupledDynamics::new(system.structure(), &directions).unwrap());
             let series = vec![0.0; ports.count()];
-            level.receptance =
+            discretization.receptance =
                 Receptance::Modal(ModalReceptance::new((&structure, None), (harmonics, omega), &series).unwrap());
         }
-        let start = level.initial_guess(system, &ports, None, omega);
-        let found = level.solve(&ports, omega, start);
-        let found = found.unwrap_or_else(|lost| panic!("{form:?} at {omega}: {lost:?}"));
-        (found, level.products, level.aft.law_steps)
+        let start = discretization.initial_guess(system, &ports, None, omega);
+        let found = discretization.solve(&ports, omega, start);
+        let found = found.unwrap_or_else(|error| panic!("{form:?} at {omega}: {error:?}"));
+        (found, discretization.products, discretization.aft.law_steps)
     }
 
     fn agree(system: &System, harmonics: &[usize], forms: &[SolverForm]) {
@@ -790,37 +790,40 @@ mod tests {
             (0..201).map(|_| (Arc::new(Jenkins2d { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 2)).collect();
         let system = system(&contacts);
         let ports = Ports::new(&system).unwrap();
-        let mut level = Discretization::new(vec![1], 64, &ports, None);
-        level.begin_search(&ports);
-        level.evaluations = 10_000;
-        assert!(level.newton_krylov.is_some() && !level.is_budget_used(&ports));
-        level.products = 1_000_000;
-        assert!(level.is_budget_used(&ports));
-        level.begin_point();
-        assert!(!level.is_budget_used(&ports));
+        let mut discretization = Discretization::new(vec![1], 64, &ports, None);
+        discretization.begin_search(&ports);
+        discretization.evaluations = 10_000;
+        assert!(discretization.newton_krylov.is_some() && !discretization.is_budget_used(&ports));
+        discretization.products = 1_000_000;
+        assert!(discretization.is_budget_used(&ports));
+        discretization.begin_point();
+        assert!(!discretization.is_budget_used(&ports));
     }
 
-    /// Work of earlier searches of a point, here or at other levels, reduces
+    /// Work of earlier searches of a point, here or at other discretizations, reduces
     /// the budget of the next search.
     #[test]
     fn searches_of_a_point_share_its_budget() {
         let joints: Vec<_> = (0..3).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
         let ports = Ports::new(&system(&joints)).unwrap();
-        let mut level = Discretization::new(vec![1, 3], 64, &ports, None);
-        level.aft.law_steps = usize::MAX / 2;
-        assert!(level.is_budget_used(&ports));
-        level.begin_search(&ports);
-        assert!(level.work_before.exceeds(POINT_LIMIT) && level.is_budget_used(&ports), "the point has nothing left");
+        let mut discretization = Discretization::new(vec![1, 3], 64, &ports, None);
+        discretization.aft.law_steps = usize::MAX / 2;
+        assert!(discretization.is_budget_used(&ports));
+        discretization.begin_search(&ports);
+        assert!(
+            discretization.work_before.exceeds(POINT_LIMIT) && discretization.is_budget_used(&ports),
+            "the point has nothing left"
+        );
         let share = |share: f64| WorkShare {
             multiplications: share * POINT_LIMIT.multiplications,
             time_steps: share * POINT_LIMIT.time_steps,
         };
-        (level.work_before, level.work_elsewhere) = (share(0.6), share(0.3));
-        assert!(!level.is_budget_used(&ports));
-        level.work_elsewhere = share(0.5);
-        assert!(level.is_budget_used(&ports));
-        level.begin_point();
-        assert!(!level.is_budget_used(&ports));
+        (discretization.work_before, discretization.work_elsewhere) = (share(0.6), share(0.3));
+        assert!(!discretization.is_budget_used(&ports));
+        discretization.work_elsewhere = share(0.5);
+        assert!(discretization.is_budget_used(&ports));
+        discretization.begin_point();
+        assert!(!discretization.is_budget_used(&ports));
     }
 
     /// GMRES also solves for unknown forces, of rigid friction together with elastic friction.
@@ -853,12 +856,12 @@ mod tests {
         let joints: Vec<_> = (0..10).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
         let system = system(&joints);
         let ports = Ports::new(&system).unwrap();
-        let mut level = Discretization::new((1..512).step_by(2).collect(), 8192, &ports, None);
-        level.begin_search(&ports);
-        level.products = 1_000;
-        assert!(level.newton_krylov.is_some() && !level.is_budget_used(&ports));
-        level.products = 2_000;
-        assert!(level.is_budget_used(&ports));
+        let mut discretization = Discretization::new((1..512).step_by(2).collect(), 8192, &ports, None);
+        discretization.begin_search(&ports);
+        discretization.products = 1_000;
+        assert!(discretization.newton_krylov.is_some() && !discretization.is_budget_used(&ports));
+        discretization.products = 2_000;
+        assert!(discretization.is_budget_used(&ports));
     }
 
     /// The Jacobian is formed on request, also if modes would replace the receptances.
@@ -868,14 +871,14 @@ mod tests {
             (0..201).map(|_| (Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 1)).collect();
         let system = system(&contacts);
         let ports = Ports::new(&system).unwrap();
-        let rest = LinearDynamics::new(&system, &ports);
-        assert!(rest.modes_for(&ports).is_some());
+        let dynamics = LinearDynamics::new(&system, &ports);
+        assert!(dynamics.modes_for(&ports).is_some());
         for needed in [false, true] {
-            let level = Discretization::new(vec![1], 64, &ports, None);
-            let mut level = if needed { level.with_matrix() } else { level };
-            level.set_frequency(&system, &ports, &rest, 0.7).unwrap();
-            let mut motion = level.initial_guess(&system, &ports, None, 0.7);
-            level.evaluate(
+            let discretization = Discretization::new(vec![1], 64, &ports, None);
+            let mut discretization = if needed { discretization.with_matrix() } else { discretization };
+            discretization.set_frequency(&system, &ports, &dynamics, 0.7).unwrap();
+            let mut motion = discretization.initial_guess(&system, &ports, None, 0.7);
+            discretization.evaluate(
                 &ports,
                 0.7,
                 &mut motion,
@@ -883,7 +886,7 @@ mod tests {
                 1.0,
                 crate::method::harmonic_balance::equations::DerivativeScope::All,
             );
-            assert_eq!(level.assemble(&ports, 0.7, GIVEN_EQUATIONS, 1.0), needed);
+            assert_eq!(discretization.assemble(&ports, 0.7, GIVEN_EQUATIONS, 1.0), needed);
         }
     }
 }

@@ -42,18 +42,18 @@ pub(crate) struct BranchEquations<'a> {
     range_length: f64,
     ports: Ports,
     around: Option<Ports>,
-    rest: LinearDynamics,
-    /// System to which `rest` belongs.
+    dynamics: LinearDynamics,
+    /// System to which `dynamics` belongs.
     receptance_of: Arc<System>,
-    level: Discretization,
+    discretization: Discretization,
     /// Equations with twice the harmonics for the error estimate, unless they are too large.
     finer: Option<Discretization>,
     tolerance: f64,
     motion: HarmonicSolution,
     /// Unit of motions, m.
     length: f64,
-    judge: OrbitCheck,
-    kept: HarmonicSet,
+    orbit_check: OrbitCheck,
+    harmonic_set: HarmonicSet,
 }
 
 impl<'a> BranchEquations<'a> {
@@ -66,38 +66,43 @@ impl<'a> BranchEquations<'a> {
         let (system, omega) = at(range.0);
         let system = Arc::new(system);
         // a force that is zero at the first value may be nonzero later
-        let kept = HarmonicSet::new(&system, |_| true);
-        method.check(kept.highest)?;
-        let top = method.harmonics.unwrap_or((HARMONICS * kept.unit).max(kept.highest));
+        let harmonic_set = HarmonicSet::new(&system, |_| true);
+        method.check(harmonic_set.highest)?;
+        let top = method.harmonics.unwrap_or((HARMONICS * harmonic_set.unit).max(harmonic_set.highest));
         let (ports, around) = Ports::for_sector(&system).map_err(|error| error.with(ways(&system)))?;
-        let rest = LinearDynamics::new(&system, &ports);
+        let dynamics = LinearDynamics::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
-        let level = |top: usize| {
-            Discretization::new(kept.up_to(top), method.samples_at(top, &ports, ports.has_steep()), &ports, None)
-                .with_matrix()
+        let discretization = |top: usize| {
+            Discretization::new(
+                harmonic_set.up_to(top),
+                method.samples_at(top, &ports, ports.has_steep()),
+                &ports,
+                None,
+            )
+            .with_matrix()
         };
-        let harmonics = kept.up_to(top).len();
-        check_memory(unbanded_memory(&ports, &rest, harmonics, true), &ports, (harmonics, 1))?;
-        let few = 2 * ports.count() * kept.up_to(kept.doubled(top)).len() <= MOST_ELIMINATED_UNKNOWNS;
-        let (finer, level) = (few.then(|| level(kept.doubled(top))), level(top));
-        let motion = HarmonicSolution::zero(level.linear_motion.len());
+        let harmonics = harmonic_set.up_to(top).len();
+        check_memory(unbanded_memory(&ports, &dynamics, harmonics, true), &ports, (harmonics, 1))?;
+        let few = 2 * ports.count() * harmonic_set.up_to(harmonic_set.doubled(top)).len() <= MOST_ELIMINATED_UNKNOWNS;
+        let (finer, discretization) = (few.then(|| discretization(harmonic_set.doubled(top))), discretization(top));
+        let motion = HarmonicSolution::zero(discretization.linear_motion.len());
         Ok(BranchEquations {
             system_at: at,
             receptance_of: system.clone(),
-            judge: OrbitCheck::new(&system),
+            orbit_check: OrbitCheck::new(&system),
             system,
             omega,
             value: f64::NAN,
             range_length: (range.1 - range.0).abs(),
             ports,
             around,
-            rest,
-            level,
+            dynamics,
+            discretization,
             finer,
             tolerance: method.tolerance.unwrap_or(TOLERANCE),
             motion,
             length: 1.0,
-            kept,
+            harmonic_set,
         })
     }
 
@@ -125,14 +130,14 @@ impl<'a> BranchEquations<'a> {
         }
         let same = system.structure() == self.receptance_of.structure();
         if !same {
-            self.rest = LinearDynamics::new(&system, &self.ports);
+            self.dynamics = LinearDynamics::new(&system, &self.ports);
             self.receptance_of = system.clone();
         }
-        if self.level.set_frequency(&system, &self.ports, &self.rest, omega).is_err() {
+        if self.discretization.set_frequency(&system, &self.ports, &self.dynamics, omega).is_err() {
             return false;
         }
         if !same || self.system.joints() != system.joints() {
-            self.judge = OrbitCheck::new(&system);
+            self.orbit_check = OrbitCheck::new(&system);
         }
         (self.system, self.omega, self.value) = (system, omega, value);
         true
@@ -151,14 +156,14 @@ impl<'a> BranchEquations<'a> {
         // as for a single point: the initial guess solves the whole structure; large systems
         // start without friction
         let guess = (self.system.dofs() < DESCRIBING_DOFS).then(|| DescribingGuess::new(&self.system, self.omega));
-        let start = self.level.initial_guess(&self.system, &self.ports, guess.as_ref(), self.omega);
-        self.level.begin_point();
-        let solved = self.level.solve(&self.ports, self.omega, start);
-        self.motion = solved.map_err(|lost| self.not_converged(lost.iterations, lost.residual))?;
+        let start = self.discretization.initial_guess(&self.system, &self.ports, guess.as_ref(), self.omega);
+        self.discretization.begin_point();
+        let solved = self.discretization.solve(&self.ports, self.omega, start);
+        self.motion = solved.map_err(|error| self.not_converged(error.iterations, error.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-        let size = norm(&self.motion.c).max(1e-3 * norm(&self.level.linear_motion));
+        let size = norm(&self.motion.c).max(1e-3 * norm(&self.discretization.linear_motion));
         self.length = (UNIT_OF_MOTION * size).max(f64::MIN_POSITIVE);
-        Ok(self.level.pack(&self.ports, &self.motion, self.length))
+        Ok(self.discretization.pack(&self.ports, &self.motion, self.length))
     }
 
     /// Returns the orbit of a point of the branch.
@@ -166,24 +171,26 @@ impl<'a> BranchEquations<'a> {
         if !self.set_parameter(value) {
             return None;
         }
-        self.level.unpack(&self.ports, (x, self.length), &mut self.motion);
-        self.level.begin_point();
-        self.level.newton_from(&self.ports, self.omega, &mut self.motion, 10).ok()?;
-        let places = postprocess::places(&mut self.level, &self.rest, self.omega, &self.motion).ok()?;
+        self.discretization.unpack(&self.ports, (x, self.length), &mut self.motion);
+        self.discretization.begin_point();
+        self.discretization.newton_from(&self.ports, self.omega, &mut self.motion, 10).ok()?;
+        let places = postprocess::places(&mut self.discretization, &self.dynamics, self.omega, &self.motion).ok()?;
         let truncation = self.finer.as_mut().and_then(|finer| {
-            finer.set_frequency(&self.system, &self.ports, &self.rest, self.omega).ok()?;
-            let mut motion = with_harmonics(&self.motion, self.level.harmonics(), finer.harmonics());
+            finer.set_frequency(&self.system, &self.ports, &self.dynamics, self.omega).ok()?;
+            let mut motion = with_harmonics(&self.motion, self.discretization.harmonics(), finer.harmonics());
             // Newton's method alone: a search would find another branch near a turning point
             finer.begin_point();
             finer.newton_from(&self.ports, self.omega, &mut motion, ESTIMATE_ITERATIONS).ok()?;
-            let better = postprocess::places(finer, &self.rest, self.omega, &motion).ok()?;
-            let coarse = ComparedSolution { harmonics: self.level.harmonics(), places: &places, along: &self.motion.c };
-            let steep = self.ports.has_steep() || self.level.states_cross_within_sample(&self.ports, &self.motion);
-            let at = (self.kept, self.omega, steep);
+            let better = postprocess::places(finer, &self.dynamics, self.omega, &motion).ok()?;
+            let coarse =
+                ComparedSolution { harmonics: self.discretization.harmonics(), places: &places, along: &self.motion.c };
+            let steep =
+                self.ports.has_steep() || self.discretization.states_cross_within_sample(&self.ports, &self.motion);
+            let at = (self.harmonic_set, self.omega, steep);
             Some(truncation_error(
                 self.system.place_axes(),
                 &self.ports,
-                &self.rest,
+                &self.dynamics,
                 at,
                 &coarse,
                 (finer, &motion, &better),
@@ -195,12 +202,12 @@ impl<'a> BranchEquations<'a> {
             ring_ports: self.around.as_ref(),
             omega: self.omega,
             excitation_harmonic: 1,
-            half_period: self.kept.has_half_period_symmetry(),
+            half_period: self.harmonic_set.has_half_period_symmetry(),
             truncation,
             tolerance: self.tolerance,
-            judge: Some(&mut self.judge),
+            orbit_check: Some(&mut self.orbit_check),
         };
-        postprocess::orbit(setting, &mut self.level, &self.motion, places)
+        postprocess::orbit(setting, &mut self.discretization, &self.motion, places)
             .filter(|orbit| postprocess::energies_balance(&self.system, orbit))
     }
 
@@ -229,7 +236,7 @@ impl ParametricEquations for BranchEquations<'_> {
             if !self.set_parameter(at) {
                 return false;
             }
-            self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, None);
+            self.discretization.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, None);
             for (d, r) in by_p.iter_mut().zip(f.iter()) {
                 *d = if sign > 0.0 { *r } else { (*d - *r) / (2.0 * step) };
             }
@@ -237,7 +244,7 @@ impl ParametricEquations for BranchEquations<'_> {
         if !self.set_parameter(p) {
             return false;
         }
-        self.level.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
+        self.discretization.residual_at(&self.ports, self.omega, (x, self.length), &mut self.motion, f, Some(by_x));
         true
     }
 
@@ -246,11 +253,11 @@ impl ParametricEquations for BranchEquations<'_> {
             return false;
         }
         let mut start = self.motion.clone();
-        self.level.unpack(&self.ports, (x, self.length), &mut start);
-        self.level.begin_point();
-        let Ok(motion) = self.level.solve(&self.ports, self.omega, start) else { return false };
+        self.discretization.unpack(&self.ports, (x, self.length), &mut start);
+        self.discretization.begin_point();
+        let Ok(motion) = self.discretization.solve(&self.ports, self.omega, start) else { return false };
         self.motion = motion;
-        x.copy_from_slice(&self.level.pack(&self.ports, &self.motion, self.length));
+        x.copy_from_slice(&self.discretization.pack(&self.ports, &self.motion, self.length));
         true
     }
 }

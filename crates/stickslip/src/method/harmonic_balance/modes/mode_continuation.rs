@@ -154,7 +154,7 @@ impl ModeEquations<'_> {
     /// and the end of slip would be corners of the curve.
     fn apply_metric(&self, at: &ModeArc, direction: &[f64]) -> Vec<f64> {
         let (n, last) = (self.system.dofs(), self.size());
-        let nh = self.alternation.harmonics.len();
+        let nh = self.aft.harmonics.len();
         let mut out = vec![0.0; last + 1];
         for k in 0..nh {
             let first = 2 * k * n;

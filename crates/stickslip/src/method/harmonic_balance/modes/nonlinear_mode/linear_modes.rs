@@ -111,16 +111,16 @@ impl ModeEquations<'_> {
     /// Returns a linear mode at amplitude `a`. Forces along laws of velocity are zero. Returns
     /// `None` if its frequency is zero.
     pub fn linear_state(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
-        let (n, nh) = (self.system.dofs(), self.alternation.harmonics.len());
+        let (n, nh) = (self.system.dofs(), self.aft.harmonics.len());
         let omega = mode.squared_frequency.sqrt();
         let mut x = vec![ZERO; nh * n];
         for i in 0..n {
             x[self.first * n + i] = a * mode.shape[i];
         }
         let damping = self.system.structure().damping().map(|c| Complex64::new(c, 0.0));
-        let lost = mode.shape.dotc(&(damping * &mode.shape)).re;
+        let dissipated = mode.shape.dotc(&(damping * &mode.shape)).re;
         let force = vec![ZERO; nh * self.force_axes()];
-        (omega > 0.0).then(|| ModeState { x, force, omega, damping: lost / (2.0 * omega) })
+        (omega > 0.0).then(|| ModeState { x, force, omega, damping: dissipated / (2.0 * omega) })
     }
 
     /// Returns the linear mode number `index`, by rising frequency, with all joints at their
@@ -161,7 +161,7 @@ impl ModeEquations<'_> {
             found = Some((shape, whole.im / (2.0 * square)));
         }
         let (shape, damping) = found?;
-        let nh = self.alternation.harmonics.len();
+        let nh = self.aft.harmonics.len();
         let mut x = vec![ZERO; nh * n];
         x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
         Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })

@@ -64,7 +64,7 @@ pub(crate) struct ModeEquations<'a> {
     pub(super) motion_ports: Vec<PlacedPort>,
     /// Force ports. Their axes have separate numbers.
     pub(super) force_ports: Vec<PlacedPort>,
-    pub(super) alternation: FrequencyTime,
+    pub(super) aft: FrequencyTime,
     /// Index of the first harmonic.
     first: usize,
     /// True if motions may be mixtures of two modes of equal frequency, so that the equations
@@ -121,13 +121,13 @@ impl<'a> ModeEquations<'a> {
         }
         let odd = system.joints().iter().all(|joint| joint.law().is_odd());
         let list: Vec<usize> = if odd { (1..=harmonics).step_by(2).collect() } else { (0..=harmonics).collect() };
-        let mut alternation = FrequencyTime::new(list, samples);
-        alternation.by_frequency = Some(Vec::new());
+        let mut aft = FrequencyTime::new(list, samples);
+        aft.by_frequency = Some(Vec::new());
         Ok(ModeEquations {
             system,
             motion_ports: elastic,
             force_ports: contacts,
-            alternation,
+            aft,
             first: usize::from(!odd),
             may_be_singular: false,
         })
@@ -135,12 +135,12 @@ impl<'a> ModeEquations<'a> {
 
     /// Returns harmonics times samples.
     pub fn resolution(&self) -> usize {
-        self.alternation.resolution()
+        self.aft.resolution()
     }
 
     /// Returns the number of time steps of laws with memory.
     pub fn time_steps(&self) -> usize {
-        self.alternation.law_steps
+        self.aft.law_steps
     }
 
     /// Returns true if the system has one degree of freedom and a law with memory.
@@ -167,7 +167,7 @@ impl<'a> ModeEquations<'a> {
 
     /// Returns the number of unknowns: real and imaginary parts of motions and forces, ω and ζ.
     pub(crate) fn size(&self) -> usize {
-        2 * self.alternation.harmonics.len() * (self.system.dofs() + self.force_axes()) + 2
+        2 * self.aft.harmonics.len() * (self.system.dofs() + self.force_axes()) + 2
     }
 
     /// Returns ε of every contact, N s/m, see [`contact_parameter`].
@@ -179,7 +179,7 @@ impl<'a> ModeEquations<'a> {
         if self.force_ports.is_empty() {
             return Vec::new();
         }
-        let top = self.alternation.harmonics[self.alternation.harmonics.len() - 1];
+        let top = self.aft.harmonics[self.aft.harmonics.len() - 1];
         let rate = top as f64 * omega;
         let stiff = self.system.structure().stiffness() + self.system.structure().mass() * (rate * rate);
         // masses are positive; only an ω that overflows has no factor, and its residual is not
@@ -206,7 +206,7 @@ impl<'a> ModeEquations<'a> {
         mut jacobian: Option<&mut [f64]>,
     ) {
         let n = self.system.dofs();
-        let harmonics = self.alternation.harmonics.clone();
+        let harmonics = self.aft.harmonics.clone();
         let size = self.size();
         let (omega, zeta) = (state.omega, state.damping);
         if let Some(jacobian) = jacobian.as_deref_mut() {
@@ -280,14 +280,14 @@ impl<'a> ModeEquations<'a> {
 
     /// Adds the forces of motion ports on the places.
     fn add_elastic_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
-        let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
+        let (n, size, nh) = (self.system.dofs(), self.size(), self.aft.harmonics.len());
         for placed in &self.motion_ports {
             let wide = 2 * nh * placed.directions.len();
             let mut force = vec![ZERO; nh * placed.directions.len()];
             let mut tangent = vec![0.0; if jacobian.is_some() { wide * wide } else { 0 }];
             let c = placed.along(&state.x, nh);
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
-            self.alternation.motion_port_force(&placed.port, (state.omega, 1.0), &c, &mut force, wanted);
+            self.aft.motion_port_force(&placed.port, (state.omega, 1.0), &c, &mut force, wanted);
             for (a, w) in placed.directions.iter().enumerate() {
                 for k in 0..nh {
                     for i in (0..n).filter(|&i| w[i] != 0.0) {
@@ -295,7 +295,7 @@ impl<'a> ModeEquations<'a> {
                         residual[row] += w[i] * force[a * nh + k].re;
                         residual[row + 1] += w[i] * force[a * nh + k].im;
                         let Some(jacobian) = jacobian.as_deref_mut() else { continue };
-                        if let Some(by_frequency) = &self.alternation.by_frequency {
+                        if let Some(by_frequency) = &self.aft.by_frequency {
                             jacobian[row * size + size - 2] += w[i] * by_frequency[a * nh + k].re;
                             jacobian[(row + 1) * size + size - 2] += w[i] * by_frequency[a * nh + k].im;
                         }
@@ -324,7 +324,7 @@ impl<'a> ModeEquations<'a> {
     /// affects the solution only through the missing harmonics. Newton's method converges
     /// without this term.
     fn add_contact_forces(&mut self, state: &ModeState, residual: &mut [f64], mut jacobian: Option<&mut [f64]>) {
-        let (n, size, nh) = (self.system.dofs(), self.size(), self.alternation.harmonics.len());
+        let (n, size, nh) = (self.system.dofs(), self.size(), self.aft.harmonics.len());
         let penalties = self.penalties(state.omega);
         for (placed, &penalty) in self.force_ports.iter().zip(&penalties) {
             let port = &placed.port;
@@ -336,7 +336,7 @@ impl<'a> ModeEquations<'a> {
             let mut image = vec![ZERO; force.len()];
             let mut tangent = vec![0.0; if jacobian.is_some() { wide * wide } else { 0 }];
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
-            self.alternation.force_port_image(port, (state.omega, penalty, 1.0), (&c, force), &mut image, wanted);
+            self.aft.force_port_image(port, (state.omega, penalty, 1.0), (&c, force), &mut image, wanted);
             for (a, w) in placed.directions.iter().enumerate() {
                 for k in 0..nh {
                     let at = a * nh + k;
@@ -355,9 +355,9 @@ impl<'a> ModeEquations<'a> {
             let Some(jacobian) = jacobian.as_deref_mut() else { continue };
             for (i, slopes) in tangent.chunks_exact(wide).enumerate() {
                 let row = &mut jacobian[(first + i) * size..(first + i + 1) * size];
-                row[first + i] += 1.0 + force_regularization(self.alternation.harmonics[i / 2 % nh]);
+                row[first + i] += 1.0 + force_regularization(self.aft.harmonics[i / 2 % nh]);
                 for (b, v) in placed.directions.iter().enumerate() {
-                    for (l, &h) in self.alternation.harmonics.iter().enumerate() {
+                    for (l, &h) in self.aft.harmonics.iter().enumerate() {
                         let at = b * nh + l;
                         let (x, y) = (slopes[2 * at], slopes[2 * at + 1]);
                         let by = |z: Complex64| (x * z.re + y * z.im, y * z.re - x * z.im);
@@ -387,7 +387,7 @@ impl<'a> ModeEquations<'a> {
             .amax()
             .max(start.omega * start.omega * self.system.structure().mass().amax());
         let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
-        let width = 2 * self.alternation.harmonics.len();
+        let width = 2 * self.aft.harmonics.len();
         scale.extend(self.force_ports.iter().flat_map(|placed| vec![placed.port.scale; width * placed.port.axes]));
         scale.extend([1.0; 2]);
         scale
@@ -408,7 +408,7 @@ impl<'a> ModeEquations<'a> {
     /// Returns a multiple of a motion about the same mean.
     pub fn scaled(&self, state: &ModeState, factor: f64) -> ModeState {
         let (mut scaled, n) = (state.clone(), self.system.dofs());
-        let harmonics = &self.alternation.harmonics;
+        let harmonics = &self.aft.harmonics;
         for (k, _) in harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
             scaled.x[k * n..(k + 1) * n].iter_mut().for_each(|x| *x *= factor);
             scaled.force.iter_mut().skip(k).step_by(harmonics.len()).for_each(|force| *force *= factor);

@@ -62,17 +62,17 @@ impl ModeEquations<'_> {
     /// Returns the contribution of the viscous dampers to the damping ratio. It is the energy
     /// that they dissipate per cycle relative to the energy that `2 ζ ω M` supplies for ζ = 1.
     pub fn viscous_damping_ratio(&self, state: &ModeState) -> f64 {
-        let (n, mut lost, mut whole) = (self.system.dofs(), 0.0, 0.0);
-        for (k, &h) in self.alternation.harmonics.iter().enumerate() {
+        let (n, mut dissipated, mut whole) = (self.system.dofs(), 0.0, 0.0);
+        for (k, &h) in self.aft.harmonics.iter().enumerate() {
             for i in 0..n {
                 for l in 0..n {
                     let pair = (state.x[k * n + i].conj() * state.x[k * n + l]).re * (h * h) as f64;
-                    lost += pair * self.system.structure().damping()[(i, l)];
+                    dissipated += pair * self.system.structure().damping()[(i, l)];
                     whole += pair * self.system.structure().mass()[(i, l)];
                 }
             }
         }
-        lost / (2.0 * state.omega * whole)
+        dissipated / (2.0 * state.omega * whole)
     }
 
     /// Returns the first harmonic of every place, m.
@@ -84,7 +84,7 @@ impl ModeEquations<'_> {
     pub fn half_ranges(&self, state: &ModeState) -> Vec<f64> {
         let n = self.system.dofs();
         let series: Vec<Vec<Complex64>> = state.x.chunks_exact(n).map(|x| self.at_places(x)).collect();
-        let harmonics = &self.alternation.harmonics;
+        let harmonics = &self.aft.harmonics;
         let of_place = |place: usize| {
             let terms: Vec<(f64, Complex64)> =
                 harmonics.iter().zip(&series).map(|(h, places)| (*h as f64, places[place])).collect();
