@@ -24,7 +24,7 @@ pub fn load(a: usize) -> Complex64 {
 
 /// Returns the mass with viscous `damping` (N s/m) along each direction, under [`load`] and the
 /// constant force `constant` (N) along all directions.
-pub fn held(law: &SharedLaw, damping: f64, constant: f64) -> System {
+pub fn mass_on_law(law: &SharedLaw, damping: f64, constant: f64) -> System {
     let d = law.directions();
     let one = DMatrix::identity(d, d);
     let places = (0..d).map(|a| format!("x{a}")).collect();

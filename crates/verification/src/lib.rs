@@ -113,7 +113,7 @@ pub fn random_system(seed: u64) -> (System, f64) {
 }
 
 /// Returns such a system with law parameters from their whole ranges.
-pub fn random_system_of_any(seed: u64) -> (System, f64) {
+pub fn random_system_of_any_parameters(seed: u64) -> (System, f64) {
     system_with(seed, &|random| any_law(random, TABLE))
 }
 

@@ -42,7 +42,7 @@ pub struct Reference<'a> {
     contacts: Vec<Contact>,
     time: f64,
     /// Number of steps with equations that were not solved.
-    pub lost: usize,
+    pub unsolved_steps: usize,
 }
 
 /// Velocity over which a law with only a resolvent is smoothed: a fraction of the velocity of
@@ -92,7 +92,7 @@ impl<'a> Reference<'a> {
             a: DVector::zeros(system.dofs()),
             contacts: contacts.collect(),
             time: 0.0,
-            lost: 0,
+            unsolved_steps: 0,
         };
         for j in 0..reference.contacts.len() {
             let (u, v) = reference.motion(j, &reference.x, &reference.v, 0.0);
@@ -205,7 +205,7 @@ impl<'a> Reference<'a> {
             let Some(change) = jacobian.lu().solve(&residual) else { break };
             a -= change;
         }
-        self.lost += usize::from(!solved && n > 0);
+        self.unsolved_steps += usize::from(!solved && n > 0);
         let x = &self.x + &self.v * h + (&self.a + &a) * (0.25 * h * h);
         let v = &self.v + (&self.a + &a) * (0.5 * h);
         for j in 0..self.contacts.len() {
@@ -261,7 +261,7 @@ impl Contact {
                 let way = |a: usize| c * h * (self.v[a] + 0.5 * c * (v[a] - self.v[a]));
                 RelativeMotion { displacement: std::array::from_fn(|a| self.u[a] + way(a)), velocity }
             });
-            z = replay::after(rate, self.axes.len(), h, &motion, &self.z);
+            z = replay::radau_step(rate, self.axes.len(), h, &motion, &self.z);
             let force =
                 rate.evaluate_values(&RelativeMotion { displacement: u, velocity: v }, &z, &mut vec![0.0; z.len()]);
             return (force, z, moving);
@@ -298,7 +298,7 @@ mod tests {
         let sample = exact.sample(0.0);
         let mut reference = Reference::new(&system, omega, 1000, &sample.displacement, &sample.velocity);
         let (amplitudes, change) = reference.settle(80, 1e-5);
-        assert!(change < 1e-4 && reference.lost == 0, "{change} {}", reference.lost);
+        assert!(change < 1e-4 && reference.unsolved_steps == 0, "{change} {}", reference.unsolved_steps);
         for (place, amplitude) in exact.places.iter().zip(amplitudes) {
             assert!((amplitude / place.amplitude() - 1.0).abs() < 1e-3, "{amplitude} {}", place.amplitude());
         }

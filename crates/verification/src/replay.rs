@@ -11,7 +11,7 @@ use crate::Random;
 pub type Instant = ([f64; MAX_DIRECTIONS], [f64; MAX_DIRECTIONS]);
 
 /// A given motion as a function of time, from zero on.
-pub type Given<'a> = &'a dyn Fn(f64) -> Instant;
+pub type Motion<'a> = &'a dyn Fn(f64) -> Instant;
 
 /// A view of a law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub fn views(law: &dyn Law) -> Vec<View> {
 ///
 /// # Panics
 /// If the law does not offer the view.
-pub fn forces(law: &dyn Law, view: View, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
+pub fn forces(law: &dyn Law, view: View, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     match view {
         View::Pieces => pieces(&law.ideal_elements().expect("pieces"), motion, times),
         View::Step => step(law.step().expect("a step"), motion, times),
@@ -52,7 +52,7 @@ pub fn forces(law: &dyn Law, view: View, motion: Given<'_>, times: &[f64]) -> Ve
     }
 }
 
-fn pieces(pieces: &[IdealElement], motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
+fn pieces(pieces: &[IdealElement], motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let mut held = vec![0.0; pieces.len()];
     let mut before = motion(times[0]).0[0];
     times
@@ -77,7 +77,7 @@ fn pieces(pieces: &[IdealElement], motion: Given<'_>, times: &[f64]) -> Vec<[f64
         .collect()
 }
 
-fn step(step: &dyn StepView, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
+fn step(step: &dyn StepView, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let mut z = vec![0.0; step.states()];
     let mut before = motion(times[0]).0;
     times
@@ -107,7 +107,13 @@ const STAGES: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 /// # Panics
 /// If the equations of the step are singular.
 #[must_use]
-pub fn after(law: &dyn RateView, directions: usize, h: f64, motion: &[RelativeMotion<f64>; 2], z: &[f64]) -> Vec<f64> {
+pub fn radau_step(
+    law: &dyn RateView,
+    directions: usize,
+    h: f64,
+    motion: &[RelativeMotion<f64>; 2],
+    z: &[f64],
+) -> Vec<f64> {
     let n = law.states();
     let mut point = RatePoint::new(directions, n);
     let mut stages = DVector::from_fn(2 * n, |i, _| z[i % n]);
@@ -142,7 +148,7 @@ pub fn after(law: &dyn RateView, directions: usize, h: f64, motion: &[RelativeMo
     stages.as_slice()[n..].to_vec()
 }
 
-fn rate(directions: usize, law: &dyn RateView, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
+fn rate(directions: usize, law: &dyn RateView, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let mut z = vec![0.0; law.states()];
     let relative = |time: f64| {
         let (displacement, velocity) = motion(time);
@@ -153,14 +159,14 @@ fn rate(directions: usize, law: &dyn RateView, motion: Given<'_>, times: &[f64])
         .iter()
         .map(|&time| {
             let h = time - last;
-            z = after(law, directions, h, &NODES.map(|c| relative(last + c * h)), &z);
+            z = radau_step(law, directions, h, &NODES.map(|c| relative(last + c * h)), &z);
             last = time;
             law.evaluate_values(&relative(time), &z, &mut vec![0.0; z.len()])
         })
         .collect()
 }
 
-fn prox(directions: usize, law: &dyn ProxView, motion: Given<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
+fn prox(directions: usize, law: &dyn ProxView, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MAX_DIRECTIONS]> {
     let resolve = |y: &[f64], penalty: f64| {
         let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
         law.resolve(y, penalty, &mut force[..directions], &mut slope[..directions * directions]);
@@ -193,7 +199,7 @@ fn prox(directions: usize, law: &dyn ProxView, motion: Given<'_>, times: &[f64])
 }
 
 /// Returns the energy lost between the samples, `∫ f · du` by the trapezoidal rule, J.
-pub fn lost(motion: Given<'_>, times: &[f64], forces: &[[f64; MAX_DIRECTIONS]]) -> f64 {
+pub fn dissipated(motion: Motion<'_>, times: &[f64], forces: &[[f64; MAX_DIRECTIONS]]) -> f64 {
     let places: Vec<_> = times.iter().map(|&time| motion(time).0).collect();
     let each = |k: usize| -> f64 {
         let along = |a: usize| 0.5 * (forces[k][a] + forces[k + 1][a]) * (places[k + 1][a] - places[k][a]);

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::law::{Contact, Coulomb, Gap, IdealElement, Jenkins, Law, LawInfo, Parameter, SharedLaw, Stribeck};
-use stickslip::method::event_driven::{EventDriven, Subharmonic};
+use stickslip::method::event_driven::{EventDriven, SubharmonicEventDriven};
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::time_history::{Excitation, TimeHistory};
 use stickslip::method::{Method, auto::Auto, shooting::Shooting};
@@ -155,7 +155,8 @@ fn subharmonic_motion_beside_an_unstable_one() {
     let single = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
     assert_eq!(single.is_stable(), Some(false));
     multiplied(&single, [-1.878_280_613_595_553, -0.418_107_055_970_699].map(Complex64::from));
-    let double = Subharmonic { period: 2 }.solver(&system).unwrap().orbit(omega, Some(&[-1.0, 0.3])).unwrap();
+    let double =
+        SubharmonicEventDriven { period: 2 }.solver(&system).unwrap().orbit(omega, Some(&[-1.0, 0.3])).unwrap();
     let other = Shooting { period: 2, tolerance: 1e-10, ..Shooting::default() };
     let other = other.solver(&system).unwrap().orbit(omega, Some(&double.initial_state)).unwrap();
     close("maximum", double.places[0].maximum, other.places[0].maximum, 1e-7);
@@ -227,7 +228,7 @@ fn motions_of_one_three_and_five_periods_side_by_side() {
         let multiplier = Complex64::new(multiplier[0], multiplier[1]);
         let shrinks = (-damping * f64::from(period) * TAU / omega).exp();
         assert!((multiplier.norm_sqr() - shrinks).abs() < PRINTED, "{period}");
-        let method = Subharmonic { period: period as usize };
+        let method = SubharmonicEventDriven { period: period as usize };
         let orbit = method.solver(&system).unwrap().orbit(omega, Some(&start)).unwrap();
         for (found, expected) in orbit.initial_state.iter().zip(start) {
             near("start", *found, expected, PRINTED);

@@ -25,7 +25,7 @@ mod mode_curve;
 pub use mode_curve::{ModeEnd, ModeEndCause, TurningPart};
 
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
-use crate::method::{MethodError, ways};
+use crate::method::{MethodError, alternatives};
 use crate::model::System;
 use mode_curve::ModeCurve;
 use num_complex::Complex64;
@@ -117,7 +117,7 @@ pub fn check(system: &System) -> Result<(), MethodError> {
 
 /// Returns the mode equations of a system. The error names alternative methods.
 fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEquations<'_>, MethodError> {
-    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with(ways(system)))
+    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with_alternatives(alternatives(system)))
 }
 
 /// Computes a nonlinear mode, from an amplitude at which friction is negligible to smaller

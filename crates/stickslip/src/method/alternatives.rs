@@ -4,17 +4,17 @@ use std::fmt;
 
 /// The methods that take a system, without `auto`.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Ways {
+pub struct Alternatives {
     /// Methods that take the system unchanged.
     pub methods: Vec<&'static str>,
     /// Methods that take the system only with a `width`, which smooths its laws.
     pub with_width: Vec<&'static str>,
     /// Reasons of all methods if none takes the system: the methods with the same reason, and
     /// the reason.
-    pub missing: Vec<(Vec<&'static str>, String)>,
+    pub reasons: Vec<(Vec<&'static str>, String)>,
 }
 
-impl Ways {
+impl Alternatives {
     /// Returns true if at least one method takes the system.
     pub fn any(&self) -> bool {
         !(self.methods.is_empty() && self.with_width.is_empty())
@@ -22,7 +22,7 @@ impl Ways {
 
     /// Returns the text that follows an error message; empty if no methods are known.
     pub(super) fn suffix(&self) -> String {
-        if *self == Ways::default() { String::new() } else { format!("; {self}") }
+        if *self == Alternatives::default() { String::new() } else { format!("; {self}") }
     }
 }
 
@@ -35,7 +35,7 @@ fn one_of(names: &[&str]) -> String {
     }
 }
 
-impl fmt::Display for Ways {
+impl fmt::Display for Alternatives {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = "with the option `width` (m/s), which smooths the friction";
         match (&self.methods[..], &self.with_width[..]) {
@@ -49,7 +49,7 @@ impl fmt::Display for Ways {
                 write!(
                     f,
                     "no method takes this system: {}",
-                    self.missing.iter().map(one).collect::<Vec<_>>().join("; ")
+                    self.reasons.iter().map(one).collect::<Vec<_>>().join("; ")
                 )
             }
             (methods, []) => write!(f, "use method {}", one_of(methods)),

@@ -9,7 +9,7 @@ use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
 use super::shooting::Shooting;
 use super::{
-    Choice, Method, MethodError, MethodInfo, Options, Solver, event_driven, harmonic_balance, transient, ways,
+    Choice, Method, MethodError, MethodInfo, Options, Solver, alternatives, event_driven, harmonic_balance, transient,
 };
 use crate::law::Law;
 use crate::model::System;
@@ -64,7 +64,7 @@ impl Auto {
         if method.name() != harmonic_balance::NAME || HarmonicBalance::takes_laws(system) {
             return (method, because);
         }
-        let methods = ways(system).methods;
+        let methods = alternatives(system).methods;
         // `transient` is the last resort
         let other = methods.iter().find(|name| **name != transient::INFO.name).or(methods.first());
         match other.and_then(|name| build_named(name)) {
@@ -160,12 +160,11 @@ impl<'a> WithFallback<'a> {
         let (system, joints) = (self.system, self.system.joints().len());
         let cheap = |name: &str| match name {
             harmonic_balance::NAME => true,
-            name if name == event_driven::INFO.name => {
-                event_driven::orbit_work(system).is_some_and(|work| event_driven::ALONE * work <= FALLBACK_WORK)
-            }
+            name if name == event_driven::INFO.name => event_driven::orbit_work(system)
+                .is_some_and(|work| event_driven::COLD_START_FACTOR * work <= FALLBACK_WORK),
             name => name != transient::INFO.name && system.dofs() <= SHOOTING_DOFS && joints <= SHOOTING_JOINTS,
         };
-        let methods = ways(system).methods;
+        let methods = alternatives(system).methods;
         let name = methods.into_iter().find(|name| *name != self.chosen && cheap(name))?;
         Some((name, build_named(name)?.solver(system).ok()?))
     }
@@ -174,12 +173,12 @@ impl<'a> WithFallback<'a> {
     /// the second may avoid.
     fn search(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
         let by = |solver: &mut (dyn Solver + Send + 'a), start| match between {
-            true => solver.between(omega, start),
+            true => solver.orbit_without_estimate(omega, start),
             false => solver.orbit(omega, start),
         };
         let own = start.filter(|start| self.last.as_deref() != Some(*start));
         let found = by(&mut *self.first, own);
-        self.effort = self.first.effort();
+        self.effort = self.first.work_fraction();
         let error = match found {
             Err(error) if may_succeed_elsewhere(&error) => error,
             outcome => return outcome,
@@ -190,7 +189,7 @@ impl<'a> WithFallback<'a> {
         let Some((name, second)) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
         let near = start.filter(|start| self.last.as_deref() == Some(*start)).or(error.candidate());
         let found = by(&mut **second, near);
-        self.effort += second.effort();
+        self.effort += second.work_fraction();
         let mut orbit = found.map_err(|_| error.with_failed_alternative(name))?;
         orbit.evidence.fallback_from = Some(self.chosen);
         self.last = Some(orbit.initial_state.clone());
@@ -219,16 +218,16 @@ impl Solver for WithFallback<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.search(omega, start, false)
     }
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.search(omega, start, true)
     }
-    fn effort(&self) -> f64 {
+    fn work_fraction(&self) -> f64 {
         self.effort
     }
-    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
         match self.second.as_mut().and_then(Option::as_mut).filter(|_| self.last.as_deref() == Some(start)) {
-            Some((_, second)) => second.begin_at(omega, start),
-            None => self.first.begin_at(omega, start),
+            Some((_, second)) => second.begin_branch(omega, start),
+            None => self.first.begin_branch(omega, start),
         }
     }
 }

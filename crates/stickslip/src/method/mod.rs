@@ -23,14 +23,14 @@ pub mod transient;
 mod with_alternatives;
 
 pub use crate::orbit::{IntegrationError, OrbitError};
-pub use alternatives::Ways;
+pub use alternatives::Alternatives;
 pub use error::{MethodError, Refusal};
 use list::LIST;
 pub use options::{MethodOption, Options, WIDTH};
 pub use orbit_search::evidence::evidence_steps;
 pub use static_equilibrium::StaticEquilibrium;
 pub use traits::{Choice, Method, MethodInfo, Solver};
-pub use with_alternatives::{advised, ways};
+pub use with_alternatives::{alternatives, solver_with_alternatives};
 
 /// All methods: `auto` and the rows of `list.rs`.
 pub const TABLE: &[MethodInfo] = &{

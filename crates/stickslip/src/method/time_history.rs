@@ -7,7 +7,7 @@
 
 use super::flow::Flow;
 use super::flow::integrator_choice;
-use super::{IntegrationError, MethodError, ways};
+use super::{IntegrationError, MethodError, alternatives};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;
@@ -94,7 +94,7 @@ struct TimeInterval {
 }
 
 /// A sample of the motion, and the motion since the previous sample.
-pub struct Instant<'a> {
+pub struct TimeSample<'a> {
     /// Time, s.
     pub time: f64,
     /// Excitation frequency, rad/s; zero if free.
@@ -103,7 +103,7 @@ pub struct Instant<'a> {
     pub state: &'a Sample,
     /// Returns the state at any time (s) between the previous sample and this one, from the
     /// computed motion.
-    pub since: &'a dyn Fn(f64) -> Sample,
+    pub between: &'a dyn Fn(f64) -> Sample,
 }
 
 impl TimeInterval {
@@ -154,7 +154,11 @@ impl TimeHistory {
     ///
     /// # Errors
     /// Same as [`TimeHistory::run`].
-    pub fn visit(&self, system: &System, visitor: &mut dyn FnMut(Instant<'_>) -> bool) -> Result<(), TimeHistoryError> {
+    pub fn visit(
+        &self,
+        system: &System,
+        visitor: &mut dyn FnMut(TimeSample<'_>) -> bool,
+    ) -> Result<(), TimeHistoryError> {
         let shared = Arc::new(system.clone());
         let mut flow = TimeHistory::flow(system, self.width)?;
         flow.set_recording(true);
@@ -194,7 +198,7 @@ impl TimeHistory {
                         Some(before) if time < stretch.begin => before.at(time),
                         _ => stretch.at(time),
                     };
-                    if !visitor(Instant { time, omega, state: &stretch.at(time), since: &since }) {
+                    if !visitor(TimeSample { time, omega, state: &stretch.at(time), between: &since }) {
                         return Ok(());
                     }
                     next += 1;
@@ -253,7 +257,8 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        integrator_choice::integrator(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
+        integrator_choice::integrator(system, width, TOLERANCE, NAME)
+            .map_err(|error| error.with_alternatives(alternatives(system)))
     }
 
     /// Returns the excitation frequency of the cycle that begins at `time`.

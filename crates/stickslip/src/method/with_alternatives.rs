@@ -3,7 +3,9 @@
 //! The functions try to make a solver of every method in the list.
 
 use super::list::LIST;
-use super::{Method, MethodError, MethodInfo, Options, OrbitError, Solver, WIDTH, Ways, event_driven, transient};
+use super::{
+    Alternatives, Method, MethodError, MethodInfo, Options, OrbitError, Solver, WIDTH, event_driven, transient,
+};
 use crate::model::System;
 use crate::orbit::Orbit;
 
@@ -16,17 +18,20 @@ use crate::orbit::Orbit;
 /// ```
 /// use stickslip::law::Stribeck;
 /// use std::sync::Arc;
-/// use stickslip::method::{advised, event_driven::EventDriven, find};
+/// use stickslip::method::{solver_with_alternatives, event_driven::EventDriven, find};
 /// let mut model = stickslip::model::example::blade_couple();
 /// model.joints[0].law = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.01 });
 /// let system = model.assemble().unwrap();
-/// let error = advised(&EventDriven, &system).err().unwrap();
-/// let ways = error.ways().unwrap();
-/// assert_eq!(ways.methods, ["transient", "shooting", "harmonic-balance"]);
+/// let error = solver_with_alternatives(&EventDriven, &system).err().unwrap();
+/// let alternatives = error.alternatives().unwrap();
+/// assert_eq!(alternatives.methods, ["transient", "shooting", "harmonic-balance"]);
 /// assert!((find("shooting").unwrap().build)(&Default::default()).unwrap().solver(&system).is_ok());
 /// ```
-pub fn advised<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-    let solver = method.solver(system).map_err(|error| error.with(ways(system)))?;
+pub fn solver_with_alternatives<'a>(
+    method: &dyn Method,
+    system: &'a System,
+) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+    let solver = method.solver(system).map_err(|error| error.with_alternatives(alternatives(system)))?;
     Ok(Box::new(WithAlternatives { solver, system }))
 }
 
@@ -35,13 +40,13 @@ pub fn advised<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn So
 const ANY_WIDTH: f64 = 1e-3;
 
 /// Returns the methods of the list that take a system.
-pub fn ways(system: &System) -> Ways {
+pub fn alternatives(system: &System) -> Alternatives {
     alternatives_among(system, |_| true)
 }
 
 /// Tests the methods with names that `asked` accepts.
-fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
-    let mut ways = Ways::default();
+fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Alternatives {
+    let mut alternatives = Alternatives::default();
     for row in LIST.iter().filter(|row| asked(row.name)) {
         let plain = Options::new();
         let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
@@ -49,21 +54,21 @@ fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Ways {
         // the refusal of smoothed laws names the real obstacle
         let last = if smooths { &smoothed } else { &plain };
         match (refusal(row, &plain, system), refusal(row, last, system)) {
-            (None, _) => ways.methods.push(row.name),
-            (Some(_), None) => ways.with_width.push(row.name),
+            (None, _) => alternatives.methods.push(row.name),
+            (Some(_), None) => alternatives.with_width.push(row.name),
             (Some(_), Some(refusal)) => {
                 let said = refusal.strip_prefix(row.name).map(|rest| rest.trim_start().to_owned()).unwrap_or(refusal);
-                match ways.missing.iter_mut().find(|(_, known)| *known == said) {
+                match alternatives.reasons.iter_mut().find(|(_, known)| *known == said) {
                     Some((methods, _)) => methods.push(row.name),
-                    None => ways.missing.push((vec![row.name], said)),
+                    None => alternatives.reasons.push((vec![row.name], said)),
                 }
             }
         }
     }
-    if ways.any() {
-        ways.missing.clear();
+    if alternatives.any() {
+        alternatives.reasons.clear();
     }
-    ways
+    alternatives
 }
 
 /// A solver whose errors name other methods that take the system and may find the orbit.
@@ -76,14 +81,14 @@ impl Solver for WithAlternatives<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.solver.orbit(omega, start).map_err(|error| with_alternatives(error, self.system))
     }
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.solver.between(omega, start).map_err(|error| with_alternatives(error, self.system))
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.solver.orbit_without_estimate(omega, start).map_err(|error| with_alternatives(error, self.system))
     }
-    fn effort(&self) -> f64 {
-        self.solver.effort()
+    fn work_fraction(&self) -> f64 {
+        self.solver.work_fraction()
     }
-    fn begin_at(&mut self, omega: f64, start: &[f64]) {
-        self.solver.begin_at(omega, start);
+    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
+        self.solver.begin_branch(omega, start);
     }
 }
 
@@ -97,8 +102,8 @@ fn with_alternatives(mut error: OrbitError, system: &System) -> OrbitError {
         return error;
     }
     let words = |asked: &dyn Fn(&str) -> bool| {
-        let ways = alternatives_among(system, asked);
-        if ways.any() { format!(", or {ways}") } else { String::new() }
+        let alternatives = alternatives_among(system, asked);
+        if alternatives.any() { format!(", or {alternatives}") } else { String::new() }
     };
     match &mut error {
         // `transient` is the last resort; the method that failed is not named again
@@ -119,7 +124,7 @@ fn with_alternatives(mut error: OrbitError, system: &System) -> OrbitError {
 /// Returns the reason for which a method refuses a system, or `None` if it accepts the system.
 fn refusal(row: &MethodInfo, options: &Options, system: &System) -> Option<String> {
     let solver = (row.build)(options).and_then(|method| method.solver(system).map(drop));
-    solver.err().map(|error| error.alone().to_string())
+    solver.err().map(|error| error.without_alternatives().to_string())
 }
 
 #[cfg(test)]
@@ -142,7 +147,10 @@ mod tests {
             model.joints[0].law = law;
             let system = model.assemble().unwrap();
             let method = HarmonicBalance { tolerance: Some(1e-11), ..HarmonicBalance::default() };
-            let error = advised(&method, &system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap_err();
+            let error = solver_with_alternatives(&method, &system)
+                .unwrap()
+                .orbit(std::f64::consts::TAU * 121.0, None)
+                .unwrap_err();
             let said = error.to_string();
             assert!(matches!(error, OrbitError::Truncation { .. }), "{said}");
             assert!(said.contains(named) && !said.contains(unnamed), "{said}");

@@ -21,7 +21,7 @@ const RIGID_SLIDER_COST: f64 = 50.0;
 
 /// Cost factor of an orbit without a warm start. Measured in the same rings of `coulomb`: 57
 /// ms, 0.34 s and 4.8 s; 36 sectors of two masses 1.8 s, 100 of one 6 to 17 s.
-pub const ALONE: f64 = 3.0;
+pub const COLD_START_FACTOR: f64 = 3.0;
 
 /// Returns the number of multiplications for an orbit with a warm start; `None` if a law does
 /// not consist of sliders and stops.

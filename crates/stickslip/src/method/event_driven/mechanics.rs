@@ -275,7 +275,7 @@ fn light_place_error(system: &System, parts: &[JointPart], method: &'static str)
         (several && ratio > MAX_MASS_RATIO).then(|| {
             let place = system.structure().places()[lightest].clone();
             let joint = system.joints()[part.joint].name().to_owned();
-            Refusal::Light { method, place, joint, ratio, least: MAX_MASS_RATIO.recip() }.into()
+            Refusal::NegligibleMass { method, place, joint, ratio, least: MAX_MASS_RATIO.recip() }.into()
         })
     })
 }

@@ -22,7 +22,7 @@ mod segments;
 mod tolerances;
 mod transition;
 
-pub use cost_model::{ALONE, orbit_work};
+pub use cost_model::{COLD_START_FACTOR, orbit_work};
 use mechanics::PartKind;
 pub(crate) use mechanics::{Mechanics, supports};
 pub(crate) use postprocess::ExactPath;
@@ -52,7 +52,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     options: &[PERIOD],
     build: |options| match periods(NAME, options)? {
         1 => Ok(Box::new(EventDriven)),
-        period => Ok(Box::new(Subharmonic { period })),
+        period => Ok(Box::new(SubharmonicEventDriven { period })),
     },
 };
 
@@ -90,12 +90,12 @@ impl Method for EventDriven {
 
 /// The exact method for orbits that repeat after several periods of the excitation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Subharmonic {
+pub struct SubharmonicEventDriven {
     /// Number of periods of the excitation after which the orbit repeats.
     pub period: usize,
 }
 
-impl Method for Subharmonic {
+impl Method for SubharmonicEventDriven {
     fn name(&self) -> &'static str {
         NAME
     }

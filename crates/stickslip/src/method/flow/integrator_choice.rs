@@ -95,7 +95,7 @@ mod tests {
     };
     use crate::method::harmonic_balance::{self, HarmonicBalance};
     use crate::method::shooting::Shooting;
-    use crate::method::{Method, OrbitError, advised, event_driven, transient::Transient};
+    use crate::method::{Method, OrbitError, event_driven, solver_with_alternatives, transient::Transient};
     use crate::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring};
     use crate::orbit::{Orbit, Symmetry};
     use crate::structure::Structure;
@@ -496,7 +496,7 @@ mod tests {
         let orbit = shoot(&beside, 1.3);
         near(orbit.places[0].amplitude(), alone.places[0].amplitude(), 1e-12);
         assert_eq!((orbit.joints[0].dissipation, orbit.joints[0].slip_fraction), (0.0, 1.0));
-        let refused = advised(&Shooting::default(), &system).map(|_| ()).unwrap_err().to_string();
+        let refused = solver_with_alternatives(&Shooting::default(), &system).map(|_| ()).unwrap_err().to_string();
         assert!(refused.contains("`coulomb` of joint `j0`") && refused.contains("width"), "{refused}");
         let smoothed = Shooting { width: Some(1e-3), ..Shooting::default() };
         assert!(smoothed.solver(&system).is_ok());
@@ -573,7 +573,7 @@ mod tests {
     fn a_neighbour_does_not_keep_a_search_on_an_unstable_orbit() {
         let system = stopped(4.0);
         let shooting = Shooting { period: 2, ..Shooting::default() };
-        let exact = event_driven::Subharmonic { period: 2 };
+        let exact = event_driven::SubharmonicEventDriven { period: 2 };
         let series = harmonic_balance::Subharmonic { balance: HarmonicBalance::default(), period: 2 };
         let mut amplitudes = Vec::new();
         for method in [&shooting as &dyn Method, &exact, &series] {

@@ -59,7 +59,7 @@ pub fn doubling_work(system: &System, longest: f64) -> f64 {
 
 /// Returns the work limit, in multiplications, of a point with rigid friction if the method
 /// chooses the harmonics.
-pub fn most_work(system: &System) -> f64 {
+pub fn point_work_limit(system: &System) -> f64 {
     POINT_LIMIT.multiplications * SEARCH_MULTIPLICATIONS.max(LEAST_ELIMINATIONS * step_work(system, FIRST_HARMONICS))
 }
 

@@ -19,7 +19,8 @@
 //! - `warm_start`: the last orbits, for warm starts and the secant predictor;
 //! - `subharmonic`: orbits of several periods of the excitation;
 //! - `static_equilibrium`: the equilibrium under the constant loads, by harmonic 0 alone;
-//! - `budget`, `cost_model`, `memory_estimate`: work limits, operation counts, estimates of memory.
+//! - `budget`, `cost_model`, `memory_estimate`: work limits, operation counts, estimates of
+//!   memory.
 //!
 //! The equations and their solution:
 //! - `equations/`: residual and Jacobian along the joints, set of harmonics, scaling;
@@ -57,7 +58,7 @@ use super::options::{PERIOD, periods};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver};
 use crate::dimension::Dimension;
 use crate::model::System;
-pub use cost_model::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
+pub use cost_model::{doubling_work, factor_bytes, orbit_work, point_work_limit, step_work};
 pub(crate) use modes::branch_equations::BranchEquations;
 pub(crate) use modes::mode_continuation::{ModeArc, ModeStep};
 pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState};

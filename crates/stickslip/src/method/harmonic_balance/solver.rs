@@ -76,7 +76,7 @@ pub(super) struct HarmonicBalanceSolver {
     /// The last orbits, newest first.
     pub(super) recent: VecDeque<RecentOrbit>,
     /// Frequency (rad/s) and state from which the next searches continue, see
-    /// [`Solver::begin_at`].
+    /// [`Solver::begin_branch`].
     pub(super) branch_start: Option<(f64, Vec<f64>)>,
     /// Frequencies (rad/s) without an orbit at which the motion was integrated in time, and how
     /// that motion behaved and ended.
@@ -437,7 +437,7 @@ impl HarmonicBalanceSolver {
     /// `start` needs.
     ///
     /// This is the orbit with that start. Otherwise, if `start` is the announced state of
-    /// [`Solver::begin_at`], it is the orbit at the nearest frequency, provided that it is
+    /// [`Solver::begin_branch`], it is the orbit at the nearest frequency, provided that it is
     /// nearer than that state.
     fn recent_for_length(&self, start: &[f64], omega: f64) -> Option<usize> {
         let distance = |at: &usize| (self.recent[*at].omega - omega).abs();
@@ -488,7 +488,7 @@ impl Solver for HarmonicBalanceSolver {
         self.end_point(found)
     }
 
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         let at = omega / self.periods as f64;
         let known =
             start.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.recent_for_length(start, at));
@@ -504,11 +504,11 @@ impl Solver for HarmonicBalanceSolver {
         }
     }
 
-    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
         self.branch_start = Some((omega / self.periods as f64, start.to_vec()));
     }
 
-    fn effort(&self) -> f64 {
+    fn work_fraction(&self) -> f64 {
         let WorkShare { multiplications: eliminated, time_steps: marched } = self.work_used(None);
         (eliminated / POINT_LIMIT.multiplications).max(marched / POINT_LIMIT.time_steps)
     }
@@ -547,8 +547,8 @@ mod tests {
             let start = starts.last().map(Vec::as_slice);
             starts.push(solver.orbit(rate(12.0 + 0.35 * f64::from(i)), start).unwrap().initial_state);
         }
-        solver.begin_at(rate(15.85), &starts[11]);
-        let between = solver.between(rate(15.7276), Some(&starts[11])).unwrap();
+        solver.begin_branch(rate(15.85), &starts[11]);
+        let between = solver.orbit_without_estimate(rate(15.7276), Some(&starts[11])).unwrap();
         let exact = EventDriven.solver(&system).unwrap().orbit(rate(15.7276), None).unwrap();
         let error = (between.places[0].amplitude() / exact.places[0].amplitude() - 1.0).abs();
         assert!(error < 1e-3, "{error:.1e} with {:?} harmonics", between.evidence.harmonics);
@@ -570,9 +570,9 @@ mod tests {
         let less = vain(&mut balance, usize::MAX / 2);
         assert_eq!(less, POINT_LIMIT.times(budget::REDUCED_SHARE));
         assert_eq!(balance.discretization(7, omega).unwrap().work_limit, less);
-        assert!(balance.effort() > 1.0);
+        assert!(balance.work_fraction() > 1.0);
         balance.orbit(omega, None).unwrap();
         assert_eq!(balance.work_limit(), POINT_LIMIT);
-        assert!(balance.effort() > 0.0 && balance.effort() < 1e-3, "{}", balance.effort());
+        assert!(balance.work_fraction() > 0.0 && balance.work_fraction() < 1e-3, "{}", balance.work_fraction());
     }
 }

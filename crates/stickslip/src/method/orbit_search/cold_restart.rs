@@ -24,11 +24,11 @@ impl<S: Solver> Solver for ColdRestart<S> {
         Ok(self.0.orbit(omega, None).ok().filter(better).unwrap_or(near))
     }
 
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.0.between(omega, start)
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.0.orbit_without_estimate(omega, start)
     }
 
-    fn effort(&self) -> f64 {
-        self.0.effort()
+    fn work_fraction(&self) -> f64 {
+        self.0.work_fraction()
     }
 }

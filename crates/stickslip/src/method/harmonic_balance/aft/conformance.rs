@@ -10,7 +10,7 @@ use crate::method::harmonic_balance::HarmonicBalance;
 use crate::method::harmonic_balance::dynamics::banded::BandedForm;
 use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
 use crate::method::shooting::Shooting;
-use crate::method::{Method, advised};
+use crate::method::{Method, solver_with_alternatives};
 use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 use crate::orbit::Orbit;
 use crate::structure::Structure;
@@ -157,7 +157,7 @@ fn refusals_name_law_and_alternative() {
         let structure = Structure::new(places, one.clone(), one.clone(), one).unwrap();
         let axes = (0..d).map(|i| Axis::new(vec![(i, 1.0)])).collect();
         let system = System::builder(structure).joint("rub", law.clone(), axes).build().unwrap();
-        let error = advised(&HarmonicBalance::default(), &system).err().expect("refused").to_string();
+        let error = solver_with_alternatives(&HarmonicBalance::default(), &system).err().expect("refused").to_string();
         for part in ["harmonic-balance", "rub", law.name(), words] {
             assert!(error.contains(part), "{error}");
         }

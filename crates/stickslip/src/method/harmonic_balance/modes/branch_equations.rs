@@ -12,7 +12,7 @@ use crate::method::harmonic_balance::postprocess;
 use crate::method::harmonic_balance::solver::MOST_ELIMINATED_UNKNOWNS;
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
-use crate::method::{MethodError, OrbitError, ways};
+use crate::method::{MethodError, OrbitError, alternatives};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
@@ -69,7 +69,8 @@ impl<'a> BranchEquations<'a> {
         let harmonic_set = HarmonicSet::new(&system, |_| true);
         method.check(harmonic_set.highest)?;
         let top = method.harmonics.unwrap_or((HARMONICS * harmonic_set.unit).max(harmonic_set.highest));
-        let (ports, around) = Ports::for_sector(&system).map_err(|error| error.with(ways(&system)))?;
+        let (ports, around) =
+            Ports::for_sector(&system).map_err(|error| error.with_alternatives(alternatives(&system)))?;
         let dynamics = LinearDynamics::new(&system, &ports);
         let method = HarmonicBalance { harmonics: Some(top), ..method };
         let discretization = |top: usize| {
