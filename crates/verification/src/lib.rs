@@ -4,10 +4,10 @@
 //! The library part holds code that several tests share: random models, changed templates, and
 //! small numerics (search, quadrature). It does not use the numerics of the other crates.
 
-pub mod held;
+pub mod law_driver;
 pub mod loose_dampers;
-pub mod reference;
-pub mod replay;
+pub mod newmark_reference;
+pub mod single_mass;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;

@@ -1,7 +1,7 @@
 //! Random systems with random laws in every method that takes them: small systems with full
 //! matrices, and long rows and rings.
 //!
-//! Each orbit is compared with small steps in time ([`stickslip_verification::reference`]),
+//! Each orbit is compared with small steps in time ([`stickslip_verification::newmark_reference`]),
 //! which share no code with any method. Environment variables extend the audit:
 //!
 //! - `STICKSLIP_AUDIT_MODELS=1000`: number of small systems;
@@ -19,7 +19,7 @@ use std::time::Instant;
 use stickslip::method::TABLE as METHODS;
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
-use stickslip_verification::reference::Reference;
+use stickslip_verification::newmark_reference::Reference;
 use stickslip_verification::{random_row, random_system, random_system_of_any_parameters};
 
 /// Default numbers of models.

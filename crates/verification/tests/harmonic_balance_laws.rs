@@ -8,8 +8,8 @@ use stickslip::law::{SharedLaw, TABLE};
 use stickslip::method::{Method, MethodError, Refusal, harmonic_balance::HarmonicBalance, solver_with_alternatives};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
-use stickslip_verification::held::{FORCE, MASS, OMEGA, STIFFNESS, load, mass_on_law};
-use stickslip_verification::replay::{self, View};
+use stickslip_verification::law_driver::{self, View};
+use stickslip_verification::single_mass::{FORCE, MASS, OMEGA, STIFFNESS, load, mass_on_law};
 
 /// Viscous damping, N s/m.
 const DAMPING: f64 = 5.0;
@@ -39,9 +39,9 @@ fn answer(law: &SharedLaw, view: View, orbit: &Orbit, periods: usize) -> (Vec<[f
         (joint.displacement, joint.velocity)
     };
     let times: Vec<f64> = (0..=SAMPLES * periods).map(|i| period * i as f64 / SAMPLES as f64).collect();
-    let forces = replay::forces(&**law, view, &motion, &times);
+    let forces = law_driver::forces(&**law, view, &motion, &times);
     let last = SAMPLES * (periods - 1);
-    let loss = replay::dissipated(&motion, &times[last..], &forces[last..]);
+    let loss = law_driver::dissipated(&motion, &times[last..], &forces[last..]);
     (forces[last..times.len() - 1].to_vec(), loss)
 }
 
@@ -84,7 +84,7 @@ fn every_law_balances_the_structure() {
         };
         taken += 1;
         let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {constant}: {error}", info.name));
-        let views = replay::views(&*law);
+        let views = law_driver::views(&*law);
         // the resolvent of a rigid law leaves the force at rest free, and a series never quite
         // rests: prefer any other view
         let view = *views.iter().find(|view| **view != View::Prox).unwrap_or(&views[0]);

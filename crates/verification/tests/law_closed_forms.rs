@@ -8,7 +8,7 @@ use stickslip::law::{
     BoucWen, Cubic, Dahl, FrictionContact, Gap, IdealElement, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Stribeck,
     Valanis,
 };
-use stickslip_verification::replay::{Instant, View, dissipated, forces, steps};
+use stickslip_verification::law_driver::{Instant, View, dissipated, forces, steps};
 use stickslip_verification::{close, integral, near, zero};
 
 /// Returns a motion through points, straight and at constant speed, one second from point to

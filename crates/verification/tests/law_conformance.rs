@@ -15,7 +15,7 @@ use stickslip::law::{
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
 use stickslip::model::{GROUND, Joint, Mass, Model, Motion, Spring};
-use stickslip_verification::replay::{Instant, View, dissipated, forces, random_motion, steps, views};
+use stickslip_verification::law_driver::{Instant, View, dissipated, forces, random_motion, steps, views};
 use stickslip_verification::{Random, exact, near};
 
 /// Samples of a period, fine enough for the smooth laws. Their steepest slope spans a

@@ -11,8 +11,8 @@ use stickslip::method::{self, Method, MethodError, Options, Refusal, auto::Auto,
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
-use stickslip_verification::held::{OMEGA, mass_on_law};
-use stickslip_verification::reference::Reference;
+use stickslip_verification::newmark_reference::Reference;
+use stickslip_verification::single_mass::{OMEGA, mass_on_law};
 
 /// Damping for a ratio of 0.1: a transient falls to 1e-8 in 30 periods.
 const DAMPING: f64 = 28.0;

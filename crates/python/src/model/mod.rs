@@ -460,10 +460,12 @@ impl PyModel {
     /// >>> sector = stickslip.Model()
     /// >>> sector.mass("blade", "300 g")
     /// >>> sector.spring("blade", "ground", stiffness="150 N/mm", damping="0.3 kg/s")
-    /// >>> sector.joint("shroud", "blade", "next.blade", stickslip.law("jenkins", stiffness="10
-    /// N/mm", limit="3 N")) >>> sector.force("blade", "1 N", engine_order=4) >>> ring =
-    /// sector.disk(24) >>> orbit = ring.orbit("115 Hz") >>> abs(orbit.amplitude["blade_7"] /
-    /// orbit.amplitude["blade_0"] - 1) < 1e-9 True
+    /// >>> sector.joint("shroud", "blade", "next.blade", stickslip.law("jenkins", stiffness="10 N/mm", limit="3 N"))
+    /// >>> sector.force("blade", "1 N", engine_order=4)
+    /// >>> ring = sector.disk(24)
+    /// >>> orbit = ring.orbit("115 Hz")
+    /// >>> abs(orbit.amplitude["blade_7"] / orbit.amplitude["blade_0"] - 1) < 1e-9
+    /// True
     #[pyo3(signature = (sectors, *, mistuning=None))]
     fn disk(&self, py: Python<'_>, sectors: usize, mistuning: Option<&Bound<'_, PyAny>>) -> PyResult<PyModel> {
         let mistuning = mistuning.map(|given| quantity::dictionary(given, "`mistuning`")).transpose()?;

@@ -9,7 +9,7 @@
 //! - sliders by trial force and clamp; a rigid slider gets a spring that is stiffer than the
 //!   steps resolve.
 
-use crate::replay::{self, NODES};
+use crate::law_driver::{self, NODES};
 use nalgebra::DVector;
 use stickslip::law::{IdealElement, MAX_DIRECTIONS, RelativeMotion, SharedLaw, Slider};
 use stickslip::model::{Axis, System};
@@ -261,7 +261,7 @@ impl Contact {
                 let way = |a: usize| c * h * (self.v[a] + 0.5 * c * (v[a] - self.v[a]));
                 RelativeMotion { displacement: std::array::from_fn(|a| self.u[a] + way(a)), velocity }
             });
-            z = replay::radau_step(rate, self.axes.len(), h, &motion, &self.z);
+            z = law_driver::radau_step(rate, self.axes.len(), h, &motion, &self.z);
             let force =
                 rate.evaluate_values(&RelativeMotion { displacement: u, velocity: v }, &z, &mut vec![0.0; z.len()]);
             return (force, z, moving);

@@ -16,7 +16,7 @@ use stickslip::method::{IntegrationError, Method, MethodError, OrbitError, Solve
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
 use stickslip_numerics::dual::Real;
-use stickslip_verification::reference::Reference;
+use stickslip_verification::newmark_reference::Reference;
 
 /// Two rubbing surfaces side by side that creep towards their limits after different ways: a rate law with two states.
 #[derive(Debug)]
@@ -463,7 +463,7 @@ fn the_book_shows_the_code_of_this_file() {
     assert_eq!(blocks.len(), 3);
     for block in blocks {
         for part in block.split("\n\nimpl ") {
-            assert!(include_str!("outside.rs").contains(part), "not in this file:\n{part}");
+            assert!(include_str!("external_laws.rs").contains(part), "not in this file:\n{part}");
         }
     }
 }
