@@ -8,7 +8,7 @@
 use super::event_driven::GAP_PER_DISTANCE;
 use super::flow::Flow;
 use super::flow::assembly::{Assembly, NEAR_REST};
-use super::flow::average_acceleration::flow::{AverageAccelerationFlow, INITIAL_STEPS, MAX_STEPS, estimate};
+use super::flow::average_acceleration::equal_steps::{AverageAccelerationFlow, INITIAL_STEPS, MAX_STEPS, estimate};
 use super::flow::integrator_choice::IntegratorKind;
 use super::flow::radau::step_size_control::{RadauFlow, StepSizes};
 use super::flow::set_valued::located_switches::SetValuedFlow;

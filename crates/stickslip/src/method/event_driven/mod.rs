@@ -8,6 +8,7 @@
 //! - `segments`: segments joined at the switches, with exact sensitivities
 //! - `postprocess`: results of an orbit from its segments
 //! - `cost_model`: cost estimate of an orbit
+//! - `tolerances`: tolerances that several files use
 //!
 //! Newton's method on the return map finds the periodic orbit. If the excitation has only odd
 //! harmonics, the solver uses the half period `x(t + T/2) = -x(t)`. This halves the work, and

@@ -11,7 +11,7 @@
 
 use super::Flow;
 use super::assembly::carries_nothing;
-use super::average_acceleration::flow::AverageAccelerationFlow;
+use super::average_acceleration::equal_steps::AverageAccelerationFlow;
 use super::event_flow::ExactFlow;
 use super::radau::step_size_control::RadauFlow;
 use super::set_valued;

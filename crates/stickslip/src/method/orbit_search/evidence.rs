@@ -14,7 +14,7 @@ use super::return_map::{newton_step, norm};
 use super::vibration_share;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::NEAR_REST;
-use crate::method::flow::average_acceleration::flow::AverageAccelerationFlow;
+use crate::method::flow::average_acceleration::equal_steps::AverageAccelerationFlow;
 use crate::method::flow::integrator_choice::{self, IntegratorKind};
 use crate::model::{CyclicSymmetry, System};
 use crate::orbit::{Path, Symmetry};

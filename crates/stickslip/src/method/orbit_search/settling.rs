@@ -5,7 +5,7 @@
 
 use crate::law::Contact;
 use crate::method::flow::Flow;
-use crate::method::flow::average_acceleration::flow::AverageAccelerationFlow;
+use crate::method::flow::average_acceleration::equal_steps::AverageAccelerationFlow;
 use crate::method::flow::integrator_choice::IntegratorKind;
 use crate::model::{Axis, System};
 use crate::orbit::{ObservedMotion, Path, Sample, Symmetry};

@@ -259,7 +259,7 @@ fn relative(
 
 #[cfg(test)]
 mod tests {
-    use super::super::flow::AverageAccelerationFlow;
+    use super::super::equal_steps::AverageAccelerationFlow;
     use super::super::sensitivity::Sensitivity;
     use super::*;
     use crate::law::{Cubic, Jenkins2d, SharedLaw};

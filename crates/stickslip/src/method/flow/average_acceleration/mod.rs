@@ -5,12 +5,12 @@
 //! - `acceleration_step`: one step of average acceleration (Newmark 1959, β = ¼, γ = ½), with the
 //!   structure eliminated onto the joints' axes
 //! - `sensitivity`: sensitivities of a run
-//! - `flow`: the number of equal steps according to the estimated error
+//! - `equal_steps`: the number of equal steps according to the estimated error
 //!
 //! The steps are of second order, also across kinks of the force, and conserve the energy of
 //! the structure. Richardson extrapolation with halved steps estimates their error.
 
 mod acceleration_step;
-pub(crate) mod flow;
+pub(crate) mod equal_steps;
 pub(crate) mod law_step;
 mod sensitivity;
