@@ -5,6 +5,22 @@
 //!
 //! [`Method::solver`] makes a [`Solver`] for one system. The solver keeps data that it can
 //! reuse from orbit to orbit.
+//!
+//! The methods:
+//! - `event_driven/`: closed-form motion between switches
+//! - `shooting`: Newton's method on the return map of a time integration
+//! - `harmonic_balance/`: Fourier series of the joint motions
+//! - `transient`: integration until the transient has decayed
+//! - `auto`: picks one of them
+//!
+//! What they share:
+//! - `flow/`: time integrations
+//! - `orbit_search/`: initial guess, return map, evidence
+//! - `static_equilibrium`: the equilibrium under the constant loads
+//! - `alternatives`, `with_alternatives`: methods that take a system instead of one that does not
+//! - `traits`, `options`, `error`, `list`: the interface of a method
+//!
+//! `time_history` integrates a motion from given displacements, without an orbit.
 
 mod alternatives;
 pub mod auto;

@@ -10,6 +10,24 @@
 //!
 //! Both kinds return the exact derivative by all unknowns of the port. The equations use nothing
 //! else of a law. Joints with proportional motions may share one force port, see [`grouping`].
+//!
+//! From harmonics to time and back:
+//! - `frequency_time`: signals of a port over a period, and helpers of all kernels
+//! - `series`: a motion at any phase: value, derivatives, zeros, range
+//! - `events`: turning points, and intervals in which a slider's force is linear
+//!
+//! The kernels:
+//! - `sliders`: sliders behind springs, and stops, exact for the series
+//! - `masing`: laws that obey Masing's rules, exact for the series
+//! - `rate`, `step`: laws in rate form and in step form
+//! - `periodic_state`: states of laws with memory that repeat after a period
+//! - `prox`: laws of velocity by their resolvent
+//! - `interior_point`: interior-point form of rigid friction
+//!
+//! Others:
+//! - `grouping`: from joints to ports
+//! - `workspace`: scratch memory of laws with memory
+//! - `conformance`: tests of every kind of port
 
 #[cfg(test)]
 mod conformance;

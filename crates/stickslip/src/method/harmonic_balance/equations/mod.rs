@@ -22,6 +22,14 @@
 //!
 //! Source: Nacivet, Pierre, Thouverez, Jezequel (2003), "A dynamic Lagrangian
 //! frequency-time method".
+//!
+//! - `excitation`: the equations at one frequency, and the initial guess
+//! - `harmonic_set`: the harmonics in the series of a motion
+//! - `scaling`: units of motions and residuals
+//! - `scaled_unknowns`: the equations as a function of unknowns of order one
+//! - `coarse_sampling`: fewer samples for derivatives of many contacts
+//! - `contact_parameter`: the parameter ε of a rigid contact
+//! - `regularization`: terms for equations that the model leaves singular
 
 mod coarse_sampling;
 pub(super) mod contact_parameter;

@@ -13,6 +13,9 @@
 //!
 //! Source: Krack (2015), "Nonlinear modal analysis of nonconservative systems: extension of the
 //! periodic motion concept".
+//!
+//! - `linear_modes`: linear modes, where nonlinear modes begin
+//! - `mode_results`: results of a point: shape, modal assurance, damping by dampers
 
 mod linear_modes;
 mod mode_results;
