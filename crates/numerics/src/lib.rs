@@ -12,6 +12,7 @@ pub mod fourier;
 pub mod gmres;
 pub mod golden_section;
 pub mod interrupt;
+pub mod min_norm;
 mod null_space;
 pub mod quadratic_modes;
 pub mod quadrature;

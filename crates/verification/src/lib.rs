@@ -4,10 +4,10 @@
 //! The library part holds code that several tests share: random models, changed templates, and
 //! small numerics (search, quadrature). It does not use the numerics of the other crates.
 
-pub mod held;
+pub mod law_driver;
 pub mod loose_dampers;
-pub mod reference;
-pub mod replay;
+pub mod newmark_reference;
+pub mod single_mass;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -113,7 +113,7 @@ pub fn random_system(seed: u64) -> (System, f64) {
 }
 
 /// Returns such a system with law parameters from their whole ranges.
-pub fn random_system_of_any(seed: u64) -> (System, f64) {
+pub fn random_system_of_any_parameters(seed: u64) -> (System, f64) {
     system_with(seed, &|random| any_law(random, TABLE))
 }
 

@@ -28,7 +28,7 @@ const WINDOW: usize = 40;
 
 /// Settings of the integration.
 #[derive(Debug, Clone, Copy)]
-pub struct Course {
+pub struct Settings {
     /// Steps per period.
     pub steps: usize,
     /// Periods over which the excitation grows from zero.
@@ -272,7 +272,7 @@ impl LooseDamper {
                 }
                 matrix[i][4] = r[i];
             }
-            let change = eliminated(matrix)?;
+            let change = solve_4x4(matrix)?;
             let mut share = 1.0;
             loop {
                 let tried: [f64; 4] = std::array::from_fn(|i| u[i] - share * change[i]);
@@ -309,7 +309,7 @@ impl LooseDamper {
 
     /// Returns displacements and friction forces in static equilibrium. The constant load grows
     /// slowly, and every motion is critically damped.
-    fn pressed(&self) -> Option<(DVector<f64>, [f64; 2])> {
+    fn static_equilibrium(&self) -> Option<(DVector<f64>, [f64; 2])> {
         let n = self.load.len();
         let [m, _, k] = &self.matrices;
         let held = self.stuck_stiffness();
@@ -323,7 +323,8 @@ impl LooseDamper {
         Some((motion.x, motion.friction))
     }
 
-    /// Returns the amplitudes of the linear motion on two contacts that stick for the whole period.
+    /// Returns the amplitudes of the linear motion on two contacts that stick for the whole
+    /// period.
     ///
     /// Returns `None` if no constant friction force keeps both contacts within their slip limits
     /// at every instant.
@@ -332,7 +333,7 @@ impl LooseDamper {
         let dynamic = (self.stuck_stiffness() - m * (omega * omega)).map(|re| Complex64::new(re, 0.0))
             + c.map(|im| Complex64::new(0.0, omega * im));
         let x = dynamic.lu().solve(&self.excitation)?;
-        let (still, _) = self.pressed()?;
+        let (still, _) = self.static_equilibrium()?;
         let sticks = self.faces.iter().zip(self.along(&still)).all(|(face, [_, depth])| {
             let force = |axis: usize| face[axis].map(|w| Complex64::new(w, 0.0)).dot(&x) * self.stiffness[axis];
             let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -352,11 +353,11 @@ impl LooseDamper {
     /// static equilibrium.
     ///
     /// The excitation grows slowly. Returns `None` if the motion does not settle.
-    pub fn settled(&self, omega: f64, course: Course) -> Option<Vec<f64>> {
-        let Course { steps, growth, periods, settled } = course;
+    pub fn settled(&self, omega: f64, course: Settings) -> Option<Vec<f64>> {
+        let Settings { steps, growth, periods, settled } = course;
         let n = self.load.len();
         let mut motion = Motion::new(self, &self.matrices[1], TAU / (omega * steps as f64))?;
-        (motion.x, motion.friction) = self.pressed()?;
+        (motion.x, motion.friction) = self.static_equilibrium()?;
         let mut before: Option<Vec<(f64, f64)>> = None;
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); n];
         for count in 0..periods {
@@ -447,7 +448,7 @@ fn flat([one, two]: [[f64; 2]; 2]) -> [f64; 4] {
 }
 
 /// Solves four equations with the right-hand side in the last column.
-fn eliminated(mut matrix: [[f64; 5]; 4]) -> Option<[f64; 4]> {
+fn solve_4x4(mut matrix: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for i in 0..4 {
         let pivot = (i..4).max_by(|a, b| matrix[*a][i].abs().total_cmp(&matrix[*b][i].abs()))?;
         matrix.swap(i, pivot);

@@ -12,7 +12,7 @@ use stickslip::method::transient::Transient;
 use stickslip::model::{Disk, SectorDistribution, normal_deviations};
 use stickslip::{Force, GROUND, Joint, Mass, Method, Model, Orbit, Spring};
 use stickslip_verification::close;
-use stickslip_verification::reference::Reference;
+use stickslip_verification::newmark_reference::Reference;
 
 fn between(a: &str, b: &str) -> [String; 2] {
     [a.to_owned(), b.to_owned()]

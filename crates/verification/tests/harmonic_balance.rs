@@ -324,7 +324,7 @@ fn distance(one: &Orbit, other: &Orbit) -> f64 {
 
 /// Compares the reported with the true error on 200 random models. It is within a factor of 3
 /// in 95 of 100, and always above a tenth.
-fn judge_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
+fn check_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
     let mut dice = Dice(seed);
     let (mut judged, mut within) = (0, 0);
     for case in 0..200 {
@@ -353,25 +353,25 @@ fn judge_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
 /// Three joints, a given number of harmonics.
 #[test]
 fn the_error_estimate_is_honest() {
-    judge_estimates(HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() }, 1, 20);
+    check_estimates(HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() }, 1, 20);
 }
 
 /// Three joints with two laws each.
 #[test]
 fn the_error_estimate_is_honest_with_two_laws_per_joint() {
-    judge_estimates(HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() }, 2, 21);
+    check_estimates(HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() }, 2, 21);
 }
 
 /// The automatic choice: the search ends where the estimate is low, and the estimate must still
 /// be reliable.
 #[test]
 fn the_error_estimate_of_the_automatic_choice_is_honest() {
-    judge_estimates(HarmonicBalance { tolerance: Some(3e-3), ..HarmonicBalance::default() }, 1, 22);
+    check_estimates(HarmonicBalance { tolerance: Some(3e-3), ..HarmonicBalance::default() }, 1, 22);
 }
 
 /// The Floquet multipliers agree with those of the exact method.
 #[test]
-fn stability_by_the_same_judge() {
+fn multipliers_agree_with_the_exact_method() {
     let couple = templates::find("blade-couple-massless").unwrap();
     let system = couple.model_with(&[("Ft", 2.0)]).unwrap().assemble().unwrap();
     for hertz in [120.0, 121.0, 121.25, 122.0] {
@@ -450,7 +450,7 @@ fn smooth_laws_against_shooting() {
 /// Messages where harmonic balance cannot give an orbit: too few harmonics, too few samples, a
 /// tolerance out of reach, no motion.
 #[test]
-fn clear_words_instead_of_wrong_amplitudes() {
+fn messages_where_no_orbit_is_found() {
     let mut model = griffin(1.0, 0.0);
     model.forces.push(Force { on: "m".into(), amplitude: 0.1, phase: 0.0, harmonic: 5 });
     let system = model.assemble().unwrap();

@@ -51,7 +51,7 @@ fn agrees(model: &Model, omega: f64) {
 /// driven body through a spring. The amplitude is `F/|k + c - m ω² + i b ω|`. The test covers
 /// smooth and falling friction too.
 #[test]
-fn limits_that_nothing_reaches() {
+fn permanently_stuck_contacts_are_springs() {
     let (stiffness, coupling, omega) = (100.0, 40.0, 7.0);
     let expected = 1.0 / f64::hypot(stiffness + coupling - 2.0 * omega * omega, 0.3 * omega);
     for exponent in [3, 9, 15, 20, 100] {

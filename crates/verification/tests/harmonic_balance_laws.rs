@@ -5,11 +5,11 @@
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::law::{SharedLaw, TABLE};
-use stickslip::method::{Method, MethodError, Refusal, advised, harmonic_balance::HarmonicBalance};
+use stickslip::method::{Method, MethodError, Refusal, harmonic_balance::HarmonicBalance, solver_with_alternatives};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
-use stickslip_verification::held::{FORCE, MASS, OMEGA, STIFFNESS, held, load};
-use stickslip_verification::replay::{self, View};
+use stickslip_verification::law_driver::{self, View};
+use stickslip_verification::single_mass::{FORCE, MASS, OMEGA, STIFFNESS, load, mass_on_law};
 
 /// Viscous damping, N s/m.
 const DAMPING: f64 = 5.0;
@@ -39,9 +39,9 @@ fn answer(law: &SharedLaw, view: View, orbit: &Orbit, periods: usize) -> (Vec<[f
         (joint.displacement, joint.velocity)
     };
     let times: Vec<f64> = (0..=SAMPLES * periods).map(|i| period * i as f64 / SAMPLES as f64).collect();
-    let forces = replay::forces(&**law, view, &motion, &times);
+    let forces = law_driver::forces(&**law, view, &motion, &times);
     let last = SAMPLES * (periods - 1);
-    let loss = replay::lost(&motion, &times[last..], &forces[last..]);
+    let loss = law_driver::dissipated(&motion, &times[last..], &forces[last..]);
     (forces[last..times.len() - 1].to_vec(), loss)
 }
 
@@ -71,12 +71,12 @@ fn every_law_balances_the_structure() {
     let (mut taken, mut returned) = (0, 0);
     for (info, constant) in TABLE.iter().flat_map(|info| [(info, 0.0), (info, 1.5)]) {
         let law = (info.build)(info.sample);
-        let system = held(&law, DAMPING, constant);
+        let system = mass_on_law(&law, DAMPING, constant);
         let method = HarmonicBalance { harmonics: Some(31), ..HarmonicBalance::default() };
-        let mut solver = match advised(&method, &system) {
+        let mut solver = match solver_with_alternatives(&method, &system) {
             Ok(solver) => solver,
             // harmonic balance may refuse a law by name, with alternative methods
-            Err(MethodError { refusal: Refusal::Law { .. }, ways }) => {
+            Err(MethodError { refusal: Refusal::Law { .. }, alternatives: ways }) => {
                 assert!(ways.methods.contains(&"event-driven"), "{}: {ways}", info.name);
                 continue;
             }
@@ -84,7 +84,7 @@ fn every_law_balances_the_structure() {
         };
         taken += 1;
         let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {constant}: {error}", info.name));
-        let views = replay::views(&*law);
+        let views = law_driver::views(&*law);
         // the resolvent of a rigid law leaves the force at rest free, and a series never quite
         // rests: prefer any other view
         let view = *views.iter().find(|view| **view != View::Prox).unwrap_or(&views[0]);
@@ -114,7 +114,7 @@ fn every_law_has_small_and_large_orbits() {
     for (info, share) in TABLE.iter().flat_map(|info| [(info, 0.01), (info, 10.0)]) {
         let law = (info.build)(info.sample);
         let d = law.directions();
-        let mut builder = System::builder(held(&law, DAMPING, 0.0).structure().clone()).joint(
+        let mut builder = System::builder(mass_on_law(&law, DAMPING, 0.0).structure().clone()).joint(
             "j",
             law.clone(),
             (0..d).map(|a| Axis::new(vec![(a, 1.0)])).collect(),

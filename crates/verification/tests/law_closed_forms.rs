@@ -8,7 +8,7 @@ use stickslip::law::{
     BoucWen, Cubic, Dahl, FrictionContact, Gap, IdealElement, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Stribeck,
     Valanis,
 };
-use stickslip_verification::replay::{Instant, View, forces, lost, steps};
+use stickslip_verification::law_driver::{Instant, View, dissipated, forces, steps};
 use stickslip_verification::{close, integral, near, zero};
 
 /// Returns a motion through points, straight and at constant speed, one second from point to
@@ -42,7 +42,7 @@ fn loop_loss(law: &dyn Law, view: View, places: &[f64], samples: usize) -> f64 {
     let times = steps(1.0, places.len() - 1, samples);
     let found = forces(law, view, &along(places), &times);
     let from = times.len() - 1 - 2 * samples;
-    lost(&along(places), &times[from..], &found[from..])
+    dissipated(&along(places), &times[from..], &found[from..])
 }
 
 /// Returns the places from zero and then back and forth three times.
@@ -68,7 +68,7 @@ fn theory_11_1_jenkins_loops_have_the_area_and_the_harmonic_of_their_closed_form
         let places = [0.0, a, slip, -a, -slip, a];
         let times = steps(1.0, 5, 1);
         let found = forces(&law, View::Pieces, &along(&places), &times);
-        near("loss", lost(&along(&places), &times[1..], &found[1..]), loss, 1e-12);
+        near("loss", dissipated(&along(&places), &times[1..], &found[1..]), loss, 1e-12);
         let linear = law.describing_function(a, 3.0);
         near("stiffness", linear.re, keq, 5e-7);
         near("damping", linear.im, ceq, 5e-7);
@@ -89,7 +89,7 @@ fn theory_11_2_circular_motion_slips_all_the_time() {
     let found = forces(&law, View::Step, &motion, &times);
     let (last, from) = (&times[4 * COUNT..], &found[4 * COUNT..]);
     let d = limit / stiffness;
-    close("loss", lost(&motion, last, from), TAU * limit * (a * a - d * d).sqrt(), 1e-6);
+    close("loss", dissipated(&motion, last, from), TAU * limit * (a * a - d * d).sqrt(), 1e-6);
     let mut sum = Complex64::new(0.0, 0.0);
     for (time, force) in last[1..].iter().zip(&from[1..]) {
         sum += Complex64::cis(-TAU * time) * force[0];
@@ -120,7 +120,7 @@ fn theory_11_3_a_normal_load_in_phase_makes_a_polygon() {
             near("at -a", at(7), -mu * (preload - nu * a), 1e-12);
             near("slip forward begins", at(8), mu * (preload + nu * u2), 1e-12);
             let tangential: Vec<_> = found[5 * samples..].iter().map(|force| [force[0], 0.0, 0.0]).collect();
-            near("loss", lost(&motion, &times[5 * samples..], &tangential), 12.051_948_051_948_05, 1e-7);
+            near("loss", dissipated(&motion, &times[5 * samples..], &tangential), 12.051_948_051_948_05, 1e-7);
             near("normal", found[9 * samples][tangents], preload + nu * a, 1e-12);
         }
     }
@@ -204,7 +204,7 @@ fn exact_loop_loss(law: &Iwan, u: f64) -> f64 {
     let places: Vec<f64> = std::iter::once(0.0).chain(way(u)).chain(way(-u)).chain([u]).collect();
     let times = steps(1.0, places.len() - 1, 1);
     let found = forces(law, View::Pieces, &along(&places), &times);
-    lost(&along(&places), &times[1..], &found[1..])
+    dissipated(&along(&places), &times[1..], &found[1..])
 }
 
 /// (11.4) to all given digits, by extrapolation over the number of elements.
@@ -438,7 +438,7 @@ fn theory_11_11_separation_costs_no_order_of_accuracy() {
         let found = forces(&law, View::Step, &motion, &times);
         let open = found[2 * count..].iter().filter(|force| force[2] == 0.0).count();
         assert!(open > count / 4 && open < count * 3 / 4, "it is apart for {open} of {count} samples");
-        lost(&motion, &times[2 * count..], &found[2 * count..])
+        dissipated(&motion, &times[2 * count..], &found[2 * count..])
     };
     let reference = run(1 << 17);
     let errors = [512, 2048, 8192].map(|count| (run(count) / reference - 1.0).abs());
@@ -502,7 +502,7 @@ fn theory_11_11_both_readings_of_separation_are_one_law() {
         let off = |times: &[f64], tangential: &[f64]| {
             let found: Vec<_> = tangential.iter().map(|force| [*force, 0.0, 0.0]).collect();
             let from = times.len() / 3 * 2;
-            (lost(&motion, &times[from..], &found[from..]) / expected - 1.0).abs()
+            (dissipated(&motion, &times[from..], &found[from..]) / expected - 1.0).abs()
         };
         let law = FrictionContact { tangential: kt, normal: kn, friction: mu, preload, tangents: 1 };
         let own = |count: usize| {

@@ -15,7 +15,7 @@ use stickslip::law::{
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
 use stickslip::model::{GROUND, Joint, Mass, Model, Motion, Spring};
-use stickslip_verification::replay::{Instant, View, forces, lost, random_motion, steps, views};
+use stickslip_verification::law_driver::{Instant, View, dissipated, forces, random_motion, steps, views};
 use stickslip_verification::{Random, exact, near};
 
 /// Samples of a period, fine enough for the smooth laws. Their steepest slope spans a
@@ -41,7 +41,7 @@ fn way(motion: &dyn Fn(f64) -> Instant, times: &[f64]) -> f64 {
 }
 
 #[test]
-fn rows_are_whole() {
+fn rows_are_complete() {
     let mut names = BTreeSet::new();
     for row in TABLE {
         let law = row.sample();
@@ -121,8 +121,8 @@ fn no_energy_is_created_over_closed_histories() {
                     let times = steps(1.0 / speed, 5, SAMPLES);
                     let found = forces(&*law, view, &motion, &times);
                     let (times, found) = (&times[4 * SAMPLES..], &found[4 * SAMPLES..]);
-                    let share =
-                        lost(&motion, times, found) / (largest(found) * way(&motion, times)).max(f64::MIN_POSITIVE);
+                    let share = dissipated(&motion, times, found)
+                        / (largest(found) * way(&motion, times)).max(f64::MIN_POSITIVE);
                     assert!((-QUADRATURE..=1.0).contains(&share), "{} by {view:?}, seed {seed}: {share}", row.name);
                     (least, most) = (least.min(share), most.max(share));
                 }
@@ -415,7 +415,7 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
 /// that they do not. For an incrementally passive law, `∫ δf · δu' dt ≥ 0` from rest: the
 /// difference of two motions never gives back more energy than it took.
 #[test]
-fn what_laws_say_of_themselves() {
+fn oddness_and_passivity_hold() {
     for row in TABLE {
         let sample = row.sample();
         for law in [Some(sample.clone()), sample.regularised(1e-4)].into_iter().flatten() {

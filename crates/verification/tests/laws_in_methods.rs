@@ -7,12 +7,12 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::law::TABLE;
-use stickslip::method::{self, Method, MethodError, Options, Refusal, advised, auto::Auto};
+use stickslip::method::{self, Method, MethodError, Options, Refusal, auto::Auto, solver_with_alternatives};
 use stickslip::model::{Axis, System};
 use stickslip::orbit::Orbit;
 use stickslip::structure::Structure;
-use stickslip_verification::held::{OMEGA, held};
-use stickslip_verification::reference::Reference;
+use stickslip_verification::newmark_reference::Reference;
+use stickslip_verification::single_mass::{OMEGA, mass_on_law};
 
 /// Damping for a ratio of 0.1: a transient falls to 1e-8 in 30 periods.
 const DAMPING: f64 = 28.0;
@@ -49,7 +49,7 @@ fn followed(system: &System, steps: usize, orbit: &Orbit) -> (Vec<f64>, f64) {
 fn every_law_in_every_method_moves_as_the_reference() {
     for info in TABLE {
         let law = info.sample();
-        let system = held(&law, DAMPING, 0.0);
+        let system = mass_on_law(&law, DAMPING, 0.0);
         let begins = Auto.solver(&system).unwrap().orbit(OMEGA, None).unwrap();
         let [(fine, missing), (coarse, _)] = [STEPS, COARSE].map(|steps| followed(&system, steps, &begins));
         let size = fine.iter().fold(0.0f64, |size, x| size.max(*x));
@@ -60,10 +60,10 @@ fn every_law_in_every_method_moves_as_the_reference() {
         let mut taken = 0;
         for row in method::TABLE {
             let method = (row.build)(&Options::new()).unwrap();
-            let mut solver = match advised(&*method, &system) {
+            let mut solver = match solver_with_alternatives(&*method, &system) {
                 Ok(solver) => solver,
                 // refused by name, with alternative methods
-                Err(MethodError { refusal: Refusal::Law { law, .. }, ways }) => {
+                Err(MethodError { refusal: Refusal::Law { law, .. }, alternatives: ways }) => {
                     assert!(law == info.name && !ways.methods.is_empty(), "{} in {}: {ways}", info.name, row.name);
                     continue;
                 }
@@ -85,7 +85,7 @@ fn every_law_in_every_method_moves_as_the_reference() {
 /// may keep the motion from settling. The solver must not report this as a motion of several
 /// periods. Newton's method finds the orbit of one period, and the reference confirms it.
 #[test]
-fn what_steps_do_is_no_motion_of_several_periods() {
+fn step_errors_are_not_reported_as_subharmonics() {
     let one = |value: f64| DMatrix::from_element(1, 1, value);
     let values = [("limit", 2.0), ("static_limit", 2.5), ("velocity", 0.01), ("alpha", 25_000.0)];
     let law = stickslip::law::find("stribeck-arctan").unwrap().build(&values.into()).unwrap();

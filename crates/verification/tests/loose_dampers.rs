@@ -13,16 +13,16 @@ use std::time::Instant;
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip_verification::loose_dampers::{Course, LooseDamper, loose_damper, roof_damper};
+use stickslip_verification::loose_dampers::{LooseDamper, Settings, loose_damper, roof_damper};
 
 /// Default number of random dampers.
 const DAMPERS: u64 = 6;
 /// Settings of the reference, and longer ones for points that differ. Undamped ringing on the
 /// contacts needs an excitation that grows slowly, and a resonance needs many steps.
-const COURSES: [Course; 3] = [
-    Course { steps: 1000, growth: 40, periods: 3000, settled: 1e-5 },
-    Course { steps: 2000, growth: 1000, periods: 6000, settled: 2e-6 },
-    Course { steps: 8000, growth: 1000, periods: 6000, settled: 2e-6 },
+const COURSES: [Settings; 3] = [
+    Settings { steps: 1000, growth: 40, periods: 3000, settled: 1e-5 },
+    Settings { steps: 2000, growth: 1000, periods: 6000, settled: 2e-6 },
+    Settings { steps: 8000, growth: 1000, periods: 6000, settled: 2e-6 },
 ];
 /// Difference that is always allowed.
 const NEAR: f64 = 1e-3;

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use stickslip::law::{Range, SharedLaw, TABLE};
-use stickslip::method::{self, MethodError, MethodInfo, Options, WIDTH, advised};
+use stickslip::method::{self, MethodError, MethodInfo, Options, WIDTH, solver_with_alternatives};
 use stickslip::model::{Axis, System};
 use stickslip::structure::Structure;
 
@@ -61,7 +61,7 @@ fn a_width_is_more_than_nothing() {
 
 fn asked(row: &MethodInfo, width: bool, system: &System) -> Result<(), MethodError> {
     let options = if width { Options::from([(WIDTH.to_owned(), WIDTH_GIVEN)]) } else { Options::new() };
-    advised(&*(row.build)(&options).unwrap(), system).map(drop)
+    solver_with_alternatives(&*(row.build)(&options).unwrap(), system).map(drop)
 }
 
 fn named(name: &str) -> &'static MethodInfo {
@@ -70,12 +70,12 @@ fn named(name: &str) -> &'static MethodInfo {
 
 /// Compares the refusals of all methods with what the methods do. Returns the number of
 /// refusals, and the number without an alternative.
-fn hold(system: &System) -> (usize, usize) {
+fn check_refusals(system: &System) -> (usize, usize) {
     let (mut refused, mut hopeless) = (0, 0);
     for row in method::TABLE {
         let Err(error) = asked(row, false, system) else { continue };
         refused += 1;
-        let (text, ways) = (error.to_string(), error.ways().expect("a refusal that no option mends"));
+        let (text, ways) = (error.to_string(), error.alternatives().expect("a refusal that no option mends"));
         for name in &ways.methods {
             assert!(asked(named(name), false, system).is_ok(), "{text}: {name} refuses too");
             assert!(text.contains(&format!("`{name}`")), "{text}");
@@ -95,11 +95,11 @@ fn hold(system: &System) -> (usize, usize) {
                 }
                 // each method states what it misses, except `auto`, which only picks another
                 // method
-                let why = asked(other, true, system).unwrap_err().alone().to_string();
+                let why = asked(other, true, system).unwrap_err().without_alternatives().to_string();
                 let said = |(methods, said): &(Vec<&str>, String)| {
                     methods.contains(&other.name) && why == format!("{} {said}", other.name)
                 };
-                assert!(ways.missing.iter().any(said) || other.name == "auto", "{text}: {why}");
+                assert!(ways.reasons.iter().any(said) || other.name == "auto", "{text}: {why}");
             }
         }
     }
@@ -112,7 +112,7 @@ fn what_a_refusal_names_takes_the_system() {
     let (mut refused, mut hopeless) = (0, 0);
     for (i, law) in laws.iter().enumerate() {
         for other in &laws[i..] {
-            let (refusals, without) = hold(&system(&[law.clone(), other.clone()], 1.0));
+            let (refusals, without) = check_refusals(&system(&[law.clone(), other.clone()], 1.0));
             refused += refusals;
             hopeless += without;
         }
@@ -121,9 +121,9 @@ fn what_a_refusal_names_takes_the_system() {
 }
 
 #[test]
-fn a_place_without_mass_has_ways_too() {
+fn alternatives_for_a_massless_place() {
     for law in laws() {
-        let (refused, hopeless) = hold(&system(std::slice::from_ref(&law), 0.0));
+        let (refused, hopeless) = check_refusals(&system(std::slice::from_ref(&law), 0.0));
         assert!(refused > 0, "{}", law.name());
         // harmonic balance needs no mass, unless it cannot take the law at all
         let alone = asked(named("harmonic-balance"), false, &system(std::slice::from_ref(&law), 1.0));

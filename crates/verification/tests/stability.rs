@@ -85,7 +85,7 @@ fn ring(count: usize, drive: f64, mistuning: f64, damping: f64) -> System {
 /// The eigenvalue iteration ends for return maps of many sliders, which are nilpotent in large
 /// parts.
 #[test]
-fn models_that_hung_end() {
+fn eigenvalues_of_nilpotent_return_maps_converge() {
     for (what, system, hertz) in
         [("ten sliders", ten_sliders(), 14.35), ("ring that sticks", ring(12, 0.01, 0.0, 0.5), 116.0)]
     {
@@ -231,7 +231,7 @@ fn masses_that_couple_places() {
 /// Extreme numbers end quickly in an orbit or in an error with a reason. No method hangs or
 /// panics.
 #[test]
-fn absurd_numbers_end() {
+fn extreme_numbers_end_without_hanging() {
     let smooth = |kt: f64, limit: f64| -> SharedLaw { Arc::new(JenkinsArctan { stiffness: kt, limit, alpha: 25e3 }) };
     let exact = |kt: f64, limit: f64| -> SharedLaw { Arc::new(Jenkins { stiffness: kt, limit }) };
     let rigid = |_: f64, limit: f64| -> SharedLaw { Arc::new(Coulomb { limit }) };
@@ -297,7 +297,7 @@ fn absurd_numbers_end() {
 /// the exact method finds them. Apart from the one of the stick offset, they multiply to
 /// `exp(-T tr(M⁻¹C))` (Liouville).
 #[test]
-fn what_sticks_up_to_its_limit_has_the_multipliers_of_stick() {
+fn stick_at_the_limit_has_the_multipliers_of_stick() {
     let force = |on: &str, harmonic, amplitude, phase| Force { harmonic, ..force(on, amplitude, phase) };
     let preloaded = Model {
         masses: vec![mass("m0", 0.41), mass("m1", 0.13)],

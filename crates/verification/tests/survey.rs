@@ -234,7 +234,7 @@ fn a_chain_of_five_hundred_masses_takes_below_a_second() {
 }
 
 #[test]
-fn what_nothing_holds_is_told_apart_from_what_friction_holds() {
+fn free_bodies_and_bodies_held_by_friction_differ() {
     // two masses on a spring, free in space: one rigid motion, and the mode of the reduced mass
     let mut model = Model {
         masses: vec![mass("a", 1.0), mass("b", 3.0)],

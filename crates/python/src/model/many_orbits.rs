@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::sync::Arc;
 use stickslip::curve::sweep::{BLOCK, Watch as Sweep, sweep};
-use stickslip::method::{Method, OrbitError, advised};
+use stickslip::method::{Method, OrbitError, solver_with_alternatives};
 use stickslip::model::{Model, ModelError, System};
 use stickslip::orbit::Orbit;
 use stickslip_study::run::Context;
@@ -68,7 +68,7 @@ pub fn along_parameters(
             parameters::set(&mut model, name, values[index]).map_err(|message| PointError::Model(at(message)))?;
         }
         let system = model.assemble().map_err(|cause| PointError::Model(at(describe(&cause, &model))))?;
-        let solver = advised(&*request.method, &system);
+        let solver = solver_with_alternatives(&*request.method, &system);
         let mut solver = solver.map_err(|cause| PointError::Method(at(cause.to_string())))?;
         let outcome = solver.orbit(omegas[index], None);
         (context.finished)();

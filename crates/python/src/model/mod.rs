@@ -35,7 +35,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Method, Options, Solver, advised};
+use stickslip::method::{self, Method, Options, Solver, solver_with_alternatives};
 use stickslip::model::{
     Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure, SubstructureDamping,
     System,
@@ -86,7 +86,7 @@ struct CachedSolver {
 
 /// Creates the solver of a system that is stored together with the solver.
 fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
-    let solver = advised(method, system)?;
+    let solver = solver_with_alternatives(method, system)?;
     // SAFETY: the system is on the heap and does not move; `CachedSolver` drops the solver before
     // its own reference to the system, and never gives the solver away
     #[allow(unsafe_code)]
@@ -551,7 +551,7 @@ impl PyModel {
     ) -> PyResult<Bound<'py, PyDict>> {
         let request = self.request(py, method, options)?;
         let prepared = run_here(py, || {
-            advised(&*request.method, &request.system).map(|_| request.method.choice(&request.system))
+            solver_with_alternatives(&*request.method, &request.system).map(|_| request.method.choice(&request.system))
         })?;
         let choice = prepared.map_err(|cause| error::method(py, cause))?;
         let out = PyDict::new(py);

@@ -4,7 +4,7 @@
 pub use super::branch_following::is_followed;
 use super::peak::{CurvePoint, held_amplitude};
 use super::sweep::reverse_sweep;
-use crate::method::{Method, MethodError, OrbitError, advised};
+use crate::method::{Method, MethodError, OrbitError, solver_with_alternatives};
 use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
@@ -90,7 +90,7 @@ impl BidirectionalSweep {
         stop: &AtomicBool,
     ) -> Result<Vec<OtherOrbit>, MethodError> {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
-        let mut solver = advised(method, system)?;
+        let mut solver = solver_with_alternatives(method, system)?;
         // A search without initial guess can find another orbit than the forward sweep.
         let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.initial_state);
         let mut omegas = self.points.iter().rev().map(|point| point.omega);

@@ -5,7 +5,7 @@
 //! from its initial guess, the solver repeats the interval in smaller steps. Either these steps
 //! reach the frequency, or the branch ends between both frequencies.
 
-use crate::method::{Method, MethodError, OrbitError, Solver, advised};
+use crate::method::{Method, MethodError, OrbitError, Solver, solver_with_alternatives};
 use crate::model::System;
 use crate::orbit::Orbit;
 use num_complex::Complex64;
@@ -38,7 +38,7 @@ pub fn is_followed(system: &System) -> bool {
 /// # Errors
 /// The method does not support the system.
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-    let solver = advised(method, system)?;
+    let solver = solver_with_alternatives(method, system)?;
     Ok(if is_followed(system) {
         Box::new(BranchFollower { solver, last: None, announced: None, end: None, work_limit_reached: false })
     } else {
@@ -49,7 +49,7 @@ pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<
 struct BranchFollower<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     last: Option<BranchPoint>,
-    /// The orbit that [`Solver::begin_at`] announced.
+    /// The orbit that [`Solver::begin_branch`] announced.
     announced: Option<BranchPoint>,
     /// The end of a branch at which smaller steps failed.
     end: Option<BranchEnd>,
@@ -103,7 +103,7 @@ impl BranchPoint {
 
 impl BranchFollower<'_> {
     fn solve(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
-        if between { self.solver.between(omega, start) } else { self.solver.orbit(omega, start) }
+        if between { self.solver.orbit_without_estimate(omega, start) } else { self.solver.orbit(omega, start) }
     }
 
     fn next(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
@@ -131,7 +131,7 @@ impl BranchFollower<'_> {
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
             let found = self.solve(target, Some(&last.start), between || !arrives);
-            effort += self.solver.effort();
+            effort += self.solver.work_fraction();
             self.work_limit_reached =
                 effort > WORK_LIMIT || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
             match found.ok().filter(|orbit| last.may_precede(orbit)) {
@@ -155,20 +155,20 @@ impl Solver for BranchFollower<'_> {
         self.next(omega, start, false)
     }
 
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.next(omega, start, true)
     }
 
-    fn effort(&self) -> f64 {
-        self.solver.effort()
+    fn work_fraction(&self) -> f64 {
+        self.solver.work_fraction()
     }
 
-    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
         if [&self.last, &self.announced].into_iter().flatten().all(|last| last.start != start) {
-            let orbit = self.solver.between(omega, Some(start));
+            let orbit = self.solver.orbit_without_estimate(omega, Some(start));
             self.announced = orbit.ok().map(|orbit| BranchPoint { start: start.to_vec(), ..BranchPoint::new(&orbit) });
         }
-        self.solver.begin_at(omega, start);
+        self.solver.begin_branch(omega, start);
     }
 }
 
@@ -190,10 +190,10 @@ mod tests {
         fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             self.solver.orbit(omega, start)
         }
-        fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             if self.effort < 1.0 {
-                return self.solver.between(omega, start);
+                return self.solver.orbit_without_estimate(omega, start);
             }
             let (iterations, residual, advice) = (9, 1e-2, String::new());
             Err(OrbitError::NotConverged {
@@ -205,7 +205,7 @@ mod tests {
                 advice,
             })
         }
-        fn effort(&self) -> f64 {
+        fn work_fraction(&self) -> f64 {
             self.effort
         }
     }
@@ -266,9 +266,9 @@ mod tests {
         let start = onward.orbit(from, None).unwrap().initial_state;
         let count = || asked.load(std::sync::atomic::Ordering::Relaxed);
         let mut searches = |beyond: f64| {
-            onward.begin_at(from, &start);
+            onward.begin_branch(from, &start);
             let before = count();
-            onward.between(from + beyond, Some(&start)).unwrap();
+            onward.orbit_without_estimate(from + beyond, Some(&start)).unwrap();
             count() - before
         };
         // The first interval locates the end. The next two contain the known end and take one

@@ -246,7 +246,7 @@ impl BranchContinuation<'_> {
             return best;
         }
         let mut height = |value: f64| {
-            let orbit = equations.near(&arc[1].0, value);
+            let orbit = equations.orbit_near(&arc[1].0, value);
             orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit))
         };
         let close = |a: f64, b: f64| (b - a).abs() <= PEAK_TOLERANCE * (a.abs() + b.abs());

@@ -25,7 +25,7 @@ mod mode_curve;
 pub use mode_curve::{ModeEnd, ModeEndCause, TurningPart};
 
 use crate::method::harmonic_balance::{ModeEquations, ModeState};
-use crate::method::{MethodError, ways};
+use crate::method::{MethodError, alternatives};
 use crate::model::System;
 use mode_curve::ModeCurve;
 use num_complex::Complex64;
@@ -117,7 +117,7 @@ pub fn check(system: &System) -> Result<(), MethodError> {
 
 /// Returns the mode equations of a system. The error names alternative methods.
 fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEquations<'_>, MethodError> {
-    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with(ways(system)))
+    ModeEquations::new(system, harmonics, samples).map_err(|error| error.with_alternatives(alternatives(system)))
 }
 
 /// Computes a nonlinear mode, from an amplitude at which friction is negligible to smaller
@@ -180,7 +180,7 @@ impl ModeBranches {
         let (low, high) = request.range;
         // A single mode has the same number at both ends. For a law with memory, large motions
         // are expensive, so the branch from small amplitudes is tried first.
-        let rising = match equations.is_alone_with_memory() {
+        let rising = match equations.is_single_dof_with_memory() {
             true => ModeCurve::from_small_amplitude(equations, request.mode, request.range),
             false => None,
         };
@@ -282,7 +282,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
         amplitude,
         omega: state.omega,
         damping: state.damping,
-        viscous: equations.viscous(state),
+        viscous: equations.viscous_damping_ratio(state),
         places: equations.places(state),
         amplitudes: equations.half_ranges(state),
     }

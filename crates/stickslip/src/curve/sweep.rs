@@ -147,7 +147,7 @@ pub fn reverse_sweep(
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let found = solver.between(omega, start.as_deref()).ok();
+        let found = solver.orbit_without_estimate(omega, start.as_deref()).ok();
         found.iter().for_each(&mut *see);
         start = found.map(|orbit| orbit.initial_state);
     }

@@ -3,12 +3,13 @@
 //! It picks event-driven for exact laws and shooting for smooth laws. It picks harmonic balance
 //! for cheaper or other systems, and for travelling waves on a disk.
 
-use super::followed::Kind;
+use super::event_driven::EventDriven;
+use super::flow::integrator_choice::IntegratorKind;
 use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
+use super::shooting::Shooting;
 use super::{
-    Choice, Method, MethodError, MethodInfo, Options, Solver, event_driven, event_driven::EventDriven,
-    harmonic_balance, shooting::Shooting, transient, ways,
+    Choice, Method, MethodError, MethodInfo, Options, Solver, alternatives, event_driven, harmonic_balance, transient,
 };
 use crate::law::Law;
 use crate::model::System;
@@ -27,22 +28,22 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 
 /// Most joints with smooth laws for shooting. The cost of its sensitivity grows with the cube
 /// of the state size; the cost of harmonic balance grows linearly.
-const FOLLOWED: usize = 12;
+const SHOOTING_JOINTS: usize = 12;
 /// Most degrees of freedom for shooting. Measured on chains with two joints and 30, 60, 100 and
 /// 150 degrees of freedom: 0.014, 0.1, 0.5 and 2.3 s per point; harmonic balance takes 0.004 to
 /// 0.009 s. A chain of 60 given by matrices, with a `bouc-wen`, takes minutes; harmonic balance
 /// takes 1.3 s.
-const DOFS: usize = 24;
+const SHOOTING_DOFS: usize = 24;
 /// Most multiplications per orbit for event-driven, about one minute, whatever the other
 /// methods cost.
-const DEAREST: f64 = 3e11;
+const EVENT_DRIVEN_WORK: f64 = 3e11;
 /// Most multiplications for event-driven as the second method, a few seconds. Measured: a chain
 /// of 40 masses takes 1.2 s per point. A chain of 80 masses is above the bound and takes ten
 /// seconds or more.
-const SECOND: f64 = 1e10;
+const FALLBACK_WORK: f64 = 1e10;
 /// Factor on the cost of an orbit with a close warm start. The spacing of the orbits is unknown
 /// here, so the factor lies between that cost and the cost without a warm start.
-const APART: f64 = 2.0;
+const SPACING_FACTOR: f64 = 2.0;
 
 /// Picks a method by the laws and the number of joints.
 ///
@@ -58,15 +59,15 @@ pub struct Auto;
 impl Auto {
     /// Returns the picked method and the reason. If harmonic balance is picked and refuses a
     /// law, returns another method that takes the system.
-    fn chosen(system: &System) -> (Box<dyn Method>, String) {
-        let (method, because) = Auto::by_laws(system);
+    fn pick(system: &System) -> (Box<dyn Method>, String) {
+        let (method, because) = Auto::pick_by_laws(system);
         if method.name() != harmonic_balance::NAME || HarmonicBalance::takes_laws(system) {
             return (method, because);
         }
-        let methods = ways(system).methods;
+        let methods = alternatives(system).methods;
         // `transient` is the last resort
         let other = methods.iter().find(|name| **name != transient::INFO.name).or(methods.first());
-        match other.and_then(|name| named(name)) {
+        match other.and_then(|name| build_named(name)) {
             Some(other) => (other, format!("{} refuses a law", harmonic_balance::NAME)),
             // the error of the refusing method lists the alternatives
             None => (method, because),
@@ -74,11 +75,11 @@ impl Auto {
     }
 
     /// Picks a method by the laws and sizes.
-    fn by_laws(system: &System) -> (Box<dyn Method>, String) {
+    fn pick_by_laws(system: &System) -> (Box<dyn Method>, String) {
         let joints = system.joints().len();
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         let massless = (0..system.dofs()).any(|dof| system.structure().diagonal_mass(dof) <= 0.0);
-        let events = event_driven::orbit_work(system).map(|work| APART * work);
+        let events = event_driven::orbit_work(system).map(|work| SPACING_FACTOR * work);
         let balance =
             |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };
         if joints > 0 && system.cyclic().is_some() {
@@ -88,25 +89,25 @@ impl Auto {
         } else if !system.structure().has_definite_mass() {
             balance("the mass matrix is singular".to_owned())
         } else if let Some(events) = events {
-            if events > DEAREST || events > harmonic_balance::orbit_work(system) {
+            if events > EVENT_DRIVEN_WORK || events > harmonic_balance::orbit_work(system) {
                 let sizes = format!("{} degrees of freedom and {joints} joints", system.dofs());
                 return balance(format!("faster than event-driven with {sizes}"));
             }
             let because = if joints == 0 { "there are no joints" } else { "every law is exact" };
             (Box::new(EventDriven), because.to_owned())
-        } else if falls(system)
-            && Kind::of(system, None) == Kind::Switched
-            && system.dofs() <= DOFS
-            && joints <= FOLLOWED
+        } else if has_falling_friction(system)
+            && IntegratorKind::of(system, None) == IntegratorKind::Switched
+            && system.dofs() <= SHOOTING_DOFS
+            && joints <= SHOOTING_JOINTS
         {
             let because = "friction falls with velocity along a smooth curve; shooting locates its switches";
             (Box::new(Shooting::default()), because.to_owned())
         } else if !smooth {
             balance("the laws are neither all exact nor all smooth".to_owned())
-        } else if system.dofs() > DOFS {
-            balance(format!("{} degrees of freedom exceed the limit of {DOFS} for shooting", system.dofs()))
-        } else if joints > FOLLOWED {
-            balance(format!("{joints} joints exceed the limit of {FOLLOWED} for shooting"))
+        } else if system.dofs() > SHOOTING_DOFS {
+            balance(format!("{} degrees of freedom exceed the limit of {SHOOTING_DOFS} for shooting", system.dofs()))
+        } else if joints > SHOOTING_JOINTS {
+            balance(format!("{joints} joints exceed the limit of {SHOOTING_JOINTS} for shooting"))
         } else {
             (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }
@@ -115,7 +116,7 @@ impl Auto {
 
 /// Returns true if the friction of a joint falls with velocity; a series then needs many
 /// harmonics.
-fn falls(system: &System) -> bool {
+fn has_falling_friction(system: &System) -> bool {
     let falls = |law: &dyn Law| law.sliding().is_some() && !law.is_incrementally_passive();
     system.joints().iter().any(|joint| falls(&**joint.law()))
 }
@@ -125,22 +126,22 @@ impl Method for Auto {
         INFO.name
     }
     fn choice(&self, system: &System) -> Choice {
-        let (method, because) = Auto::chosen(system);
+        let (method, because) = Auto::pick(system);
         Choice { method: method.name(), because: Some(format!("chosen by auto: {because}")) }
     }
     fn closes_motions(&self, system: &System) -> bool {
-        Auto::chosen(system).0.closes_motions(system)
+        Auto::pick(system).0.closes_motions(system)
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let (method, _) = Auto::chosen(system);
+        let (method, _) = Auto::pick(system);
         let first = method.solver(system)?;
-        Ok(Box::new(WithSecond { first, chosen: method.name(), system, second: None, last: None, effort: 0.0 }))
+        Ok(Box::new(WithFallback { first, chosen: method.name(), system, second: None, last: None, effort: 0.0 }))
     }
 }
 
 /// The picked method, and a second method that takes over if the first finds no orbit. The
 /// second method must take the system and need only seconds.
-struct WithSecond<'a> {
+struct WithFallback<'a> {
     first: Box<dyn Solver + Send + 'a>,
     chosen: &'static str,
     system: &'a System,
@@ -153,43 +154,42 @@ struct WithSecond<'a> {
     effort: f64,
 }
 
-impl<'a> WithSecond<'a> {
+impl<'a> WithFallback<'a> {
     /// Returns the second method. It is never `transient`, which can take minutes.
-    fn next(&self) -> Option<(&'static str, Box<dyn Solver + Send + 'a>)> {
+    fn fallback(&self) -> Option<(&'static str, Box<dyn Solver + Send + 'a>)> {
         let (system, joints) = (self.system, self.system.joints().len());
         let cheap = |name: &str| match name {
             harmonic_balance::NAME => true,
-            name if name == event_driven::INFO.name => {
-                event_driven::orbit_work(system).is_some_and(|work| event_driven::ALONE * work <= SECOND)
-            }
-            name => name != transient::INFO.name && system.dofs() <= DOFS && joints <= FOLLOWED,
+            name if name == event_driven::INFO.name => event_driven::orbit_work(system)
+                .is_some_and(|work| event_driven::COLD_START_FACTOR * work <= FALLBACK_WORK),
+            name => name != transient::INFO.name && system.dofs() <= SHOOTING_DOFS && joints <= SHOOTING_JOINTS,
         };
-        let methods = ways(system).methods;
+        let methods = alternatives(system).methods;
         let name = methods.into_iter().find(|name| *name != self.chosen && cheap(name))?;
-        Some((name, named(name)?.solver(system).ok()?))
+        Some((name, build_named(name)?.solver(system).ok()?))
     }
 
     /// Searches with the first method, and with the second if the first reports an error that
     /// the second may avoid.
-    fn seek(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
+    fn search(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
         let by = |solver: &mut (dyn Solver + Send + 'a), start| match between {
-            true => solver.between(omega, start),
+            true => solver.orbit_without_estimate(omega, start),
             false => solver.orbit(omega, start),
         };
         let own = start.filter(|start| self.last.as_deref() != Some(*start));
         let found = by(&mut *self.first, own);
-        self.effort = self.first.effort();
+        self.effort = self.first.work_fraction();
         let error = match found {
-            Err(error) if misses(&error) => error,
+            Err(error) if may_succeed_elsewhere(&error) => error,
             outcome => return outcome,
         };
         if self.second.is_none() {
-            self.second = Some(self.next());
+            self.second = Some(self.fallback());
         }
         let Some((name, second)) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
         let near = start.filter(|start| self.last.as_deref() == Some(*start)).or(error.candidate());
         let found = by(&mut **second, near);
-        self.effort += second.effort();
+        self.effort += second.work_fraction();
         let mut orbit = found.map_err(|_| error.with_failed_alternative(name))?;
         orbit.evidence.fallback_from = Some(self.chosen);
         self.last = Some(orbit.initial_state.clone());
@@ -198,12 +198,12 @@ impl<'a> WithSecond<'a> {
 }
 
 /// Builds the method with this name from the list, without options.
-fn named(name: &str) -> Option<Box<dyn Method>> {
+fn build_named(name: &str) -> Option<Box<dyn Method>> {
     (LIST.iter().find(|row| row.name == name)?.build)(&Options::new()).ok()
 }
 
 /// Returns true if another method may find an orbit after this error.
-fn misses(error: &OrbitError) -> bool {
+fn may_succeed_elsewhere(error: &OrbitError) -> bool {
     matches!(
         error,
         OrbitError::NotConverged { .. }
@@ -214,20 +214,20 @@ fn misses(error: &OrbitError) -> bool {
     )
 }
 
-impl Solver for WithSecond<'_> {
+impl Solver for WithFallback<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.seek(omega, start, false)
+        self.search(omega, start, false)
     }
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.seek(omega, start, true)
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        self.search(omega, start, true)
     }
-    fn effort(&self) -> f64 {
+    fn work_fraction(&self) -> f64 {
         self.effort
     }
-    fn begin_at(&mut self, omega: f64, start: &[f64]) {
+    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
         match self.second.as_mut().and_then(Option::as_mut).filter(|_| self.last.as_deref() == Some(start)) {
-            Some((_, second)) => second.begin_at(omega, start),
-            None => self.first.begin_at(omega, start),
+            Some((_, second)) => second.begin_branch(omega, start),
+            None => self.first.begin_branch(omega, start),
         }
     }
 }
@@ -289,7 +289,7 @@ mod tests {
     /// Harmonic balance takes places without mass. Event-driven takes a static limit above the
     /// dynamic one at any number of joints.
     #[test]
-    fn what_the_first_choice_refuses_goes_to_who_takes_it() {
+    fn refused_systems_go_to_another_method() {
         let mut massless = example::blade_couple();
         massless.masses[1].mass = 0.0;
         let many = ring(200, &(Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.0 }) as SharedLaw));
@@ -301,9 +301,9 @@ mod tests {
     }
 
     /// A solver that finds no orbit. It asserts that it gets no warm start from another method.
-    struct Nothing;
+    struct FailingSolver;
 
-    impl Solver for Nothing {
+    impl Solver for FailingSolver {
         fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
             assert!(start.is_none());
             Err(OrbitError::not_converged("nothing", omega, 1, 1.0))
@@ -314,8 +314,8 @@ mod tests {
     fn what_the_first_choice_does_not_find_the_next_one_may() {
         let system = example::blade_couple().assemble().unwrap();
         for (chosen, next) in [("event-driven", "harmonic-balance"), ("harmonic-balance", "event-driven")] {
-            let first = Box::new(Nothing);
-            let mut solver = WithSecond { first, chosen, system: &system, second: None, last: None, effort: 0.0 };
+            let first = Box::new(FailingSolver);
+            let mut solver = WithFallback { first, chosen, system: &system, second: None, last: None, effort: 0.0 };
             let orbit = solver.orbit(TAU * 121.0, None).unwrap();
             let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.initial_state)).unwrap();
             assert_eq!((orbit.method, neighbour.method), (next, next));
@@ -325,11 +325,12 @@ mod tests {
 
     /// After both methods failed, the error advises neither of them.
     #[test]
-    fn who_was_asked_in_vain_is_not_advised() {
+    fn failed_methods_are_not_advised() {
         let system = example::blade_couple().assemble().unwrap();
-        let second = Some(Some(("harmonic-balance", Box::new(Nothing) as Box<dyn Solver + Send>)));
-        let first = Box::new(Nothing);
-        let mut solver = WithSecond { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
+        let second = Some(Some(("harmonic-balance", Box::new(FailingSolver) as Box<dyn Solver + Send>)));
+        let first = Box::new(FailingSolver);
+        let mut solver =
+            WithFallback { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
         let said = solver.orbit(TAU * 121.0, None).unwrap_err().to_string();
         assert!(said.ends_with("; `harmonic-balance` found no orbit either"), "{said}");
     }

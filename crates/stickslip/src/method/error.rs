@@ -1,24 +1,25 @@
 //! Reasons why a method cannot take a system.
 
-use super::Ways;
+use super::Alternatives;
 use crate::model::{System, SystemJoint};
 use crate::structure::MAX_FULL_DOFS;
 
 /// Error of a method that cannot take a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{refusal}{}", .ways.behind())]
+#[error("{refusal}{}", .alternatives.suffix())]
 pub struct MethodError {
     /// The reason.
     pub refusal: Refusal,
-    /// Alternative methods; empty until [`advised`](super::advised) fills them in.
-    pub ways: Box<Ways>,
+    /// Alternative methods; empty until
+    /// [`solver_with_alternatives`](super::solver_with_alternatives) fills them in.
+    pub alternatives: Box<Alternatives>,
 }
 
 /// The reason why a method cannot take a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// A law lacks the view that the method needs.
-    #[error("{method} cannot take the law `{law}` of joint `{joint}`: {misses}")]
+    #[error("{method} cannot take the law `{law}` of joint `{joint}`: {missing}")]
     Law {
         /// Name of the method.
         method: &'static str,
@@ -27,7 +28,7 @@ pub enum Refusal {
         /// Name of its law.
         law: &'static str,
         /// Missing property of the law.
-        misses: &'static str,
+        missing: &'static str,
     },
     /// A place has no mass.
     #[error(
@@ -45,7 +46,7 @@ pub enum Refusal {
          replace joints in series by one joint (two `jenkins` in series equal one with the smaller limit and both \
          springs in series)"
     )]
-    Empty {
+    OnlyJoints {
         /// Name of the method.
         method: &'static str,
         /// Name of the place.
@@ -57,7 +58,7 @@ pub enum Refusal {
          other side of joint `{joint}`, and has another rigid joint; rigid joints in series slip at the weaker one, \
          so remove the place and the stronger joint, or give the place at least {least:.0e} of that mass"
     )]
-    Light {
+    NegligibleMass {
         /// Name of the method.
         method: &'static str,
         /// Name of the place.
@@ -101,9 +102,9 @@ pub enum Refusal {
 
 impl MethodError {
     /// Returns the error that `method` needs a property that the law of `joint` lacks.
-    pub fn law(method: &'static str, joint: &SystemJoint, misses: &'static str) -> Self {
+    pub fn law(method: &'static str, joint: &SystemJoint, missing: &'static str) -> Self {
         let (joint, law) = (joint.name().to_owned(), joint.law().name());
-        Refusal::Law { method, joint, law, misses }.into()
+        Refusal::Law { method, joint, law, missing }.into()
     }
 
     /// Returns the error that `method` needs a mass at the place with this index.
@@ -113,14 +114,14 @@ impl MethodError {
 
     /// Returns the error that `method` needs more than joints at a place, if the system has a
     /// place with joints alone.
-    pub(crate) fn empty(method: &'static str, system: &System) -> Option<Self> {
+    pub(crate) fn only_joints(method: &'static str, system: &System) -> Option<Self> {
         let mut empty: Vec<bool> = (0..system.dofs()).map(|row| system.structure().diagonal_mass(row) == 0.0).collect();
         if !empty.contains(&true) {
             return None; // every place has mass
         }
         system.structure().entries().for_each(|(row, _, _)| empty[row] = false);
         let place = system.structure().places()[empty.iter().position(|empty| *empty)?].clone();
-        Some(Refusal::Empty { method, place }.into())
+        Some(Refusal::OnlyJoints { method, place }.into())
     }
 
     /// Returns the error that the full matrices of a system are too large for `method`, if they
@@ -141,29 +142,29 @@ impl MethodError {
     }
 
     /// Returns the alternative methods; `None` if another value of an option is enough.
-    pub fn ways(&self) -> Option<&Ways> {
-        (!matches!(self.refusal, Refusal::Option { .. })).then_some(&*self.ways)
+    pub fn alternatives(&self) -> Option<&Alternatives> {
+        (!matches!(self.refusal, Refusal::Option { .. })).then_some(&*self.alternatives)
     }
 
     /// Returns the same refusal without alternative methods.
     #[must_use]
-    pub fn alone(self) -> MethodError {
+    pub fn without_alternatives(self) -> MethodError {
         self.refusal.into()
     }
 
     /// Returns the same refusal with alternative methods, unless another value of an option is
     /// enough.
     #[must_use]
-    pub fn with(self, instead: Ways) -> MethodError {
+    pub fn with_alternatives(self, instead: Alternatives) -> MethodError {
         match self.refusal {
             Refusal::Option { .. } => self,
-            refusal => MethodError { refusal, ways: Box::new(instead) },
+            refusal => MethodError { refusal, alternatives: Box::new(instead) },
         }
     }
 }
 
 impl From<Refusal> for MethodError {
     fn from(refusal: Refusal) -> Self {
-        MethodError { refusal, ways: Box::default() }
+        MethodError { refusal, alternatives: Box::default() }
     }
 }

@@ -5,47 +5,48 @@
 //!
 //! [`Method::solver`] makes a [`Solver`] for one system. The solver keeps data that it can
 //! reuse from orbit to orbit.
+//!
+//! The methods:
+//! - `event_driven/`: closed-form motion between switches
+//! - `shooting`: Newton's method on the return map of a time integration
+//! - `harmonic_balance/`: Fourier series of the joint motions
+//! - `transient`: integration until the transient has decayed
+//! - `auto`: picks one of them
+//!
+//! What they share:
+//! - `flow/`: time integrations
+//! - `orbit_search/`: initial guess, return map, evidence
+//! - `static_equilibrium`: the equilibrium under the constant loads
+//! - `alternatives`, `with_alternatives`: methods that take a system instead of one that does not
+//! - `traits`, `options`, `error`, `list`: the interface of a method
+//!
+//! `time_history` integrates a motion from given displacements, without an orbit.
 
-mod advice;
-mod assembly;
+mod alternatives;
 pub mod auto;
-mod course;
-mod drive;
 mod error;
 pub mod event_driven;
-mod evidence;
-mod exact_flow;
 mod flow;
-mod followed;
-mod guess;
 pub mod harmonic_balance;
-mod incremental;
 mod list;
-mod option;
-mod periodic;
-mod repeated;
-mod residual_traction;
+mod options;
+mod orbit_search;
 pub mod shooting;
-mod smooth;
 mod static_equilibrium;
-mod stepped;
-mod steps;
-mod switched;
 pub mod time_history;
 mod traits;
 pub mod transient;
-mod vibration;
-mod ways;
+mod with_alternatives;
 
 pub use crate::orbit::{IntegrationError, OrbitError};
-pub use advice::{advised, ways};
+pub use alternatives::Alternatives;
 pub use error::{MethodError, Refusal};
-pub use evidence::evidence_steps;
 use list::LIST;
-pub use option::{MethodOption, Options, WIDTH};
+pub use options::{MethodOption, Options, WIDTH};
+pub use orbit_search::evidence::evidence_steps;
 pub use static_equilibrium::StaticEquilibrium;
 pub use traits::{Choice, Method, MethodInfo, Solver};
-pub use ways::Ways;
+pub use with_alternatives::{alternatives, solver_with_alternatives};
 
 /// All methods: `auto` and the rows of `list.rs`.
 pub const TABLE: &[MethodInfo] = &{

@@ -5,21 +5,25 @@
 //! for the transient to decay proves nothing. Newton's method with the exact derivative of the
 //! integrator's return map closes the orbit instead.
 
-use super::assembly::{Assembly, NEAR_REST};
-use super::event_driven::MISSING_WORK;
+use super::event_driven::GAP_PER_DISTANCE;
 use super::flow::Flow;
-use super::followed::Kind;
-use super::guess::Guess;
-use super::incremental::flow::{FIRST, IncrementalFlow, MOST, estimate};
-use super::option::{PERIOD, periods, width};
-use super::periodic::{Aim, Beyond, Closed, ReturnMap, Search, approached, close, descended, newton_step, norm};
-use super::repeated::Afresh;
-use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
-use super::smooth::flow::{Lengths, SmoothFlow};
+use super::flow::assembly::{Assembly, NEAR_REST};
+use super::flow::average_acceleration::equal_steps::{AverageAccelerationFlow, INITIAL_STEPS, MAX_STEPS, estimate};
+use super::flow::integrator_choice::IntegratorKind;
+use super::flow::radau::step_size_control::{RadauFlow, StepSizes};
+use super::flow::set_valued::located_switches::SetValuedFlow;
+use super::flow::trajectory::Trajectory;
+use super::options::{PERIOD, periods, width};
+use super::orbit_search::cold_restart::ColdRestart;
+use super::orbit_search::describing_guess::DescribingGuess;
+use super::orbit_search::residual_traction::{ElasticSlider, OrbitMap, select_equilibrium_orbit};
+use super::orbit_search::return_map::{
+    ClosedState, ClosingMethod, ClosingTargets, LargeIncrease, ReturnMap, close, iterate_map, newton_step,
+    newton_with_line_search, norm,
+};
+use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
-use super::stepped::SteppedPath;
-use super::switched::flow::SwitchedFlow;
-use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH, vibration};
+use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::postprocess::{CONSERVATIVE_WORK, results};
@@ -33,10 +37,10 @@ const NAME: &str = "shooting";
 /// verification tests).
 const TOLERANCE: f64 = 1e-8;
 /// Largest ratio of successive steps that reuse the derivative of the search.
-const CLOSER: f64 = 0.3;
+const SHRINK_RATIO: f64 = 0.3;
 /// Residual of the first search. Every run chooses its own steps there, so the map is smooth
 /// only to about their error.
-const NEAR: f64 = 1e-6;
+const FREE_RESIDUAL: f64 = 1e-6;
 /// Smallest relative error per step, and residual, of the coarse search before orbits with
 /// shorter steps. Longer steps jump over the layers of a law and would still take two thirds of
 /// the time.
@@ -70,7 +74,7 @@ const COARSE: f64 = 1e-5;
 const COARSE_RETURNS: usize = 1024;
 /// Largest distance between the same orbit in steps of length h and 2h, relative to the motion.
 /// 256 steps per period have an error of 1e-3 at a Q of ten; the error is proportional to Q.
-const NEIGHBOUR: f64 = 0.1;
+const SAME_ORBIT: f64 = 0.1;
 /// Instants of a return at which such orbits are compared.
 const INSTANTS: usize = 8;
 
@@ -137,59 +141,59 @@ impl Method for Shooting {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let shooter = Shooter::new(system, *self, NAME, Search::Newton)?;
-        Ok(if self.period > 1 { Box::new(Afresh(shooter)) } else { Box::new(shooter) })
+        let shooter = ShootingSolver::new(system, *self, NAME, ClosingMethod::Newton)?;
+        Ok(if self.period > 1 { Box::new(ColdRestart(shooter)) } else { Box::new(shooter) })
     }
 }
 
 /// The time integration.
-enum Stepping {
-    Smooth(Box<SmoothFlow>),
-    Switched(Box<SwitchedFlow>),
-    Incremental(Box<IncrementalFlow>),
+enum StepIntegrator {
+    Smooth(Box<RadauFlow>),
+    Switched(Box<SetValuedFlow>),
+    Incremental(Box<AverageAccelerationFlow>),
 }
 
-impl Stepping {
+impl StepIntegrator {
     fn flow(&mut self) -> &mut dyn Flow {
         match self {
-            Stepping::Smooth(flow) => flow.as_mut(),
-            Stepping::Switched(flow) => flow.as_mut(),
-            Stepping::Incremental(flow) => flow.as_mut(),
+            StepIntegrator::Smooth(flow) => flow.as_mut(),
+            StepIntegrator::Switched(flow) => flow.as_mut(),
+            StepIntegrator::Incremental(flow) => flow.as_mut(),
         }
     }
 
     fn assembly(&self) -> &Assembly {
         match self {
-            Stepping::Smooth(flow) => &flow.assembly,
-            Stepping::Switched(flow) => &flow.assembly,
-            Stepping::Incremental(flow) => &flow.assembly,
+            StepIntegrator::Smooth(flow) => &flow.assembly,
+            StepIntegrator::Switched(flow) => &flow.assembly,
+            StepIntegrator::Incremental(flow) => &flow.assembly,
         }
     }
 
-    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> SteppedPath {
+    fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Trajectory {
         match self {
-            Stepping::Smooth(flow) => flow.stepped(system, symmetry, period),
-            Stepping::Switched(flow) => flow.stepped(system, symmetry, period),
-            Stepping::Incremental(flow) => flow.stepped(system, symmetry, period),
+            StepIntegrator::Smooth(flow) => flow.stepped(system, symmetry, period),
+            StepIntegrator::Switched(flow) => flow.stepped(system, symmetry, period),
+            StepIntegrator::Incremental(flow) => flow.stepped(system, symmetry, period),
         }
     }
 }
 
 /// Finds orbits by time integration, by Newton's method or by waiting until the motion settles.
-pub(super) struct Shooter<'a> {
+pub(super) struct ShootingSolver<'a> {
     system: &'a System,
     shared: Arc<System>,
     /// Name of the method that uses this solver.
     name: &'static str,
     /// Search and relative error per step, relative to the vibration.
-    asked: (Search, f64),
+    relative_to_vibration: (ClosingMethod, f64),
     /// Size of the vibration over the size of its states.
-    share: f64,
+    vibration_fraction: f64,
     /// Search and relative error per step, relative to the states.
-    search: Search,
+    search: ClosingMethod,
     tolerance: f64,
     periods: usize,
-    stepping: Stepping,
+    stepping: StepIntegrator,
     weights: Vec<f64>,
     omega: f64,
     duration: f64,
@@ -200,62 +204,71 @@ pub(super) struct Shooter<'a> {
     equilibrium: Option<StaticEquilibrium>,
 }
 
-impl ReturnMap for Shooter<'_> {
-    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
+impl ReturnMap for ShootingSolver<'_> {
+    fn apply(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         let duration = self.duration;
         self.stepping.flow().run(state, duration, derivative)
     }
     fn weights(&self) -> &[f64] {
         &self.weights
     }
-    fn moves(&mut self, change: f64) {
-        if let Stepping::Smooth(flow) = &mut self.stepping {
+    fn report_change(&mut self, change: f64) {
+        if let StepIntegrator::Smooth(flow) = &mut self.stepping {
             let apart = change > SETTLED * flow.tolerance;
-            flow.lengths = if apart { Lengths::Chosen } else { Lengths::Halved };
+            flow.lengths = if apart { StepSizes::Chosen } else { StepSizes::Halved };
         }
     }
 }
 
-impl Closing for Shooter<'_> {
+impl OrbitMap for ShootingSolver<'_> {
     fn springs(&self) -> Vec<ElasticSlider> {
         match &self.stepping {
-            Stepping::Smooth(_) | Stepping::Switched(_) => Vec::new(),
-            Stepping::Incremental(flow) => flow.springs(),
+            StepIntegrator::Smooth(_) | StepIntegrator::Switched(_) => Vec::new(),
+            StepIntegrator::Incremental(flow) => flow.springs(),
         }
     }
     fn limit(&mut self, springs: &[ElasticSlider]) {
-        if let Stepping::Incremental(flow) = &mut self.stepping {
+        if let StepIntegrator::Incremental(flow) = &mut self.stepping {
             flow.limit(springs);
         }
     }
-    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
+    fn finish(&mut self, closed: ClosedState) -> Result<Orbit, OrbitError> {
         self.record(&closed)?;
         let symmetry = self.search.symmetry(self.system, self.periods);
         Ok(self.orbit_of(self.omega, symmetry, closed))
     }
 }
 
-impl<'a> Shooter<'a> {
+impl<'a> ShootingSolver<'a> {
     /// # Errors
     /// Fails if no integration takes a law, or if a place has no mass.
-    pub fn new(system: &'a System, options: Shooting, name: &'static str, search: Search) -> Result<Self, MethodError> {
-        let stepping = match Kind::integrated(system, options.width) {
-            Kind::Incremental => Stepping::Incremental(Box::new(IncrementalFlow::new(system, options.width, name)?)),
-            Kind::Switched => Stepping::Switched(Box::new(SwitchedFlow::new(system, options.tolerance, name)?)),
+    pub fn new(
+        system: &'a System,
+        options: Shooting,
+        name: &'static str,
+        search: ClosingMethod,
+    ) -> Result<Self, MethodError> {
+        let stepping = match IntegratorKind::stepping(system, options.width) {
+            IntegratorKind::Incremental => {
+                StepIntegrator::Incremental(Box::new(AverageAccelerationFlow::new(system, options.width, name)?))
+            }
+            IntegratorKind::Switched => {
+                StepIntegrator::Switched(Box::new(SetValuedFlow::new(system, options.tolerance, name)?))
+            }
             // the assembly smooths exact laws if a width is given, else it refuses them
-            Kind::Smooth | Kind::Exact => {
-                let assembly = super::smooth::assembly(system, options.width, name)?;
-                Stepping::Smooth(Box::new(SmoothFlow::new(assembly, options.tolerance)))
+            IntegratorKind::Smooth | IntegratorKind::Exact => {
+                let assembly = super::flow::radau::assembly(system, options.width, name)?;
+                StepIntegrator::Smooth(Box::new(RadauFlow::new(assembly, options.tolerance)))
             }
         };
-        Ok(Shooter {
+        Ok(ShootingSolver {
             system,
             shared: Arc::new(system.clone()),
             name,
             search,
             periods: options.period,
-            asked: (search, options.tolerance),
-            share: 1.0,
+            relative_to_vibration: (search, options.tolerance),
+            vibration_fraction: 1.0,
             tolerance: options.tolerance,
             weights: vec![1.0; stepping.assembly().states()],
             stepping,
@@ -270,7 +283,7 @@ impl<'a> Shooter<'a> {
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let assembly = self.stepping.assembly();
-        let mut state = Guess::new(self.system, omega).state(assembly.n);
+        let mut state = DescribingGuess::new(self.system, omega).state(assembly.n);
         let count = assembly.states() - state.len();
         let states = states_at(self.equilibrium.as_ref(), self.system, &state[..assembly.n], count);
         state.extend(states);
@@ -278,11 +291,11 @@ impl<'a> Shooter<'a> {
     }
 
     /// Returns the orbit that the search finds.
-    fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: Aim) -> Result<Orbit, OrbitError> {
+    fn found(&mut self, start: Option<&[f64]>, symmetry: Symmetry, aim: ClosingTargets) -> Result<Orbit, OrbitError> {
         let closed = match self.stepping {
-            Stepping::Smooth(_) => self.smooth_orbit(start, aim)?,
-            Stepping::Switched(_) => self.switched_orbit(start, aim)?,
-            Stepping::Incremental(_) => self.stepped_orbit(start, aim)?,
+            StepIntegrator::Smooth(_) => self.smooth_orbit(start, aim)?,
+            StepIntegrator::Switched(_) => self.switched_orbit(start, aim)?,
+            StepIntegrator::Incremental(_) => self.stepped_orbit(start, aim)?,
         };
         Ok(self.orbit_of(aim.omega, symmetry, closed))
     }
@@ -290,7 +303,7 @@ impl<'a> Shooter<'a> {
     /// Returns the size of the vibration over the size of the state at t = 0; both are at least
     /// `rest` (√J).
     fn share_in(&self, orbit: &Orbit, rest: f64) -> f64 {
-        vibration::share(
+        vibration_share::fraction(
             orbit.path.as_ref(),
             (orbit.symmetry, orbit.period()),
             &orbit.initial_state,
@@ -298,26 +311,28 @@ impl<'a> Shooter<'a> {
         )
     }
 
-    fn broke(&self, omega: f64) -> impl Fn(IntegrationError) -> OrbitError {
+    fn breakdown_error(&self, omega: f64) -> impl Fn(IntegrationError) -> OrbitError {
         let method = self.name;
         move |cause| OrbitError::Breakdown { method, omega, cause }
     }
 
     /// Returns the error that the vibration is too small a fraction of its state to have
     /// accurate digits.
-    fn lost(&self, omega: f64, share: f64) -> OrbitError {
-        self.broke(omega)(IntegrationError::Offset { share })
+    fn too_few_digits(&self, omega: f64, share: f64) -> OrbitError {
+        self.breakdown_error(omega)(IntegrationError::Offset { share })
     }
 
     /// Finds the orbit of the stiff integration: a search, steps with the derivative of the
     /// search, and closing on fixed steps.
-    fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+    fn smooth_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
         let search = self.search;
-        self.set_lengths(Lengths::Chosen);
-        if let Search::Settle { tolerance, returns } = search {
-            let fine = self.set_tolerance(self.tolerance.max(COARSE * self.share));
-            let coarse =
-                Search::Settle { tolerance: tolerance.max(COARSE * self.share), returns: returns.min(COARSE_RETURNS) };
+        self.set_lengths(StepSizes::Chosen);
+        if let ClosingMethod::Settle { tolerance, returns } = search {
+            let fine = self.set_tolerance(self.tolerance.max(COARSE * self.vibration_fraction));
+            let coarse = ClosingMethod::Settle {
+                tolerance: tolerance.max(COARSE * self.vibration_fraction),
+                returns: returns.min(COARSE_RETURNS),
+            };
             let near = coarse.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
             self.set_tolerance(fine);
             let near = match near {
@@ -330,7 +345,7 @@ impl<'a> Shooter<'a> {
             return Ok(closed);
         }
         let mut iterations = 0;
-        let near = self.coarsely(start, aim, &mut iterations);
+        let near = self.coarse_search(start, aim, &mut iterations);
         let start = near.as_ref().map(|near| near.state.as_slice()).or(start);
         let (near, fine) = match near {
             Some(near) if near.residual <= COARSE_RESIDUAL => (near, self.long_steps() == self.tolerance),
@@ -340,7 +355,7 @@ impl<'a> Shooter<'a> {
                 (near, true)
             }
         };
-        let (mut state, mut fits) = match self.brought_near((&near, fine), aim, &mut iterations) {
+        let (mut state, mut fits) = match self.refine_on_mesh((&near, fine), aim, &mut iterations) {
             Some(state) => (state, true),
             None => (near.state, false),
         };
@@ -350,20 +365,20 @@ impl<'a> Shooter<'a> {
         loop {
             mesh += 1;
             if !fits {
-                self.set_lengths(Lengths::Chosen);
-                self.returned(&mut state.clone(), None).map_err(self.broke(aim.omega))?;
+                self.set_lengths(StepSizes::Chosen);
+                self.apply(&mut state.clone(), None).map_err(self.breakdown_error(aim.omega))?;
             }
-            self.set_lengths(Lengths::Repeated);
-            self.stepping.flow().keep(true);
-            let closed = close(self, &state, Aim { residual: CLOSED, ..aim });
-            self.stepping.flow().keep(false);
+            self.set_lengths(StepSizes::Repeated);
+            self.stepping.flow().set_recording(true);
+            let closed = close(self, &state, ClosingTargets { residual: CLOSED, ..aim });
+            self.stepping.flow().set_recording(false);
             let closed = closed?;
             iterations += closed.iterations;
             let moved: Vec<f64> = closed.state.iter().zip(&state).map(|(a, b)| a - b).collect();
             let moved = norm(&self.weights, &moved) / self.size(&closed.state, aim);
             if moved <= SETTLED * self.tolerance || (mesh == MESHES && moved <= ENERGY_GAP) {
                 // the last run was that of the closed state
-                return Ok(Closed { iterations, ..closed });
+                return Ok(ClosedState { iterations, ..closed });
             }
             if mesh == MESHES {
                 return Err(OrbitError::not_converged(NAME, aim.omega, iterations, moved));
@@ -374,8 +389,8 @@ impl<'a> Shooter<'a> {
 
     /// Finds the orbit between located switches. The return map is smooth to the error of its
     /// steps.
-    fn switched_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
-        let aim = Aim { residual: CLOSED_SWITCHED * self.share, ..aim };
+    fn switched_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
+        let aim = ClosingTargets { residual: CLOSED_SWITCHED * self.vibration_fraction, ..aim };
         let closed = self.search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
         self.record(&closed)?;
         Ok(closed)
@@ -383,17 +398,28 @@ impl<'a> Shooter<'a> {
 
     /// Returns the relative error per step of the coarse search.
     fn long_steps(&self) -> f64 {
-        self.tolerance.max(LONG_STEPS * self.share)
+        self.tolerance.max(LONG_STEPS * self.vibration_fraction)
     }
 
     /// Approaches the orbit with long steps; returns `None` if they fail.
-    fn coarsely(&mut self, start: Option<&[f64]>, aim: Aim, iterations: &mut usize) -> Option<Closed> {
+    fn coarse_search(
+        &mut self,
+        start: Option<&[f64]>,
+        aim: ClosingTargets,
+        iterations: &mut usize,
+    ) -> Option<ClosedState> {
         let first = match start.filter(|state| state.len() == self.weights.len()) {
             Some(start) => start.to_vec(),
             None => self.first_state(aim.omega),
         };
         let fine = self.set_tolerance(self.long_steps());
-        let near = descended(self, &first, Aim { residual: COARSE_RESIDUAL, ..aim }, Beyond::Ends, iterations);
+        let near = newton_with_line_search(
+            self,
+            &first,
+            ClosingTargets { residual: COARSE_RESIDUAL, ..aim },
+            LargeIncrease::Ends,
+            iterations,
+        );
         self.set_tolerance(fine);
         near.ok()
     }
@@ -403,7 +429,12 @@ impl<'a> Shooter<'a> {
     /// It reuses the derivative of the search; its runs carry none. If the search was `fine`,
     /// the last run of the search is the first of these. Returns `None` if the steps do not
     /// shrink fast enough.
-    fn brought_near(&mut self, (near, fine): (&Closed, bool), aim: Aim, iterations: &mut usize) -> Option<Vec<f64>> {
+    fn refine_on_mesh(
+        &mut self,
+        (near, fine): (&ClosedState, bool),
+        aim: ClosingTargets,
+        iterations: &mut usize,
+    ) -> Option<Vec<f64>> {
         let (mut state, mut before) = (near.state.clone(), f64::INFINITY);
         let mut known = fine.then(|| near.gap.clone());
         for _ in 0..MESHES {
@@ -412,7 +443,7 @@ impl<'a> Shooter<'a> {
                 Some(gap) => gap,
                 None => {
                     let mut end = state.clone();
-                    self.returned(&mut end, None).ok()?;
+                    self.apply(&mut end, None).ok()?;
                     DVector::from_fn(state.len(), |i, _| state[i] - aim.sign * end[i])
                 }
             };
@@ -422,7 +453,7 @@ impl<'a> Shooter<'a> {
             if moved <= SETTLED * self.tolerance {
                 return Some(state);
             }
-            if moved.is_nan() || moved > CLOSER * before {
+            if moved.is_nan() || moved > SHRINK_RATIO * before {
                 return None;
             }
             before = moved;
@@ -431,20 +462,20 @@ impl<'a> Shooter<'a> {
     }
 
     /// Returns the energy norm of a state, at least that of rest.
-    fn size(&self, state: &[f64], aim: Aim) -> f64 {
+    fn size(&self, state: &[f64], aim: ClosingTargets) -> f64 {
         norm(&self.weights, state).max(aim.rest).max(f64::MIN_POSITIVE)
     }
 
     /// Runs from a closed state and records the motion.
-    fn record(&mut self, closed: &Closed) -> Result<(), OrbitError> {
-        self.stepping.flow().keep(true);
-        let kept = self.returned(&mut closed.state.clone(), None);
-        self.stepping.flow().keep(false);
-        kept.map_err(self.broke(self.omega))
+    fn record(&mut self, closed: &ClosedState) -> Result<(), OrbitError> {
+        self.stepping.flow().set_recording(true);
+        let kept = self.apply(&mut closed.state.clone(), None);
+        self.stepping.flow().set_recording(false);
+        kept.map_err(self.breakdown_error(self.omega))
     }
 
-    fn set_lengths(&mut self, lengths: Lengths) {
-        if let Stepping::Smooth(flow) = &mut self.stepping {
+    fn set_lengths(&mut self, lengths: StepSizes) {
+        if let StepIntegrator::Smooth(flow) = &mut self.stepping {
             flow.lengths = lengths;
         }
     }
@@ -452,32 +483,32 @@ impl<'a> Shooter<'a> {
     /// Sets the relative error per step and returns the old one.
     fn set_tolerance(&mut self, tolerance: f64) -> f64 {
         match &mut self.stepping {
-            Stepping::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
-            Stepping::Switched(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
-            Stepping::Incremental(_) => self.tolerance,
+            StepIntegrator::Smooth(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
+            StepIntegrator::Switched(flow) => std::mem::replace(&mut flow.tolerance, tolerance),
+            StepIntegrator::Incremental(_) => self.tolerance,
         }
     }
 
     /// Sets the vibration's fraction of the size of its states.
     fn set_share(&mut self, share: f64) {
-        let (search, tolerance) = self.asked;
-        (self.share, self.search, self.tolerance) = (share, search.of_share(share), share * tolerance);
+        let (search, tolerance) = self.relative_to_vibration;
+        (self.vibration_fraction, self.search, self.tolerance) = (share, search.of_share(share), share * tolerance);
         self.set_tolerance(self.tolerance);
     }
 
     fn set_count(&mut self, count: usize) {
-        if let Stepping::Incremental(flow) = &mut self.stepping {
+        if let StepIntegrator::Incremental(flow) = &mut self.stepping {
             flow.count = count;
         }
     }
 
     /// Finds the orbit in equal steps, and halves the steps until the estimated error is below
     /// the tolerance.
-    fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: Aim) -> Result<Closed, OrbitError> {
+    fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
         let tolerance = EQUAL_STEPS * self.tolerance;
-        let aim = Aim { residual: CLOSED_STEPS, ..aim };
+        let aim = ClosingTargets { residual: CLOSED_STEPS, ..aim };
         let search = self.search;
-        let mut count = FIRST * self.periods;
+        let mut count = INITIAL_STEPS * self.periods;
         self.set_count(count);
         // steps too long for the states of a law are not a failure: halve them
         let mut coarse = loop {
@@ -485,7 +516,7 @@ impl<'a> Shooter<'a> {
                 Err(OrbitError::Breakdown {
                     cause: IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. },
                     ..
-                }) if count < MOST => {
+                }) if count < MAX_STEPS => {
                     count *= 2;
                     self.set_count(count);
                 }
@@ -502,19 +533,19 @@ impl<'a> Shooter<'a> {
                 None => search.find(self, Some(&state), |shooter| shooter.first_state(aim.omega), aim)?,
             };
             let finer = self.instants(&fine)?;
-            let apart = motion.iter().zip(&finer).map(|(before, now)| self.apart(now, before, aim));
-            let last = apart.fold(self.apart(&fine.state, &coarse.state, aim), f64::max);
+            let apart = motion.iter().zip(&finer).map(|(before, now)| self.relative_distance(now, before, aim));
+            let last = apart.fold(self.relative_distance(&fine.state, &coarse.state, aim), f64::max);
             let error = estimate(earlier, last);
             let iterations = coarse.iterations + fine.iterations;
             if error <= tolerance {
-                let missing = Some(error.max(fine.missing.unwrap_or(0.0)));
-                return Ok(Closed { iterations, missing, ..fine });
+                let missing = Some(error.max(fine.distance.unwrap_or(0.0)));
+                return Ok(ClosedState { iterations, distance: missing, ..fine });
             }
-            if count >= MOST {
+            if count >= MAX_STEPS {
                 let cause = IntegrationError::Unresolved { steps: count, estimate: error, tolerance };
                 return Err(OrbitError::Breakdown { method: self.name, omega: aim.omega, cause });
             }
-            (earlier, motion, coarse) = (Some(last), finer, Closed { iterations, ..fine });
+            (earlier, motion, coarse) = (Some(last), finer, ClosedState { iterations, ..fine });
         }
     }
 
@@ -523,7 +554,7 @@ impl<'a> Shooter<'a> {
     ///
     /// With the free offset of a stuck contact, two different motions may begin with equal
     /// states.
-    fn instants(&mut self, closed: &Closed) -> Result<Vec<Vec<f64>>, OrbitError> {
+    fn instants(&mut self, closed: &ClosedState) -> Result<Vec<Vec<f64>>, OrbitError> {
         self.record(closed)?;
         let path = self.stepping.path(&self.shared, Symmetry::FullPeriod, self.duration);
         let at = |k: usize| {
@@ -535,23 +566,23 @@ impl<'a> Shooter<'a> {
 
     /// Finds the settled orbit in finer steps by Newton's method; returns `None` if that fails
     /// or leads to another orbit.
-    fn refined(&mut self, settled: &Closed, aim: Aim) -> Option<Closed> {
-        if self.search == Search::Newton {
+    fn refined(&mut self, settled: &ClosedState, aim: ClosingTargets) -> Option<ClosedState> {
+        if self.search == ClosingMethod::Newton {
             return None;
         }
         let fine = close(self, &settled.state, aim).ok()?;
-        (self.apart(&fine.state, &settled.state, aim) <= NEIGHBOUR).then_some(fine)
+        (self.relative_distance(&fine.state, &settled.state, aim) <= SAME_ORBIT).then_some(fine)
     }
 
     /// Returns the distance of two states, or of their displacements and velocities, relative
     /// to the first.
-    fn apart(&self, state: &[f64], other: &[f64], aim: Aim) -> f64 {
+    fn relative_distance(&self, state: &[f64], other: &[f64], aim: ClosingTargets) -> f64 {
         let change: Vec<f64> = state.iter().zip(other).map(|(a, b)| a - b).collect();
         norm(&self.weights, &change) / self.size(state, aim)
     }
 
     /// Makes the orbit from its last recorded run.
-    fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: Closed) -> Orbit {
+    fn orbit_of(&self, omega: f64, symmetry: Symmetry, closed: ClosedState) -> Orbit {
         let period = self.periods as f64 * std::f64::consts::TAU / omega;
         let path = self.stepping.path(&self.shared, symmetry, period);
         let Ok(measured) = results(self.system, &path, omega, (symmetry, period));
@@ -575,7 +606,7 @@ impl<'a> Shooter<'a> {
                 switches: measured.joints.iter().map(|joint| joint.switches).sum(),
                 iterations: closed.iterations,
                 harmonics: None,
-                error_estimate: closed.missing,
+                error_estimate: closed.distance,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),
                 history_dependent: history_dependent_joints(laws, &measured.joints, &measured.stuck, symmetry),
@@ -594,61 +625,65 @@ impl<'a> Shooter<'a> {
     }
 }
 
-impl Solver for Shooter<'_> {
+impl Solver for ShootingSolver<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
         let flow = self.stepping.flow();
-        flow.set_drive(self.system, omega);
+        flow.set_excitation(self.system, omega);
         self.weights = flow.weights();
         let rest = NEAR_REST * flow.energy_scale();
         self.rest = rest;
         let flow = self.stepping.flow();
-        flow.keep(false);
+        flow.set_recording(false);
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
-        let aim = Aim { method: self.name, omega, residual: NEAR, distance: f64::INFINITY, sign, rest };
+        let aim =
+            ClosingTargets { method: self.name, omega, residual: FREE_RESIDUAL, distance: f64::INFINITY, sign, rest };
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
-            self.set_lengths(Lengths::Chosen);
-            self.set_count(FIRST * self.periods);
+            self.set_lengths(StepSizes::Chosen);
+            self.set_count(INITIAL_STEPS * self.periods);
             let first = self.first_state(omega);
-            near = approached(self, first, sign);
+            near = iterate_map(self, first, sign);
             Some(near.as_slice())
         } else {
             known
         };
         // neighbouring orbits have almost the same fraction of vibration
-        self.set_share(if known.is_some() { self.share } else { 1.0 });
+        self.set_share(if known.is_some() { self.vibration_fraction } else { 1.0 });
         let mut orbit = match self.found(start, symmetry, aim) {
             // the neighbour's fraction may be too small for this orbit
-            Err(_) if self.share < 1.0 => {
+            Err(_) if self.vibration_fraction < 1.0 => {
                 self.set_share(1.0);
                 self.found(start, symmetry, aim)?
             }
             found => found?,
         };
-        while let Some(share) = vibration::next(self.share, self.share_in(&orbit, rest)).map_err(self.broke(omega))? {
+        while let Some(share) = vibration_share::next_fraction(self.vibration_fraction, self.share_in(&orbit, rest))
+            .map_err(self.breakdown_error(omega))?
+        {
             self.set_share(share);
             // an orbit accurate as a state but not as a vibration has too few digits
-            orbit = self.found(Some(&orbit.initial_state), symmetry, aim).map_err(|_| self.lost(omega, share))?;
+            orbit =
+                self.found(Some(&orbit.initial_state), symmetry, aim).map_err(|_| self.too_few_digits(omega, share))?;
         }
-        if self.search == Search::Newton {
+        if self.search == ClosingMethod::Newton {
             let system = self.system;
             let equilibrium = self.equilibrium.clone();
-            let aim = Aim { residual: CLOSED_STEPS, ..aim };
-            orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
+            let aim = ClosingTargets { residual: CLOSED_STEPS, ..aim };
+            orbit = select_equilibrium_orbit(self, (system, equilibrium.as_ref()), orbit, aim);
         }
         let share = self.share_in(&orbit, rest);
-        vibration::relate(&mut orbit.evidence, share);
-        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.error_estimate.unwrap_or(0.0);
+        vibration_share::rescale_evidence(&mut orbit.evidence, share);
+        let allowed = ENERGY_GAP + GAP_PER_DISTANCE * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
-            if share < vibration::SMALL {
-                return Err(self.lost(omega, share));
+            if share < vibration_share::SMALL {
+                return Err(self.too_few_digits(omega, share));
             }
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });
         }

@@ -8,8 +8,8 @@
 //! vibration then begins from there. A slider that the vibration does not move stays where the
 //! ramp left it; another slider moves only as far as necessary.
 
+use super::flow::average_acceleration::law_step;
 use super::harmonic_balance;
-use super::incremental::law;
 use crate::law::{IdealElement, Law, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -109,7 +109,7 @@ pub(crate) fn states_at(
     let mut states = Vec::with_capacity(count);
     for joint in system.joints() {
         let axes = joint.axes();
-        let Some((own, scale)) = law::states(joint.law()) else { continue };
+        let Some((own, scale)) = law_step::states(joint.law()) else { continue };
         let along = |x: &[f64], vibrates: bool| -> [f64; MAX_DIRECTIONS] {
             std::array::from_fn(|a| {
                 let Some(axis) = axes.get(a) else { return 0.0 };
@@ -121,7 +121,7 @@ pub(crate) fn states_at(
         let first = states.len();
         let before = known.get(first..first + own).map_or_else(|| vec![0.0; own], <[f64]>::to_vec);
         let to = along(displacement, true);
-        states.extend(law::moved(joint.law(), (axes.len(), scale), (from, &before), to));
+        states.extend(law_step::states_after_motion(joint.law(), (axes.len(), scale), (from, &before), to));
     }
     if states.len() == count { states } else { vec![0.0; count] }
 }

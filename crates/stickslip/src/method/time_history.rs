@@ -6,7 +6,8 @@
 //! in a stepped-sine test.
 
 use super::flow::Flow;
-use super::{IntegrationError, MethodError, followed, ways};
+use super::flow::integrator_choice;
+use super::{IntegrationError, MethodError, alternatives};
 use crate::model::System;
 use crate::orbit::{Path, Sample, Symmetry};
 use std::f64::consts::TAU;
@@ -17,7 +18,7 @@ const NAME: &str = "transient";
 /// Relative error per step for smooth laws.
 const TOLERANCE: f64 = 1e-9;
 /// Samples per interval of a free decay.
-const STRETCH: usize = 64;
+const SAMPLES_PER_INTERVAL: usize = 64;
 
 /// The excitation of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,11 +81,11 @@ fn good(last: Option<f64>) -> String {
 
 /// Most attempts to recompute an interval in which the motion broke down. Each attempt ends
 /// where the last one broke down, or at half of its length if the cause names no time. This is
-/// enough to find one of [`STRETCH`] samples.
-const SHORTENED: usize = 6;
+/// enough to find one of [`SAMPLES_PER_INTERVAL`] samples.
+const RECOMPUTE_ATTEMPTS: usize = 6;
 
 /// The motion in an interval that starts at `begin` (s).
-struct Stretch {
+struct TimeInterval {
     begin: f64,
     length: f64,
     /// Index of its last sample, if it has one.
@@ -93,7 +94,7 @@ struct Stretch {
 }
 
 /// A sample of the motion, and the motion since the previous sample.
-pub struct Instant<'a> {
+pub struct TimeSample<'a> {
     /// Time, s.
     pub time: f64,
     /// Excitation frequency, rad/s; zero if free.
@@ -102,10 +103,10 @@ pub struct Instant<'a> {
     pub state: &'a Sample,
     /// Returns the state at any time (s) between the previous sample and this one, from the
     /// computed motion.
-    pub since: &'a dyn Fn(f64) -> Sample,
+    pub between: &'a dyn Fn(f64) -> Sample,
 }
 
-impl Stretch {
+impl TimeInterval {
     /// Returns the state at a time of this interval, s.
     fn at(&self, time: f64) -> Sample {
         self.path.sample((time - self.begin).clamp(0.0, self.length))
@@ -153,10 +154,14 @@ impl TimeHistory {
     ///
     /// # Errors
     /// Same as [`TimeHistory::run`].
-    pub fn visit(&self, system: &System, visitor: &mut dyn FnMut(Instant<'_>) -> bool) -> Result<(), TimeHistoryError> {
+    pub fn visit(
+        &self,
+        system: &System,
+        visitor: &mut dyn FnMut(TimeSample<'_>) -> bool,
+    ) -> Result<(), TimeHistoryError> {
         let shared = Arc::new(system.clone());
         let mut flow = TimeHistory::flow(system, self.width)?;
-        flow.keep(true);
+        flow.set_recording(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         if state.len() + self.states.len() == flow.states() {
             state.extend(&self.states);
@@ -164,25 +169,27 @@ impl TimeHistory {
         state.resize(flow.states(), 0.0);
         let mut begin = 0.0;
         let mut next = 0usize; // index of the next sample
-        let mut before: Option<Stretch> = None;
+        let mut before: Option<TimeInterval> = None;
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             let omega = self.frequency(begin);
-            let length = if omega > 0.0 { TAU / omega } else { STRETCH as f64 * self.step };
+            let length = if omega > 0.0 { TAU / omega } else { SAMPLES_PER_INTERVAL as f64 * self.step };
             // shorten a cycle that outlasts the motion
             let length = if length > self.duration { self.duration + self.step } else { length };
-            flow.set_drive(system, omega);
+            flow.set_excitation(system, omega);
             let start = state.clone();
-            let followed = flow.follow(&mut state, length);
+            let followed = flow.run_accurately(&mut state, length);
             let end = begin + length;
             let inside = (next..=samples).take_while(|i| (*i as f64 * self.step) < end);
             let whole = inside.last();
             let stretch = match &followed {
                 Ok(()) => {
                     let path = flow.path(&shared, Symmetry::FullPeriod, length);
-                    Some(Stretch { begin, length, last: whole, path })
+                    Some(TimeInterval { begin, length, last: whole, path })
                 }
-                Err(cause) => whole.and_then(|last| self.before(&shared, &start, (begin, next, last), cause)),
+                Err(cause) => {
+                    whole.and_then(|last| self.recompute_before_breakdown(&shared, &start, (begin, next, last), cause))
+                }
             };
             if let Some(stretch) = stretch {
                 while stretch.last.is_some_and(|last| next <= last) {
@@ -191,7 +198,7 @@ impl TimeHistory {
                         Some(before) if time < stretch.begin => before.at(time),
                         _ => stretch.at(time),
                     };
-                    if !visitor(Instant { time, omega, state: &stretch.at(time), since: &since }) {
+                    if !visitor(TimeSample { time, omega, state: &stretch.at(time), between: &since }) {
                         return Ok(());
                     }
                     next += 1;
@@ -211,28 +218,28 @@ impl TimeHistory {
     ///
     /// The interval begins at `begin` from the state `start` and has the samples `first` to
     /// `last`. Returns `None` if it has no motion or no sample before the breakdown.
-    fn before(
+    fn recompute_before_breakdown(
         &self,
         system: &Arc<System>,
         start: &[f64],
         (begin, first, mut last): (f64, usize, usize),
         cause: &IntegrationError,
-    ) -> Option<Stretch> {
+    ) -> Option<TimeInterval> {
         let since = |sample: usize| sample as f64 * self.step - begin;
         let mut cause = cause.clone();
-        for _ in 0..SHORTENED {
+        for _ in 0..RECOMPUTE_ATTEMPTS {
             let reached = cause.time().unwrap_or(0.5 * since(last + 1));
             last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
             // a sample at the very start needs a short motion behind it
             let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
             // a new flow, without memory of the failed attempt
             let mut flow = TimeHistory::flow(system, self.width).ok()?;
-            flow.keep(true);
-            flow.set_drive(system, self.frequency(begin));
-            match flow.follow(&mut start.to_vec(), length) {
+            flow.set_recording(true);
+            flow.set_excitation(system, self.frequency(begin));
+            match flow.run_accurately(&mut start.to_vec(), length) {
                 Ok(()) => {
                     let path = flow.path(system, Symmetry::FullPeriod, length);
-                    return Some(Stretch { begin, length, last: Some(last), path });
+                    return Some(TimeInterval { begin, length, last: Some(last), path });
                 }
                 Err(again) => cause = again,
             }
@@ -250,7 +257,8 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        followed::of(system, width, TOLERANCE, NAME).map_err(|error| error.with(ways(system)))
+        integrator_choice::integrator(system, width, TOLERANCE, NAME)
+            .map_err(|error| error.with_alternatives(alternatives(system)))
     }
 
     /// Returns the excitation frequency of the cycle that begins at `time`.

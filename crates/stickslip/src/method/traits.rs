@@ -20,8 +20,8 @@ pub trait Method: Send + Sync + std::fmt::Debug {
     }
     /// Makes the solver for one system.
     ///
-    /// [`advised`](super::advised) makes the same solver, with errors that name alternative
-    /// methods.
+    /// [`solver_with_alternatives`](super::solver_with_alternatives) makes the same solver, with
+    /// errors that name alternative methods.
     ///
     /// # Errors
     /// Returns [`MethodError`] if the method cannot take the system. The error names the joint
@@ -64,7 +64,7 @@ pub trait Solver {
     ///
     /// # Errors
     /// Same as [`Solver::orbit`].
-    fn between(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         self.orbit(omega, start)
     }
 
@@ -72,13 +72,13 @@ pub trait Solver {
     ///
     /// Methods that do not count work return zero. A search through many orbits stops by this
     /// number, not by the clock, so its result does not depend on the machine.
-    fn effort(&self) -> f64 {
+    fn work_fraction(&self) -> f64 {
         0.0
     }
 
     /// Announces that the next searches continue along the branch of the orbit with the state
     /// `start` at the frequency `omega` (rad/s).
-    fn begin_at(&mut self, _omega: f64, _start: &[f64]) {}
+    fn begin_branch(&mut self, _omega: f64, _start: &[f64]) {}
 }
 
 /// A row of the table of methods.

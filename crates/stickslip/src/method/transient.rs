@@ -9,11 +9,11 @@
 //! The motion itself selects the orbit, so the method is an independent check of the others. In
 //! equal steps, Newton's method then finds the same orbit in finer steps.
 
-use super::event_driven::Exact;
-use super::followed::Kind;
-use super::option::{PERIOD, periods, width};
-use super::periodic::Search;
-use super::shooting::{Shooter, Shooting};
+use super::event_driven::ExactSolver;
+use super::flow::integrator_choice::IntegratorKind;
+use super::options::{PERIOD, periods, width};
+use super::orbit_search::return_map::ClosingMethod;
+use super::shooting::{Shooting, ShootingSolver};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver, WIDTH};
 use crate::dimension::Dimension;
 use crate::model::System;
@@ -97,11 +97,11 @@ impl Method for Transient {
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let returns = self.periods.div_ceil(self.period);
-        let search = Search::Settle { tolerance: self.tolerance, returns };
-        if Kind::of(system, self.width) == Kind::Exact {
-            return Ok(Box::new(Exact::new(system, NAME, search, self.period)?));
+        let search = ClosingMethod::Settle { tolerance: self.tolerance, returns };
+        if IntegratorKind::of(system, self.width) == IntegratorKind::Exact {
+            return Ok(Box::new(ExactSolver::new(system, NAME, search, self.period)?));
         }
         let options = Shooting { width: self.width, period: self.period, ..Shooting::default() };
-        Ok(Box::new(Shooter::new(system, options, NAME, search)?))
+        Ok(Box::new(ShootingSolver::new(system, options, NAME, search)?))
     }
 }

@@ -689,7 +689,7 @@ impl CostInputs<'_> {
     /// Returns the time of one event-driven orbit, s.
     fn events(&self) -> f64 {
         let counted = MULTIPLICATION_SECONDS * event_driven::orbit_work(self.system()).unwrap_or(0.0);
-        let far = event_driven::ALONE * counted;
+        let far = event_driven::COLD_START_FACTOR * counted;
         let usual = if self.is_dense(NEAR_WIDTHS) { counted } else { far };
         self.pace.select(EVENT_DRIVEN.0 + usual, EVENT_DRIVEN.1 + WAITING_FACTOR * far)
     }
@@ -787,7 +787,7 @@ impl CostInputs<'_> {
         let longest = longest.min(MAX_HARMONICS);
         let each = self.pace.select(RIGID_STEPS_PER_HARMONIC.0, RIGID_STEPS_PER_HARMONIC.1);
         let sought = each * harmonic_balance::doubling_work(system, longest);
-        MULTIPLICATION_SECONDS * sought.min(harmonic_balance::most_work(system))
+        MULTIPLICATION_SECONDS * sought.min(harmonic_balance::point_work_limit(system))
     }
 
     /// Returns the time of laws with memory in a model with rigid planar friction, s.

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::curve::sweep::BLOCK;
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Method, MethodError, Options, Refusal, WIDTH, Ways};
+use stickslip::method::{self, Alternatives, Method, MethodError, Options, Refusal, WIDTH};
 use stickslip::model::System;
 
 /// Units per thread that may be in progress or wait to be joined. The number keeps all threads
@@ -77,7 +77,9 @@ impl PreparedCase {
         let method = (row.build)(&case.method.options).map_err(|error| refusal_at_location(study, &case, &error))?;
         let system =
             case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
-        let refuse = |error: MethodError| refusal_at_location(study, &case, &error.with(method::ways(&system)));
+        let refuse = |error: MethodError| {
+            refusal_at_location(study, &case, &error.with_alternatives(method::alternatives(&system)))
+        };
         if study.kind().uses_method {
             method.solver(&system).map_err(refuse)?;
         }
@@ -90,18 +92,20 @@ impl PreparedCase {
 pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodError) -> StudyError {
     let model = &case.model;
     // the first case is prepared first, so a later refusal depends on the case and names it
-    let refusal = error.clone().alone();
+    let refusal = error.clone().without_alternatives();
     let message = match case.index {
         0 => refusal.to_string(),
         index => format!("{refusal} ({})", study.case_words(index)),
     };
-    let help = error.ways().map(|ways| refusal_advice(study, case, ways));
+    let help = error.alternatives().map(|ways| refusal_advice(study, case, ways));
     match &error.refusal {
         Refusal::Law { joint, .. } => {
             let index = model.joints.iter().position(|j| j.name == *joint).unwrap_or(0);
             study.error_at("joint", index, "law", message, help)
         }
-        Refusal::NeedsMass { place, .. } | Refusal::Empty { place, .. } | Refusal::Light { place, .. } => {
+        Refusal::NeedsMass { place, .. }
+        | Refusal::OnlyJoints { place, .. }
+        | Refusal::NegligibleMass { place, .. } => {
             let mass = model.masses.iter().position(|mass| mass.places().contains(place)).map(|at| ("mass", at));
             let body = || model.bodies.iter().position(|body| body.places().contains(place)).map(|at| ("body", at));
             match mass.or_else(body) {
@@ -122,7 +126,7 @@ pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodErro
 const TRIAL_WIDTH: f64 = 1e-3;
 
 /// Returns the advice for a refused model. A kind that uses no method cannot take another one.
-fn refusal_advice(study: &Study, case: &Case, ways: &Ways) -> String {
+fn refusal_advice(study: &Study, case: &Case, ways: &Alternatives) -> String {
     let kind = study.kind();
     if kind.uses_method || !ways.any() {
         return ways.to_string();

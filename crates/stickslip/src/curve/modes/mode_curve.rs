@@ -1,7 +1,7 @@
 //! Arc-length continuation of a nonlinear mode from large amplitudes, and evaluation of its
 //! motions.
 
-use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep as Step};
+use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep};
 use std::convert::Infallible;
 use stickslip_numerics::golden_section::golden_section;
 
@@ -114,8 +114,8 @@ const FEW_ITERATIONS: usize = 8;
 /// Fractions of a decade in amplitude by which a leap skips a part of the curve that cannot be
 /// followed.
 const LEAPS: [f64; 6] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.7];
-/// Rigidity of the shape, see [`ModeEquations::rigidity`], below which two modes count as
-/// merging. In the blade couple it falls to 0.3 with one harmonic, to 0.03 with 15 and to 0.1
+/// Rigidity of the shape, see [`ModeEquations::phase_collinearity`], below which two modes count
+/// as merging. In the blade couple it falls to 0.3 with one harmonic, to 0.03 with 15 and to 0.1
 /// with 31. The three cases connect the modes differently.
 const MERGING: f64 = 1.0 / 3.0;
 /// Number of short steps from a computed state to a nearby amplitude, if a single step fails.
@@ -142,28 +142,29 @@ impl ModeCurve {
     /// follows it up to `high` as well.
     pub(super) fn follow(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Self {
         let modes = equations.linear_modes();
-        let begun = equations.marched();
+        let begun = equations.time_steps();
         let none = |linear| {
             let ended = ModeEnd { at: f64::INFINITY, reason: ModeEndCause::NoStart };
             ModeCurve { linear, arcs: Vec::new(), sticks: false, ended: Some(ended) }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
-        let faint = equations.faint(&modes, index, FRICTION_RATIO, SEPARATION_RATIO);
+        let faint = equations.weak_friction_amplitude(&modes, index, FRICTION_RATIO, SEPARATION_RATIO);
         // without friction, any amplitude serves
         let faint = if faint > 0.0 { faint } else { low };
         // If the joints of a pair of modes are not alike, a travelling wave is not a motion. The
         // standing shape is then tried.
         let shapes = [Some(linear.clone()), linear.standing()];
         let start = shapes.into_iter().flatten().find_map(|linear| {
-            equations.mixes = linear.stands.is_some();
+            equations.may_be_singular = linear.standing_mode.is_some();
             let start = START_FACTORS.iter().find_map(|factor| {
-                if equations.marched() - begun > MEMORY_WORK {
+                if equations.time_steps() - begun > MEMORY_WORK {
                     return None;
                 }
                 let amplitude = factor * faint;
-                let guess = equations.linear(&linear, amplitude)?;
+                let guess = equations.linear_state(&linear, amplitude)?;
                 let state = equations.solve(&guess, amplitude, amplitude)?;
-                (equations.assurance(&guess, &state) >= MIN_MAC).then(|| equations.begin(&state, amplitude))?
+                (equations.modal_assurance(&guess, &state) >= MIN_MAC)
+                    .then(|| equations.start_curve(&state, amplitude))?
             });
             Some((linear, start?))
         });
@@ -196,7 +197,7 @@ impl ModeCurve {
                     path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::Overdamped });
                     return path;
                 }
-                _ if equations.marched() - begun > MEMORY_WORK => {
+                _ if equations.time_steps() - begun > MEMORY_WORK => {
                     path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::WorkLimit });
                     return path;
                 }
@@ -238,10 +239,11 @@ impl ModeCurve {
         index: usize,
         (low, high): (f64, f64),
     ) -> Option<Self> {
-        equations.mixes = false;
-        let guess = equations.at_rest(index, low)?;
-        let state = equations.solve(&guess, low, low).filter(|state| equations.assurance(&guess, state) >= MIN_MAC)?;
-        let start = equations.begin(&state, low)?;
+        equations.may_be_singular = false;
+        let guess = equations.small_amplitude_mode(index, low)?;
+        let state =
+            equations.solve(&guess, low, low).filter(|state| equations.modal_assurance(&guess, state) >= MIN_MAC)?;
+        let start = equations.start_curve(&state, low)?;
         let mut arcs = follow_upwards(equations, &start, high);
         arcs.push(start);
         Some(ModeCurve { linear: None, arcs, sticks: false, ended: None })
@@ -254,7 +256,7 @@ impl ModeCurve {
 
     /// Tells whether the mode is one of the two travelling waves of a pair.
     pub(super) fn travels(&self) -> bool {
-        self.linear.as_ref().is_some_and(|linear| linear.stands.is_some())
+        self.linear.as_ref().is_some_and(|linear| linear.standing_mode.is_some())
     }
 
     /// Returns the smallest amplitude on the curve.
@@ -269,9 +271,9 @@ impl ModeCurve {
     pub(super) fn state_at(&self, equations: &mut ModeEquations<'_>, a: f64) -> Option<ModeState> {
         let first = self.arcs.first()?;
         if a >= first.amplitude {
-            let guess = equations.linear(self.linear.as_ref()?, a)?;
+            let guess = equations.linear_state(self.linear.as_ref()?, a)?;
             let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
-            return (equations.assurance(&guess, &found) >= MIN_MAC).then_some(found);
+            return (equations.modal_assurance(&guess, &found) >= MIN_MAC).then_some(found);
         }
         // A branch from small amplitudes begins at a requested amplitude.
         if let Some(last) = self.arcs.last().filter(|last| last.amplitude == a) {
@@ -281,7 +283,7 @@ impl ModeCurve {
             let last = self.arcs.last().filter(|_| self.sticks)?;
             return Some(equations.scaled(&last.state, a / last.amplitude));
         };
-        let guess = pair[0].between(&pair[1], a);
+        let guess = pair[0].interpolated(&pair[1], a);
         let room = equations.distance(&pair[0], &pair[1].state, pair[1].amplitude);
         let near = |equations: &mut ModeEquations<'_>, from: &ModeState, before: f64| {
             let found = equations.solve(from, before, a)?;
@@ -372,7 +374,7 @@ impl ModeCurve {
         }
         let mut least: Option<(f64, f64)> = None;
         for arc in &self.arcs {
-            let rigidity = equations.rigidity(&arc.state);
+            let rigidity = equations.phase_collinearity(&arc.state);
             if rigidity >= MERGING {
                 merges.extend(least.take().map(|(_, at)| at));
             } else if least.is_none_or(|(before, _)| rigidity < before) {
@@ -403,13 +405,13 @@ impl ModeCurve {
 }
 
 /// Takes a step. `None` if the corrector fails or leaves the curve.
-fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<Step> {
+fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<ModeStep> {
     let step = equations.step(now, length, length < CORNER)?;
-    let smooth = step.off <= MAX_PREDICTOR_ERROR * length
-        && step.straight >= MIN_TANGENT_COSINE
-        && step.to.side * now.side >= 0.0;
-    let corner = length < CORNER && step.off <= MAX_CORNER * length + GAP;
-    ((smooth || corner) && equations.assurance(&now.state, &step.to.state) >= MIN_MAC).then_some(step)
+    let smooth = step.predictor_distance <= MAX_PREDICTOR_ERROR * length
+        && step.tangent_cosine >= MIN_TANGENT_COSINE
+        && step.to.determinant_sign * now.determinant_sign >= 0.0;
+    let corner = length < CORNER && step.predictor_distance <= MAX_CORNER * length + GAP;
+    ((smooth || corner) && equations.modal_assurance(&now.state, &step.to.state) >= MIN_MAC).then_some(step)
 }
 
 /// Follows the curve upwards from `start` to `high`, or until no step succeeds. Returns the
@@ -417,7 +419,7 @@ fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Op
 /// because the linear mode is then not a useful initial guess.
 fn follow_upwards(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
     let mut arcs = Vec::new();
-    let (mut now, mut length, mut creeping, begun) = (start.reversed(), INITIAL_STEP, 0, equations.marched());
+    let (mut now, mut length, mut creeping, begun) = (start.reversed(), INITIAL_STEP, 0, equations.time_steps());
     for _ in 0..MAX_STEPS {
         if now.amplitude > high || length <= MIN_STEP {
             break;
@@ -425,7 +427,7 @@ fn follow_upwards(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64)
         if now.state.damping > OVERDAMPED {
             creeping += equations.resolution();
         }
-        if creeping > OVERDAMPED_WORK || equations.marched() - begun > MEMORY_WORK {
+        if creeping > OVERDAMPED_WORK || equations.time_steps() - begun > MEMORY_WORK {
             break;
         }
         match try_step(equations, &now, length) {
@@ -449,6 +451,6 @@ fn leap(equations: &mut ModeEquations<'_>, now: &ModeArc) -> Option<ModeArc> {
     LEAPS.iter().find_map(|part| {
         let amplitude = now.amplitude * 10f64.powf(-part);
         let state = equations.solve(&now.state, now.amplitude, amplitude)?;
-        (equations.assurance(&now.state, &state) >= MIN_MAC).then(|| equations.begin(&state, amplitude))?
+        (equations.modal_assurance(&now.state, &state) >= MIN_MAC).then(|| equations.start_curve(&state, amplitude))?
     })
 }

@@ -76,8 +76,8 @@ impl Bracket {
             // The highest point is a sufficient initial guess on either side.
             let start = points[best].start.as_deref();
             let error = points[best].error;
-            start.into_iter().for_each(|start| solver.begin_at(points[best].omega, start));
-            let found = match solver.between(omega, start) {
+            start.into_iter().for_each(|start| solver.begin_branch(points[best].omega, start));
+            let found = match solver.orbit_without_estimate(omega, start) {
                 // Far from the neighbour, all fallbacks are tried; close to it they gain
                 // nothing.
                 Err(_) if (omega - points[best].omega).abs() > FALLBACK_DISTANCE * self.width => {
@@ -85,7 +85,7 @@ impl Bracket {
                 }
                 found => found,
             };
-            effort += solver.effort();
+            effort += solver.work_fraction();
             let point = match found {
                 Ok(orbit) => CurvePoint { omega, error, ..CurvePoint::new(&orbit, quantities) },
                 Err(_) => {

@@ -4,7 +4,7 @@
 //! Rigid sliders along one line have the same relative motion, and they start and stop to slip
 //! together. They form one part with the sum of their limits. Otherwise rounding could give
 //! them different contacts, and the friction problem would not have a unique solution. Each
-//! joint receives a [`Share`] of the part's force.
+//! joint receives a [`PartShare`] of the part's force.
 
 use crate::law::{Contact, IdealElement, Law};
 use crate::method::{MethodError, Refusal};
@@ -17,16 +17,16 @@ use std::sync::Arc;
 /// Relative velocity, as a fraction of the largest one, that counts as zero. Switch times are
 /// accurate to 1e-15 of the velocity scale. Joints that switch together by symmetry differ by
 /// the rounding of the whole orbit, about 1e-12.
-pub(crate) const REST: f64 = 1e-10;
+pub(crate) const ZERO_VELOCITY: f64 = 1e-10;
 
 /// Largest mass ratio at a place between rigid sliders. Accelerations below 1e-9 of those that
 /// the limits cause at the lightest mass count as zero. At this ratio, that is a tenth of those
 /// at the heaviest mass. Measured: correct up to 1e8, chatter from 1e9, wrong orbits from 1e12.
-const LIGHTEST: f64 = 1e8;
+const MAX_MASS_RATIO: f64 = 1e8;
 
 /// The kind of a part of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Kind {
+pub(crate) enum PartKind {
     /// A rigid slider. It slips with the force `limit` and sticks up to `static_limit`, N.
     Rigid { limit: f64, static_limit: f64 },
     /// A slider in series with a spring (N/m): its limit (N), and the index of its force among
@@ -38,56 +38,56 @@ pub(crate) enum Kind {
 
 /// One ideal part of a joint, or several rigid sliders along one line.
 #[derive(Debug, Clone)]
-pub(crate) struct Part {
+pub(crate) struct JointPart {
     /// Index of its joint; for several sliders, the first.
     pub joint: usize,
     /// Direction, length n.
     pub direction: DVector<f64>,
-    pub kind: Kind,
+    pub kind: PartKind,
 }
 
-impl Part {
+impl JointPart {
     /// Returns the stiffness of its spring, N/m.
     pub fn stiffness(&self) -> Option<f64> {
         match self.kind {
-            Kind::Rigid { .. } => None,
-            Kind::Elastic { stiffness, .. } | Kind::Stop { stiffness, .. } => Some(stiffness),
+            PartKind::Rigid { .. } => None,
+            PartKind::Elastic { stiffness, .. } | PartKind::Stop { stiffness, .. } => Some(stiffness),
         }
     }
 
     /// Returns the force during slip, N; zero for a stop, which never slips.
     pub fn limit(&self) -> f64 {
         match self.kind {
-            Kind::Rigid { limit, .. } | Kind::Elastic { limit, .. } => limit,
-            Kind::Stop { .. } => 0.0,
+            PartKind::Rigid { limit, .. } | PartKind::Elastic { limit, .. } => limit,
+            PartKind::Stop { .. } => 0.0,
         }
     }
 
     /// Returns the largest force in stick, N.
-    pub fn holds(&self) -> f64 {
+    pub fn static_limit(&self) -> f64 {
         match self.kind {
-            Kind::Rigid { static_limit, .. } => static_limit,
-            Kind::Elastic { limit, .. } => limit,
-            Kind::Stop { .. } => f64::INFINITY,
+            PartKind::Rigid { static_limit, .. } => static_limit,
+            PartKind::Elastic { limit, .. } => limit,
+            PartKind::Stop { .. } => f64::INFINITY,
         }
     }
 
     /// Returns the index of its force among the states, for a slider in series with a spring.
     pub fn state(&self) -> Option<usize> {
         match self.kind {
-            Kind::Elastic { state, .. } => Some(state),
+            PartKind::Elastic { state, .. } => Some(state),
             _ => None,
         }
     }
 
     /// Returns whether it is a slider.
     pub fn is_slider(&self) -> bool {
-        !matches!(self.kind, Kind::Stop { .. })
+        !matches!(self.kind, PartKind::Stop { .. })
     }
 
     /// Returns whether its force drops at the onset of slip.
-    pub fn drops(&self) -> bool {
-        self.holds() > self.limit() && self.is_slider()
+    pub fn force_drops(&self) -> bool {
+        self.static_limit() > self.limit() && self.is_slider()
     }
 
     /// Iterates over the rows on which it acts.
@@ -104,8 +104,8 @@ impl Part {
     /// Returns the constant part of the force in a contact state, N.
     pub fn constant_force(&self, contact: Contact) -> f64 {
         match (self.kind, contact) {
-            (Kind::Stop { stiffness, gap }, Contact::Stick) => -stiffness * gap,
-            (Kind::Stop { .. }, _) => 0.0,
+            (PartKind::Stop { stiffness, gap }, Contact::Stick) => -stiffness * gap,
+            (PartKind::Stop { .. }, _) => 0.0,
             (_, contact) => contact.sign() * self.limit(),
         }
     }
@@ -114,7 +114,7 @@ impl Part {
 /// A joint's share of a part: the whole part, or a fraction of several rigid sliders along one
 /// line.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Share {
+pub(crate) struct PartShare {
     pub joint: usize,
     pub part: usize,
     /// Force of the joint per force of the part during slip, by the dynamic limits. Negative
@@ -124,9 +124,9 @@ pub(crate) struct Share {
     resting: f64,
 }
 
-impl Share {
+impl PartShare {
     fn whole(joint: usize, part: usize) -> Self {
-        Share { joint, part, slipping: 1.0, resting: 1.0 }
+        PartShare { joint, part, slipping: 1.0, resting: 1.0 }
     }
 
     /// Returns the force of the joint per force of the part in this contact state.
@@ -141,7 +141,7 @@ impl Share {
 }
 
 /// A rigid slider of a joint, before those along one line are combined.
-struct Slider {
+struct RigidSlider {
     joint: usize,
     line: CollinearAxis,
     direction: DVector<f64>,
@@ -150,14 +150,14 @@ struct Slider {
 }
 
 /// Rigid sliders along one line, with their common part.
-struct Group {
+struct CollinearSliders {
     part: usize,
     line: CollinearAxis,
-    members: Vec<Member>,
+    members: Vec<CollinearSlider>,
 }
 
 /// One slider of a group.
-struct Member {
+struct CollinearSlider {
     /// Index of its share.
     share: usize,
     /// Its relative motion divided by that of the first slider.
@@ -166,10 +166,10 @@ struct Member {
     limits: (f64, f64),
 }
 
-impl Group {
+impl CollinearSliders {
     /// Returns the sums of dynamic and static limits along the first slider, N.
     fn limits(&self) -> (f64, f64) {
-        let add = |sum: (f64, f64), Member { factor, limits, .. }: &Member| {
+        let add = |sum: (f64, f64), CollinearSlider { factor, limits, .. }: &CollinearSlider| {
             (sum.0 + factor.abs() * limits.0, sum.1 + factor.abs() * limits.1)
         };
         self.members.iter().fold((0.0, 0.0), add)
@@ -178,39 +178,39 @@ impl Group {
 
 /// Parts and shares during collection, joint by joint.
 #[derive(Default)]
-struct Gathered {
-    parts: Vec<Part>,
-    shares: Vec<Share>,
-    groups: Vec<Group>,
+struct PartCollector {
+    parts: Vec<JointPart>,
+    shares: Vec<PartShare>,
+    groups: Vec<CollinearSliders>,
 }
 
-impl Gathered {
-    fn push(&mut self, part: Part) {
-        self.shares.push(Share::whole(part.joint, self.parts.len()));
+impl PartCollector {
+    fn push(&mut self, part: JointPart) {
+        self.shares.push(PartShare::whole(part.joint, self.parts.len()));
         self.parts.push(part);
     }
 
-    fn push_rigid(&mut self, slider: Slider) {
+    fn push_rigid(&mut self, slider: RigidSlider) {
         let (share, limits) = (self.shares.len(), (slider.limit, slider.static_limit));
         let found = self.groups.iter().enumerate().find_map(|(i, group)| Some((i, slider.line.ratio_to(&group.line)?)));
         let (group, factor) = found.unwrap_or((self.groups.len(), 1.0));
         if let Some(group) = self.groups.get(group) {
-            self.shares.push(Share::whole(slider.joint, group.part));
+            self.shares.push(PartShare::whole(slider.joint, group.part));
         } else {
-            let kind = Kind::Rigid { limit: limits.0, static_limit: limits.1 };
+            let kind = PartKind::Rigid { limit: limits.0, static_limit: limits.1 };
             let part = self.parts.len();
-            self.push(Part { joint: slider.joint, direction: slider.direction, kind });
-            self.groups.push(Group { part, line: slider.line, members: Vec::new() });
+            self.push(JointPart { joint: slider.joint, direction: slider.direction, kind });
+            self.groups.push(CollinearSliders { part, line: slider.line, members: Vec::new() });
         }
-        self.groups[group].members.push(Member { share, factor, limits });
+        self.groups[group].members.push(CollinearSlider { share, factor, limits });
     }
 
     /// Sets the limits of combined parts to the sums, and computes the share of each joint.
-    fn finish(mut self) -> (Arc<[Part]>, Arc<[Share]>) {
+    fn finish(mut self) -> (Arc<[JointPart]>, Arc<[PartShare]>) {
         for group in self.groups.iter().filter(|group| group.members.len() > 1) {
             let (limit, static_limit) = group.limits();
-            self.parts[group.part].kind = Kind::Rigid { limit, static_limit };
-            for Member { share, factor, limits } in &group.members {
+            self.parts[group.part].kind = PartKind::Rigid { limit, static_limit };
+            for CollinearSlider { share, factor, limits } in &group.members {
                 let share = &mut self.shares[*share];
                 // without a slip force, there is nothing to share
                 share.slipping = if limit > 0.0 { factor.signum() * limits.0 / limit } else { 0.0 };
@@ -237,7 +237,7 @@ fn refusal(law: &dyn Law) -> Option<&'static str> {
 }
 
 /// Returns whether the method supports a law.
-pub(crate) fn takes(law: &dyn Law) -> bool {
+pub(crate) fn supports(law: &dyn Law) -> bool {
     refusal(law).is_none()
 }
 
@@ -250,9 +250,9 @@ pub(crate) struct Mechanics {
     pub inverse_mass: DMatrix<f64>,
     /// Sliders and stops of all joints, without those of zero force. Rigid sliders along one
     /// line are combined.
-    pub parts: Arc<[Part]>,
+    pub parts: Arc<[JointPart]>,
     /// Shares of the joints, joint by joint.
-    pub shares: Arc<[Share]>,
+    pub shares: Arc<[PartShare]>,
     /// Names of the joints, for errors.
     pub names: Arc<[String]>,
     /// Number of sliders in series with springs.
@@ -265,17 +265,17 @@ pub(crate) struct Mechanics {
 
 /// Returns an error if a place between several rigid sliders is too light compared with an
 /// adjacent mass.
-fn light(system: &System, parts: &[Part], method: &'static str) -> Option<MethodError> {
-    let rigid = || parts.iter().filter(|part| matches!(part.kind, Kind::Rigid { .. }));
+fn light_place_error(system: &System, parts: &[JointPart], method: &'static str) -> Option<MethodError> {
+    let rigid = || parts.iter().filter(|part| matches!(part.kind, PartKind::Rigid { .. }));
     let mass = |row: usize| system.structure().diagonal_mass(row);
     rigid().find_map(|part| {
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
         let several = rigid().filter(|part| part.direction[lightest] != 0.0).nth(1).is_some();
-        (several && ratio > LIGHTEST).then(|| {
+        (several && ratio > MAX_MASS_RATIO).then(|| {
             let place = system.structure().places()[lightest].clone();
             let joint = system.joints()[part.joint].name().to_owned();
-            Refusal::Light { method, place, joint, ratio, least: LIGHTEST.recip() }.into()
+            Refusal::NegligibleMass { method, place, joint, ratio, least: MAX_MASS_RATIO.recip() }.into()
         })
     })
 }
@@ -290,15 +290,15 @@ impl Deref for Mechanics {
 
 impl Mechanics {
     /// Multiplies the slip limits of these joints by a factor.
-    pub fn strengthen(&mut self, joints: &[usize], factor: f64) {
+    pub fn scale_limits(&mut self, joints: &[usize], factor: f64) {
         let mut parts = self.parts.to_vec();
         for part in parts.iter_mut().filter(|part| joints.contains(&part.joint)) {
             match &mut part.kind {
-                Kind::Rigid { limit, static_limit } => {
+                PartKind::Rigid { limit, static_limit } => {
                     (*limit, *static_limit) = (*limit * factor, *static_limit * factor)
                 }
-                Kind::Elastic { limit, .. } => *limit *= factor,
-                Kind::Stop { .. } => {}
+                PartKind::Elastic { limit, .. } => *limit *= factor,
+                PartKind::Stop { .. } => {}
             }
         }
         self.parts = parts.into();
@@ -316,7 +316,7 @@ impl Mechanics {
         if let Some(i) = (0..n).find(|&i| system.structure().diagonal_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(method, system, i));
         }
-        let mut gathered = Gathered::default();
+        let mut gathered = PartCollector::default();
         let mut elastic = 0;
         for (j, joint) in system.joints().iter().enumerate() {
             if let Some(misses) = refusal(joint.law().as_ref()) {
@@ -332,18 +332,20 @@ impl Mechanics {
                         None => {
                             let (limit, static_limit) = (slider.limit, slider.static_limit);
                             let line = CollinearAxis::of(axis);
-                            gathered.push_rigid(Slider { joint: j, line, direction, limit, static_limit });
+                            gathered.push_rigid(RigidSlider { joint: j, line, direction, limit, static_limit });
                             continue;
                         }
                         Some(stiffness) => {
                             elastic += 1;
-                            Kind::Elastic { stiffness, limit: slider.limit, state: elastic - 1 }
+                            PartKind::Elastic { stiffness, limit: slider.limit, state: elastic - 1 }
                         }
                     },
                     // the position of a stop includes the mean of the imposed motion
-                    IdealElement::Stop { gap, stiffness } => Kind::Stop { stiffness, gap: gap - axis.imposed_at(0).re },
+                    IdealElement::Stop { gap, stiffness } => {
+                        PartKind::Stop { stiffness, gap: gap - axis.imposed_at(0).re }
+                    }
                 };
-                gathered.push(Part { joint: j, direction, kind });
+                gathered.push(JointPart { joint: j, direction, kind });
             }
         }
         let (parts, shares) = gathered.finish();
@@ -355,7 +357,7 @@ impl Mechanics {
             .try_inverse()
             .filter(|inverse| positive && inverse.iter().all(|x| x.is_finite()))
             .ok_or_else(|| MethodError::mass_not_positive(method))?;
-        if let Some(error) = light(system, &parts, method) {
+        if let Some(error) = light_place_error(system, &parts, method) {
             return Err(error);
         }
         let rate = |i: usize| (system.structure().stiffness()[(i, i)] / system.structure().mass()[(i, i)]).sqrt();
@@ -376,15 +378,15 @@ impl Mechanics {
 
     /// Returns the distance within which a stop counts as touching, m. `velocity_scale` is the
     /// largest relative velocity of the motion, m/s.
-    pub fn touch(&self, stop: &Part, omega: f64, velocity_scale: f64) -> f64 {
-        let Kind::Stop { stiffness, gap } = stop.kind else { return 0.0 };
+    pub fn contact_tolerance(&self, stop: &JointPart, omega: f64, velocity_scale: f64) -> f64 {
+        let PartKind::Stop { stiffness, gap } = stop.kind else { return 0.0 };
         let own = || (stiffness * self.inverse_mass.amax()).sqrt();
         let rate = Some(omega.max(self.fastest)).filter(|rate| *rate > 0.0).unwrap_or_else(own);
-        REST * (velocity_scale / rate).max(gap.abs())
+        ZERO_VELOCITY * (velocity_scale / rate).max(gap.abs())
     }
 
     /// Returns the joint of every part; for several sliders along one line, the first.
-    pub fn owners(&self) -> Vec<usize> {
+    pub fn part_joints(&self) -> Vec<usize> {
         self.parts.iter().map(|part| part.joint).collect()
     }
 

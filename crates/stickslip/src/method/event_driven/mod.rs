@@ -3,41 +3,43 @@
 //!
 //! - `mechanics`: the system as masses, springs, ideal sliders and stops
 //! - `pattern`: the linear motion in one pattern of stick and slip, open and closed
-//! - `memory`: cache of patterns with a memory limit
-//! - `decide`: transition to the next pattern at a switch
-//! - `flow`: segments joined at the switches, with exact sensitivities
-//! - `path`: results of an orbit from its segments
-//! - `work`: cost estimate of an orbit
+//! - `pattern_cache`: cache of patterns with a memory limit
+//! - `transition`: transition to the next pattern at a switch
+//! - `segments`: segments joined at the switches, with exact sensitivities
+//! - `postprocess`: results of an orbit from its segments
+//! - `cost_model`: cost estimate of an orbit
+//! - `tolerances`: tolerances that several files use
 //!
 //! Newton's method on the return map finds the periodic orbit. If the excitation has only odd
 //! harmonics, the solver uses the half period `x(t + T/2) = -x(t)`. This halves the work, and
 //! the map stays regular if a joint sticks for the whole period.
 
-mod decide;
-mod flow;
+mod cost_model;
 mod mechanics;
-mod memory;
-mod path;
 mod pattern;
+mod pattern_cache;
+mod postprocess;
+mod segments;
 mod tolerances;
-mod work;
+mod transition;
 
-pub(crate) use flow::SegmentedMotion;
-use mechanics::Kind;
-pub(crate) use mechanics::{Mechanics, takes};
-pub(crate) use path::ExactPath;
-pub(crate) use tolerances::MISSING_WORK;
-use tolerances::{CLOSED, ENERGY_GAP, NAME, NEAR_REST};
-pub use work::{ALONE, orbit_work};
+pub use cost_model::{COLD_START_FACTOR, orbit_work};
+use mechanics::PartKind;
+pub(crate) use mechanics::{Mechanics, supports};
+pub(crate) use postprocess::ExactPath;
+pub(crate) use segments::SegmentedMotion;
+pub(crate) use tolerances::GAP_PER_DISTANCE;
+use tolerances::{ENERGY_GAP, NAME, RESIDUAL_TOLERANCE, REST_FRACTION};
 
-use super::drive::Drive;
-use super::guess::Guess;
-use super::option::{PERIOD, periods};
-use super::periodic::{Aim, Closed, ReturnMap, Search, approached};
-use super::repeated::Afresh;
-use super::residual_traction::{Closing, ElasticSlider, as_in_equilibrium};
+use super::flow::excitation::HarmonicExcitation;
+use super::options::{PERIOD, periods};
+use super::orbit_search::cold_restart::ColdRestart;
+use super::orbit_search::describing_guess::DescribingGuess;
+use super::orbit_search::residual_traction::{ElasticSlider, OrbitMap, select_equilibrium_orbit};
+use super::orbit_search::return_map::{ClosedState, ClosingMethod, ClosingTargets, ReturnMap, iterate_map};
+use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
-use super::{IntegrationError, Method, MethodError, MethodInfo, OrbitError, Solver, vibration};
+use super::{IntegrationError, Method, MethodError, MethodInfo, OrbitError, Solver};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -51,7 +53,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     options: &[PERIOD],
     build: |options| match periods(NAME, options)? {
         1 => Ok(Box::new(EventDriven)),
-        period => Ok(Box::new(Subharmonic { period })),
+        period => Ok(Box::new(SubharmonicEventDriven { period })),
     },
 };
 
@@ -59,11 +61,11 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// receives one more Newton step. Near a resonance, the distance is dozens of times the
 /// residual. Measured amplitude errors of the couple: at most 3e-11 with this step, 6e-11
 /// without it. One orbit in fifty takes the step.
-const NEAREST: f64 = 7e-12;
+const REFINEMENT_DISTANCE: f64 = 7e-12;
 /// Relative stiffness below which a direction counts as unsupported, and relative residual force
 /// below which a load counts as supported. It covers rounding of a stiffness matrix that lost
 /// some digits in its assembly.
-const UNHELD: f64 = 1e-12;
+const SUPPORT_TOLERANCE: f64 = 1e-12;
 
 /// The exact event-driven method.
 ///
@@ -83,34 +85,34 @@ impl Method for EventDriven {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Exact::new(system, NAME, Search::Newton, 1)?))
+        Ok(Box::new(ExactSolver::new(system, NAME, ClosingMethod::Newton, 1)?))
     }
 }
 
 /// The exact method for orbits that repeat after several periods of the excitation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Subharmonic {
+pub struct SubharmonicEventDriven {
     /// Number of periods of the excitation after which the orbit repeats.
     pub period: usize,
 }
 
-impl Method for Subharmonic {
+impl Method for SubharmonicEventDriven {
     fn name(&self) -> &'static str {
         NAME
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Afresh(Exact::new(system, NAME, Search::Newton, self.period)?)))
+        Ok(Box::new(ColdRestart(ExactSolver::new(system, NAME, ClosingMethod::Newton, self.period)?)))
     }
 }
 
 /// Solver for orbits by exact motion, with Newton's method or by waiting.
-pub(crate) struct Exact<'a> {
+pub(crate) struct ExactSolver<'a> {
     system: &'a System,
     /// The system, shared with the returned orbits.
     shared: Arc<System>,
     /// Name of the calling method.
     name: &'static str,
-    search: Search,
+    search: ClosingMethod,
     flow: SegmentedMotion,
     weights: Vec<f64>,
     duration: f64,
@@ -121,8 +123,8 @@ pub(crate) struct Exact<'a> {
     equilibrium: Option<StaticEquilibrium>,
 }
 
-impl ReturnMap for Exact<'_> {
-    fn returned(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
+impl ReturnMap for ExactSolver<'_> {
+    fn apply(&mut self, state: &mut [f64], derivative: Option<&mut DMatrix<f64>>) -> Result<(), IntegrationError> {
         self.flow.run(state, 0.0, self.duration, derivative)
     }
     fn weights(&self) -> &[f64] {
@@ -130,11 +132,11 @@ impl ReturnMap for Exact<'_> {
     }
 }
 
-impl Closing for Exact<'_> {
+impl OrbitMap for ExactSolver<'_> {
     fn springs(&self) -> Vec<ElasticSlider> {
         let mechanics = &self.flow.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
-            Kind::Elastic { stiffness, limit, state } => {
+            PartKind::Elastic { stiffness, limit, state } => {
                 Some(ElasticSlider { joint: part.joint, state: 2 * mechanics.n + state, stiffness, limit })
             }
             _ => None,
@@ -146,7 +148,7 @@ impl Closing for Exact<'_> {
         let mechanics = &mut self.flow.mechanics;
         let mut parts = mechanics.parts.to_vec();
         for part in &mut parts {
-            if let Kind::Elastic { limit, .. } = &mut part.kind
+            if let PartKind::Elastic { limit, .. } = &mut part.kind
                 && let Some(spring) = springs.next()
             {
                 *limit = spring.limit;
@@ -156,26 +158,31 @@ impl Closing for Exact<'_> {
     }
     /// Creates the orbit from the segments of the last run, which started from the converged
     /// state.
-    fn finish(&mut self, closed: Closed) -> Result<Orbit, OrbitError> {
-        let omega = self.flow.drive.omega;
+    fn finish(&mut self, closed: ClosedState) -> Result<Orbit, OrbitError> {
+        let omega = self.flow.excitation.omega;
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (at, closed) = ((omega, self.periods), (closed, self.weights.as_slice()));
-        let orbit = path::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
+        let orbit = postprocess::orbit(&self.shared, self.contracts, &self.flow, at, symmetry, closed)
             .map_err(|cause| OrbitError::Breakdown { method: self.name, omega, cause })?;
         Ok(Orbit { method: self.name, ..orbit })
     }
 }
 
-impl<'a> Exact<'a> {
+impl<'a> ExactSolver<'a> {
     /// Creates a solver for a system.
     ///
     /// # Errors
     /// See [`Mechanics::new`].
-    pub fn new(system: &'a System, name: &'static str, search: Search, periods: usize) -> Result<Self, MethodError> {
+    pub fn new(
+        system: &'a System,
+        name: &'static str,
+        search: ClosingMethod,
+        periods: usize,
+    ) -> Result<Self, MethodError> {
         let mechanics = Mechanics::new(system, name)?;
         let weights = vec![1.0; mechanics.states()];
-        let flow = SegmentedMotion::new(mechanics, Drive::default());
-        Ok(Exact {
+        let flow = SegmentedMotion::new(mechanics, HarmonicExcitation::default());
+        Ok(ExactSolver {
             system,
             shared: Arc::new(system.clone()),
             name,
@@ -190,25 +197,30 @@ impl<'a> Exact<'a> {
     }
 
     /// Returns whether only friction balances the constant forces.
-    fn drifts(&self) -> bool {
-        let (mechanics, force) = (&self.flow.mechanics, &self.flow.drive.constant);
+    fn is_held_by_friction(&self) -> bool {
+        let (mechanics, force) = (&self.flow.mechanics, &self.flow.excitation.constant);
         if force.amax() == 0.0 || mechanics.parts.iter().any(|part| !part.is_slider()) {
             return false;
         }
         let at_rest = eigen::svd(mechanics.stiffness.clone())
-            .and_then(|svd| svd.solve(force, UNHELD * svd.singular_values.amax()).ok());
-        at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > UNHELD * force.amax())
+            .and_then(|svd| svd.solve(force, SUPPORT_TOLERANCE * svd.singular_values.amax()).ok());
+        at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > SUPPORT_TOLERANCE * force.amax())
     }
 
     /// Runs a search and returns its orbit.
-    fn found(&mut self, start: Option<&[f64]>, search: Search, aim: Aim) -> Result<Orbit, OrbitError> {
-        let Aim { method, omega, .. } = aim;
+    fn search(
+        &mut self,
+        start: Option<&[f64]>,
+        search: ClosingMethod,
+        aim: ClosingTargets,
+    ) -> Result<Orbit, OrbitError> {
+        let ClosingTargets { method, omega, .. } = aim;
         let closed = match search.find(self, start, |exact| exact.first_state(omega), aim) {
-            Err(OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. }) if self.drifts() => {
+            Err(OrbitError::NotConverged { .. } | OrbitError::Unsettled { .. }) if self.is_held_by_friction() => {
                 // the friction forces depend on the history, so that a guess does not contain
                 // their mean; start from rest
                 let rest = vec![0.0; self.weights.len()];
-                let near = approached(self, rest, aim.sign);
+                let near = iterate_map(self, rest, aim.sign);
                 search.close(self, &near, aim).map_err(|_| OrbitError::drift(method, omega))?
             }
             found => found?,
@@ -218,7 +230,7 @@ impl<'a> Exact<'a> {
 
     fn first_state(&self, omega: f64) -> Vec<f64> {
         let mechanics = &self.flow.mechanics;
-        let guess = Guess::new(self.system, omega);
+        let guess = DescribingGuess::new(self.system, omega);
         let mut state = guess.state(mechanics.n);
         let count = mechanics.states() - state.len();
         let states = states_at(self.equilibrium.as_ref(), self.system, &state[..mechanics.n], count);
@@ -227,49 +239,56 @@ impl<'a> Exact<'a> {
     }
 }
 
-impl Solver for Exact<'_> {
+impl Solver for ExactSolver<'_> {
     fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
-        let drive = Drive::new(self.system, &self.flow.mechanics.owners(), omega);
-        self.flow.set_drive(drive);
+        let excitation = HarmonicExcitation::new(self.system, &self.flow.mechanics.part_joints(), omega);
+        self.flow.set_excitation(excitation);
         self.weights = self.flow.mechanics.weights(omega);
         let symmetry = self.search.symmetry(self.system, self.periods);
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
-        let rest = NEAR_REST * self.flow.energy_scale;
-        let aim = Aim { method: name, omega, residual: CLOSED, distance: NEAREST, sign, rest };
+        let rest = REST_FRACTION * self.flow.energy_scale;
+        let aim = ClosingTargets {
+            method: name,
+            omega,
+            residual: RESIDUAL_TOLERANCE,
+            distance: REFINEMENT_DISTANCE,
+            sign,
+            rest,
+        };
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
-        let start = if self.periods > 1 && search == Search::Newton && known.is_none() {
+        let start = if self.periods > 1 && search == ClosingMethod::Newton && known.is_none() {
             let first = self.first_state(omega);
-            near = approached(self, first, sign);
+            near = iterate_map(self, first, sign);
             Some(near.as_slice())
         } else {
             known
         };
-        let mut orbit = self.found(start, search, aim)?;
-        if search == Search::Newton {
+        let mut orbit = self.search(start, search, aim)?;
+        if search == ClosingMethod::Newton {
             let system = self.system;
             let equilibrium = self.equilibrium.clone();
-            orbit = as_in_equilibrium(self, (system, equilibrium.as_ref()), orbit, aim);
+            orbit = select_equilibrium_orbit(self, (system, equilibrium.as_ref()), orbit, aim);
         } else {
             // only a waiting search must know the amplitude of the vibration; closed forms are
             // accurate to all digits
             let broke = |cause| OrbitError::Breakdown { method: name, omega, cause };
             let (mut taken, at) = (1.0, (symmetry, orbit.period()));
             let share = |exact: &Self, orbit: &Orbit| {
-                vibration::share(orbit.path.as_ref(), at, &orbit.initial_state, (&exact.weights, aim.rest))
+                vibration_share::fraction(orbit.path.as_ref(), at, &orbit.initial_state, (&exact.weights, aim.rest))
             };
-            while let Some(share) = vibration::next(taken, share(self, &orbit)).map_err(broke)? {
+            while let Some(share) = vibration_share::next_fraction(taken, share(self, &orbit)).map_err(broke)? {
                 taken = share;
-                orbit = self.found(Some(&orbit.initial_state), search.of_share(share), aim)?;
+                orbit = self.search(Some(&orbit.initial_state), search.of_share(share), aim)?;
             }
         }
         // an estimated distance from the settled motion causes a proportional energy gap
-        let allowed = ENERGY_GAP + MISSING_WORK * orbit.evidence.error_estimate.unwrap_or(0.0);
+        let allowed = ENERGY_GAP + GAP_PER_DISTANCE * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });
         }
@@ -288,7 +307,7 @@ mod tests {
     /// slip. One Newton step crosses the kink between them. The orbit is the same from below,
     /// from above and without an initial guess.
     #[test]
-    fn orbits_do_not_go_with_the_way_to_them() {
+    fn orbits_do_not_depend_on_the_initial_guess() {
         let mut model = example::blade_couple();
         model.joints[0].law = Arc::new(Coulomb { limit: 8.0 });
         let system = model.assemble().unwrap();
@@ -360,7 +379,7 @@ mod tests {
     /// The threshold for zero acceleration of a joint depends on its own masses: an uncoupled
     /// body, however light, changes nothing.
     #[test]
-    fn a_light_body_beside_it_changes_no_orbit() {
+    fn uncoupled_light_body_changes_no_orbit() {
         let amplitude = |mass: f64| {
             let system = with_another(mass, [GROUND, GROUND], 1e4).assemble().unwrap();
             let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0, None).unwrap();
@@ -375,7 +394,7 @@ mod tests {
     /// The weaker of two rigid joints in series slips. The method solves this as long as
     /// the inertia between them has significant digits, and rejects it otherwise.
     #[test]
-    fn a_shoe_between_two_joints_is_light_or_refused() {
+    fn light_mass_between_joints_is_solved_or_rejected() {
         let orbit = |mass: f64| -> Result<f64, String> {
             let system = with_another(mass, ["b", GROUND], 0.0).assemble().unwrap();
             let mut solver = EventDriven.solver(&system).map_err(|error| error.to_string())?;
@@ -401,7 +420,7 @@ mod tests {
     /// carries the excess. The mass creeps to that position at a decreasing rate, and the orbit
     /// sticks between `(peak - limit) / k` and `(trough + limit) / k`.
     #[test]
-    fn what_creeps_until_it_sticks_sticks() {
+    fn creeping_mass_ends_in_stick() {
         let (stiffness, limit) = (1e4, 3.7);
         for (damping, excess, omega) in [(0.5, 1e-3, 20.0), (5.0, 0.06, 64.0), (13.0, 0.3, 95.0), (50.0, 1.0, 150.0)] {
             for (constant, phase) in [(1.46, 0.0), (1.46, 0.7), (1.2, 2.5)] {
@@ -429,7 +448,7 @@ mod tests {
     /// distance of 1e-7 from the resonance, where mode and excitation form a resonant pair.
     /// Their amplitude is `F / |k - m ω²|`, at any phase.
     #[test]
-    fn orbits_without_any_loss_balance() {
+    fn undamped_orbits_have_no_energy_gap() {
         let (mass, stiffness, amplitude) = (0.182, 105_103.0, 10.0);
         let model = Model {
             masses: vec![Mass::new("m", mass)],

@@ -9,9 +9,9 @@
 //! A pattern does not depend on time, excitation frequency or slip direction. Its key is the
 //! set of stuck and closed parts.
 
-use super::mechanics::{Kind, Mechanics};
+use super::mechanics::{Mechanics, PartKind};
 use crate::law::Contact;
-use crate::method::drive::Drive;
+use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::dense::{ProductShape, multiply};
@@ -25,14 +25,14 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// redundant.
 const REDUNDANT: f64 = 1e-11;
 /// Relative eigenvalue below which a mode has frequency zero: the rounding of `QuadraticModes`.
-const STILL: f64 = 1e-13;
+const ZERO_MODE: f64 = 1e-13;
 /// Relative distance of a harmonic to a mode below which they are integrated as a resonant
 /// pair. At smaller distances, the ordinary particular solution would lose more than five
 /// digits.
 const RESONANT: f64 = 1e-5;
 /// Number of states from which the sensitivity is carried joint by joint, in a product that is
 /// blocked for the cache.
-const LARGE: usize = 24;
+const BLOCKED_STATES: usize = 24;
 
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
@@ -40,13 +40,13 @@ pub(crate) struct Pattern {
     /// Marks stuck sliders and closed stops.
     pub stuck: Vec<bool>,
     /// Indices of the stuck rigid sliders.
-    pub held: Vec<usize>,
+    pub stuck_rigid: Vec<usize>,
     /// True if fewer of them would constrain the same motion, so that their forces are not
     /// unique.
     pub redundant: bool,
     /// Marks springs, in series with sliders or in stops, that the stuck rigid sliders keep
     /// from moving.
-    pub frozen: Vec<bool>,
+    pub immobile: Vec<bool>,
     /// Exponents of the modes.
     pub lambda: Vec<Complex64>,
     /// x = Re(shape η), n × modes, column-major.
@@ -56,9 +56,9 @@ pub(crate) struct Pattern {
     start: DMatrix<Complex64>,
     /// In addition to the modes, a state moves by `place + drift τ + fall τ²/2`, n × states
     /// each.
-    place: DMatrix<f64>,
-    drift: DMatrix<f64>,
-    fall: DMatrix<f64>,
+    constant: DMatrix<f64>,
+    linear: DMatrix<f64>,
+    quadratic: DMatrix<f64>,
     /// Modal force of a unit force, modes × n. A constant force shifts the modal coordinate by
     /// `-1/λ` times its modal force.
     input: DMatrix<Complex64>,
@@ -86,9 +86,9 @@ pub(crate) struct Pattern {
 
 /// Initial data of a segment.
 #[derive(Clone, Copy)]
-pub(crate) struct Beginning<'a> {
+pub(crate) struct SegmentStart<'a> {
     /// Response of the pattern to the excitation.
-    pub driven: &'a Driven,
+    pub driven: &'a ForcedResponse,
     /// Contact states.
     pub contacts: &'a [Contact],
     /// Time, s.
@@ -99,7 +99,7 @@ pub(crate) struct Beginning<'a> {
 
 /// Data of a pattern at one excitation frequency, shared by the segments of the motion.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Driven {
+pub(crate) struct ForcedResponse {
     pub basis: ExponentialBasis,
     /// Number of exponents of the basis that are modes; those of the excitation follow.
     pub modes: usize,
@@ -118,7 +118,7 @@ pub(crate) struct Driven {
     free_steady: Vec<DVector<Complex64>>,
 }
 
-impl Driven {
+impl ForcedResponse {
     /// Returns its memory, bytes.
     pub fn bytes(&self) -> usize {
         let steady = self.steady.iter().chain(&self.free_steady).map(|x| x.len()).sum::<usize>();
@@ -138,7 +138,7 @@ impl Pattern {
         let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let inverse_delassus = weighted_inverse(
             &(w.transpose() * &mechanics.inverse_mass * &w),
-            &held.iter().map(|&s| mechanics.parts[s].holds()).collect::<Vec<_>>(),
+            &held.iter().map(|&s| mechanics.parts[s].static_limit()).collect::<Vec<_>>(),
         )
         .ok_or(out_of_range)?;
         let redundant = !held.is_empty() && {
@@ -190,7 +190,7 @@ impl Pattern {
         let fastest = modes.lambda.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let mut lambda = modes.lambda.clone();
         let drifting: Vec<usize> =
-            (0..count).filter(|&k| lambda[k].norm() <= STILL * fastest || fastest == 0.0).collect();
+            (0..count).filter(|&k| lambda[k].norm() <= ZERO_MODE * fastest || fastest == 0.0).collect();
         for &k in &drifting {
             lambda[k] = ZERO;
         }
@@ -224,14 +224,14 @@ impl Pattern {
         let directions = DMatrix::from_fn(n, stuck.len(), |i, s| mechanics.parts[s].direction[i]);
         Ok(Pattern {
             stuck: stuck.to_vec(),
-            held,
+            stuck_rigid: held,
             redundant,
-            frozen,
+            immobile: frozen,
             lambda,
             start,
-            place,
-            drift,
-            fall: &free * &free_input * &force_from_state,
+            constant: place,
+            linear: drift,
+            quadratic: &free * &free_input * &force_from_state,
             input,
             drifting,
             free,
@@ -267,7 +267,7 @@ impl Pattern {
     /// Returns its memory, bytes: matrices of some multiples of n² numbers.
     pub fn bytes(&self) -> usize {
         let complex = self.lambda.len() + self.shape.len() + self.start.len() + self.input.len();
-        let real = 3 * self.place.len()
+        let real = 3 * self.constant.len()
             + self.free.len()
             + self.free_coordinate.len()
             + self.free_input.len()
@@ -281,22 +281,22 @@ impl Pattern {
     }
 
     /// Computes the steady response and the basis at one excitation frequency.
-    pub fn drive(&self, mechanics: &Mechanics, drive: &Drive) -> Driven {
+    pub fn excitation(&self, mechanics: &Mechanics, excitation: &HarmonicExcitation) -> ForcedResponse {
         let n = mechanics.n;
-        let mut driven = Driven { modes: self.lambda.len(), ..Driven::default() };
+        let mut driven = ForcedResponse { modes: self.lambda.len(), ..ForcedResponse::default() };
         driven.basis.drifts = self.drifts();
         driven.basis.exponents = self.lambda.clone();
-        driven.basis.exponents.extend(drive.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
+        driven.basis.exponents.extend(excitation.rates.iter().map(|&rate| Complex64::new(0.0, rate)));
         let complex = |m: &DMatrix<f64>| m.map(|x| Complex64::new(x, 0.0));
-        for (h, &rate) in drive.rates.iter().enumerate() {
+        for (h, &rate) in excitation.rates.iter().enumerate() {
             let s = Complex64::new(0.0, rate);
-            let held = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]]);
+            let held = DVector::from_fn(self.stuck_rigid.len(), |i, _| excitation.imposed[h][self.stuck_rigid[i]]);
             let moved = complex(&self.hold) * held; // S g: the constrained part moves with -S g
             let mut force =
-                drive.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
+                excitation.forces[h].clone() + (complex(&self.stiffness) + complex(&mechanics.damping) * s) * &moved;
             for (i, part) in mechanics.parts.iter().enumerate() {
                 if let (Some(kt), true) = (part.stiffness(), self.stuck[i]) {
-                    force -= complex_vector(&part.direction) * (drive.imposed[h][i] * kt);
+                    force -= complex_vector(&part.direction) * (excitation.imposed[h][i] * kt);
                 }
             }
             let mut steady = -moved;
@@ -318,13 +318,15 @@ impl Pattern {
             }
             let free: DVector<Complex64> = complex(&self.free_input) * &force / (s * s);
             steady += complex(&self.free) * &free;
-            let inertia = DVector::from_fn(self.held.len(), |i, _| drive.imposed[h][self.held[i]] * (rate * rate));
-            let held = complex(&self.multiplier) * &drive.forces[h] - complex(&self.inverse_delassus) * inertia;
+            let inertia = DVector::from_fn(self.stuck_rigid.len(), |i, _| {
+                excitation.imposed[h][self.stuck_rigid[i]] * (rate * rate)
+            });
+            let held = complex(&self.multiplier) * &excitation.forces[h] - complex(&self.inverse_delassus) * inertia;
             driven.held.push(held);
             driven.free_steady.push(free);
             driven.steady.push(steady);
         }
-        driven.held_constant = &self.multiplier * &drive.constant;
+        driven.held_constant = &self.multiplier * &excitation.constant;
         driven
     }
 
@@ -333,9 +335,9 @@ impl Pattern {
     pub fn displacement(
         &self,
         mechanics: &Mechanics,
-        drive: &Drive,
-        Beginning { driven, contacts, time, state }: Beginning<'_>,
-        work: &mut Work,
+        excitation: &HarmonicExcitation,
+        SegmentStart { driven, contacts, time, state }: SegmentStart<'_>,
+        work: &mut PatternScratch,
         out: &mut [Complex64],
     ) {
         let (n, nb, count) = (mechanics.n, driven.basis.len(), self.lambda.len());
@@ -344,13 +346,13 @@ impl Pattern {
         // constant forces that do not depend on the state: loads, slip, imposed motion at the
         // start
         work.force.clear();
-        work.force.extend(drive.constant.iter());
+        work.force.extend(excitation.constant.iter());
         work.held.clear();
-        work.held.extend(self.held.iter().map(|&s| drive.imposed_at(s, time, 0)));
+        work.held.extend(self.stuck_rigid.iter().map(|&s| excitation.imposed_at(s, time, 0)));
         for (i, part) in mechanics.parts.iter().enumerate() {
             let value = match (contacts[i], part.kind) {
-                (Contact::Stick, Kind::Rigid { .. }) => continue,
-                (Contact::Stick, Kind::Elastic { stiffness, .. }) => stiffness * drive.imposed_at(i, time, 0),
+                (Contact::Stick, PartKind::Rigid { .. }) => continue,
+                (Contact::Stick, PartKind::Elastic { stiffness, .. }) => stiffness * excitation.imposed_at(i, time, 0),
                 (contact, _) => -part.constant_force(contact),
             };
             for row in 0..n {
@@ -360,7 +362,7 @@ impl Pattern {
         for row in 0..n {
             // displacement S c with the part of c due to imposed motion; `place` contains the
             // part due to x0
-            let shift: f64 = (0..self.held.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
+            let shift: f64 = (0..self.stuck_rigid.len()).map(|s| self.hold[(row, s)] * work.held[s]).sum();
             out[row * nb + constant].re += shift;
             work.shift[row] = shift;
         }
@@ -371,8 +373,8 @@ impl Pattern {
                 }
             }
         }
-        for h in 0..drive.rates.len() {
-            let (sin, cos) = (drive.rates[h] * time).sin_cos();
+        for h in 0..excitation.rates.len() {
+            let (sin, cos) = (excitation.rates[h] * time).sin_cos();
             work.turn[h] = Complex64::new(cos, sin);
             for row in 0..n {
                 out[row * nb + count + h] = driven.steady[h][row] * work.turn[h];
@@ -383,7 +385,7 @@ impl Pattern {
             for (eta, start) in work.eta.iter_mut().zip(&self.start.as_slice()[j * count..(j + 1) * count]) {
                 *eta += start * z;
             }
-            for (row, place) in self.place.as_slice()[j * n..(j + 1) * n].iter().enumerate() {
+            for (row, place) in self.constant.as_slice()[j * n..(j + 1) * n].iter().enumerate() {
                 out[row * nb + constant].re += place * z;
             }
         }
@@ -407,20 +409,20 @@ impl Pattern {
             }
             out[constant].re = moved;
             for (r, (k, h, forward)) in driven.resonant.iter().enumerate() {
-                out[count + drive.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
+                out[count + excitation.rates.len() + r] = self.shape[(row, *k)] * forward * work.turn[*h];
             }
         }
-        self.add_polynomials(mechanics, drive, driven, state, work, out);
+        self.add_polynomials(mechanics, excitation, driven, state, work, out);
     }
 
     /// Adds free directions and drifting modes: 1, τ, τ²/2.
     fn add_polynomials(
         &self,
         mechanics: &Mechanics,
-        drive: &Drive,
-        driven: &Driven,
+        excitation: &HarmonicExcitation,
+        driven: &ForcedResponse,
         state: &[f64],
-        work: &mut Work,
+        work: &mut PatternScratch,
         out: &mut [Complex64],
     ) {
         if !self.drifts() {
@@ -429,8 +431,8 @@ impl Pattern {
         let (n, nb, constant) = (mechanics.n, driven.basis.len(), driven.basis.constant());
         for (j, &z) in state.iter().enumerate().filter(|(_, z)| **z != 0.0) {
             for row in 0..n {
-                out[row * nb + constant + 1].re += self.drift[(row, j)] * z;
-                out[row * nb + constant + 2].re += self.fall[(row, j)] * z;
+                out[row * nb + constant + 1].re += self.linear[(row, j)] * z;
+                out[row * nb + constant + 2].re += self.quadratic[(row, j)] * z;
             }
         }
         for &k in &self.drifting {
@@ -441,10 +443,10 @@ impl Pattern {
         }
         for r in 0..self.free.ncols() {
             let (mut place, mut speed) = (0.0, 0.0);
-            for h in 0..drive.rates.len() {
+            for h in 0..excitation.rates.len() {
                 let z = driven.free_steady[h][r] * work.turn[h];
                 place -= z.re;
-                speed -= (z * Complex64::new(0.0, drive.rates[h])).re;
+                speed -= (z * Complex64::new(0.0, excitation.rates[h])).re;
             }
             let push: f64 = (0..n).map(|i| self.free_input[(r, i)] * work.force[i]).sum();
             for row in 0..n {
@@ -463,7 +465,7 @@ impl Pattern {
         length: f64,
         values: &[Complex64],
         sensitivity: &mut DMatrix<f64>,
-        work: &mut Work,
+        work: &mut PatternScratch,
     ) {
         let (n, count, states) = (mechanics.n, self.lambda.len(), mechanics.states());
         if states == 0 {
@@ -478,7 +480,7 @@ impl Pattern {
                 (imaginary[row], imaginary[n + row]) = (now.im, rate.im);
             }
         }
-        if states >= LARGE {
+        if states >= BLOCKED_STATES {
             self.carry_by_joints(mechanics, length, sensitivity, work);
             return;
         }
@@ -487,7 +489,7 @@ impl Pattern {
             let (motion, springs) = column.split_at_mut(2 * n);
             self.moved_by(j, length, &work.moved, motion);
             for (part, stuck) in mechanics.parts.iter().zip(&self.stuck) {
-                if let Kind::Elastic { stiffness: kt, state, .. } = part.kind {
+                if let PartKind::Elastic { stiffness: kt, state, .. } = part.kind {
                     springs[state] = if *stuck {
                         let moved: f64 = part.direction.iter().zip(&*motion).map(|(w, x)| w * x).sum();
                         let before = if j < n { part.direction[j] } else { 0.0 };
@@ -521,11 +523,11 @@ impl Pattern {
     /// its start, in `motion` (2n).
     fn moved_by(&self, j: usize, length: f64, moved: &[f64], motion: &mut [f64]) {
         let (n, count) = (motion.len() / 2, self.lambda.len());
-        motion[..n].copy_from_slice(&self.place.as_slice()[j * n..(j + 1) * n]);
+        motion[..n].copy_from_slice(&self.constant.as_slice()[j * n..(j + 1) * n]);
         motion[n..].fill(0.0);
         if self.drifts() {
             for row in 0..n {
-                let (drift, fall) = (self.drift[(row, j)], self.fall[(row, j)]);
+                let (drift, fall) = (self.linear[(row, j)], self.quadratic[(row, j)]);
                 motion[row] += drift * length + 0.5 * fall * length * length;
                 motion[n + row] += drift + fall * length;
             }
@@ -551,7 +553,13 @@ impl Pattern {
     /// The stuck springs of one joint exert one total force and have one elongation. Therefore
     /// the motion depends on them through one number, and they depend on the motion through
     /// another.
-    fn carry_by_joints(&self, mechanics: &Mechanics, length: f64, sensitivity: &mut DMatrix<f64>, work: &mut Work) {
+    fn carry_by_joints(
+        &self,
+        mechanics: &Mechanics,
+        length: f64,
+        sensitivity: &mut DMatrix<f64>,
+        work: &mut PatternScratch,
+    ) {
         let (n, states) = (mechanics.n, mechanics.states());
         // the states of one joint's springs are adjacent; slipping springs have zero stiffness,
         // and their states are dropped
@@ -559,10 +567,10 @@ impl Pattern {
         work.stiffness.clear();
         work.kept.clear();
         for (i, part) in mechanics.parts.iter().enumerate() {
-            let Kind::Elastic { stiffness, state, .. } = part.kind else { continue };
+            let PartKind::Elastic { stiffness, state, .. } = part.kind else { continue };
             match work.springs.last_mut() {
                 Some(springs) if mechanics.parts[springs.part].joint == part.joint => springs.states.end = state + 1,
-                _ => work.springs.push(Springs { part: i, states: state..state + 1, sticking: None }),
+                _ => work.springs.push(JointSprings { part: i, states: state..state + 1, sticking: None }),
             }
             if let (true, Some(springs)) = (self.stuck[i], work.springs.last_mut()) {
                 springs.sticking.get_or_insert(state);
@@ -585,7 +593,7 @@ impl Pattern {
             let (motion, pushes) = row.split_at_mut(2 * n);
             let (from, springs) = from.split_at(2 * n);
             motion.copy_from_slice(from);
-            for (push, Springs { states, .. }) in pushes.iter_mut().zip(&work.springs) {
+            for (push, JointSprings { states, .. }) in pushes.iter_mut().zip(&work.springs) {
                 *push = sum_of_products(&work.kept[states.clone()], &springs[states.clone()]);
             }
         }
@@ -594,7 +602,7 @@ impl Pattern {
         for (c, column) in sensitivity.as_mut_slice().chunks_exact_mut(states).enumerate() {
             let moved = &work.product[c * 2 * n..(c + 1) * 2 * n];
             let (motion, springs) = column.split_at_mut(2 * n);
-            for Springs { part, states, .. } in &work.springs {
+            for JointSprings { part, states, .. } in &work.springs {
                 let part = &mechanics.parts[*part];
                 let stretch = part.along(&moved[..n]) - part.along(&motion[..n]);
                 let of_joint = work.stiffness[states.clone()].iter().zip(&work.kept[states.clone()]);
@@ -643,7 +651,7 @@ fn sum_of_products(a: &[f64], b: &[f64]) -> f64 {
 
 /// Scratch memory of the pattern's formulas.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Work {
+pub(crate) struct PatternScratch {
     force: Vec<f64>,
     held: Vec<f64>,
     shift: Vec<f64>,
@@ -661,7 +669,7 @@ pub(crate) struct Work {
     /// Data of [`Pattern::carry_by_joints`]: the springs of each joint, their stiffness,
     /// whether they stick (1 or 0), and the rows of motion and total spring force in the
     /// sensitivity.
-    springs: Vec<Springs>,
+    springs: Vec<JointSprings>,
     stiffness: Vec<f64>,
     kept: Vec<f64>,
     rows: Vec<f64>,
@@ -669,7 +677,7 @@ pub(crate) struct Work {
 
 /// The springs in series with the sliders of one joint.
 #[derive(Debug, Clone)]
-struct Springs {
+struct JointSprings {
     /// Index of the first part.
     part: usize,
     /// Indices of their forces among those of all springs.
@@ -678,11 +686,11 @@ struct Springs {
     sticking: Option<usize>,
 }
 
-impl Work {
+impl PatternScratch {
     pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
         let n = mechanics.n;
-        let small = if mechanics.states() < LARGE { mechanics.states() } else { 0 };
-        Work {
+        let small = if mechanics.states() < BLOCKED_STATES { mechanics.states() } else { 0 };
+        PatternScratch {
             force: vec![0.0; n],
             held: Vec::with_capacity(mechanics.parts.len()),
             shift: vec![0.0; n],
@@ -776,14 +784,14 @@ mod tests {
         };
         let system = model.assemble().unwrap();
         let mechanics = Mechanics::new(&system, "test").unwrap();
-        let drive = Drive::new(&system, &mechanics.owners(), OMEGA);
+        let excitation = HarmonicExcitation::new(&system, &mechanics.part_joints(), OMEGA);
         let pattern = Pattern::new(&mechanics, &[contact == Contact::Stick]).unwrap();
-        let driven = pattern.drive(&mechanics, &drive);
-        let mut work = Work::new(&mechanics, drive.rates.len());
+        let driven = pattern.excitation(&mechanics, &excitation);
+        let mut work = PatternScratch::new(&mechanics, excitation.rates.len());
         let mut signal = vec![ZERO; driven.basis.len()];
         let mut speed = signal.clone();
-        let beginning = Beginning { driven: &driven, contacts: &[contact], time: TIME, state };
-        pattern.displacement(&mechanics, &drive, beginning, &mut work, &mut signal);
+        let beginning = SegmentStart { driven: &driven, contacts: &[contact], time: TIME, state };
+        pattern.displacement(&mechanics, &excitation, beginning, &mut work, &mut signal);
         driven.basis.differentiate(&signal, &mut speed);
         let mut values = signal.clone();
         driven.basis.evaluate(LENGTH, &mut values);

@@ -1,40 +1,41 @@
 //! Work limits: when a search ends, and when a point is given up.
 
-/// Work limit of one search, relative to [`WORK`].
-pub(super) const SEARCH: Work = Work { eliminated: 1.0, marched: 1.0 };
+/// Work limit of one search, relative to [`SEARCH_MULTIPLICATIONS`].
+pub(super) const SEARCH_LIMIT: WorkShare = WorkShare { multiplications: 1.0, time_steps: 1.0 };
 /// Work limit of all searches of a point, including those of the error estimate.
 ///
 /// Newton's method, the interior point method, and the proximal point method with the
 /// slip-limit homotopy after it may each use the eliminations of one search. All together may
-/// use the time steps of one search. Measured on 173 random points with half of [`WORK`]:
-/// converged points used at most 1.01 of the 3.0 eliminations, all but one at most 0.4.
-pub(super) const POINT: Work = Work { eliminated: 3.0, marched: 1.0 };
+/// use the time steps of one search. Measured on 173 random points with half of
+/// [`SEARCH_MULTIPLICATIONS`]: converged points used at most 1.01 of the 3.0 eliminations, all
+/// but one at most 0.4.
+pub(super) const POINT_LIMIT: WorkShare = WorkShare { multiplications: 3.0, time_steps: 1.0 };
 
-/// Number of consecutive failed points, each with more than [`ENOUGH`] of the work limit, after
-/// which the next points of the same solver get a smaller limit. One success restores the full
-/// limit.
-const IN_VAIN: usize = 2;
+/// Number of consecutive failed points, each with more than [`REDUCED_SHARE`] of the work limit,
+/// after which the next points of the same solver get a smaller limit. One success restores the
+/// full limit.
+const EXPENSIVE_FAILURES: usize = 2;
 /// Share of the work limit that points get after such failures. Nearly all converged points use
 /// less, and a curve without orbits ends soon.
-pub(super) const ENOUGH: f64 = 0.1;
+pub(super) const REDUCED_SHARE: f64 = 0.1;
 
 /// Multiplications of one search; about four seconds on one core.
-pub(super) const WORK: f64 = 2e10;
+pub(super) const SEARCH_MULTIPLICATIONS: f64 = 2e10;
 /// Least number of eliminations in the work limit of a search. A converging search takes a few.
 /// It does not apply to a series with force ports that refines a shorter one.
-pub(super) const FEWEST: f64 = 40.0;
+pub(super) const LEAST_ELIMINATIONS: f64 = 40.0;
 /// Newton steps that the remaining budget of a point must cover before a longer series is
 /// begun. Refining a shorter series takes 6 to 25 steps in banded form. With GMRES the steps
 /// are then short, and the total is at most three counted steps: `coulomb-2d` with 4 contacts
 /// reaches its 1023 harmonics within 0.3 s.
-const BEGUN: f64 = 3.0;
+const RESERVED_STEPS: f64 = 3.0;
 
 /// Returns true if the remaining budget of a point covers a longer series.
 ///
 /// `step` is the number of multiplications of one of its Newton steps, `taken` the work used by
 /// the point, and `allowed` its limit.
-pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
-    BEGUN * step <= WORK * (allowed.eliminated - taken.eliminated)
+pub(super) fn is_affordable(step: f64, taken: WorkShare, allowed: WorkShare) -> bool {
+    RESERVED_STEPS * step <= SEARCH_MULTIPLICATIONS * (allowed.multiplications - taken.multiplications)
 }
 
 /// Work of a point, relative to that of its first orbit, up to which longer series may reduce the
@@ -42,43 +43,49 @@ pub(super) fn is_affordable(step: f64, taken: Work, allowed: Work) -> bool {
 const IMPROVES: f64 = 8.0;
 
 /// Returns the work limit of a point that found its first orbit with this work.
-pub(super) fn to_improve(taken: Work) -> Work {
+pub(super) fn to_improve(taken: WorkShare) -> WorkShare {
     taken.times(IMPROVES)
 }
 
 /// Returns the work limit of the next point after this number of consecutive failed points that
-/// used more than [`ENOUGH`].
-pub(super) fn allowed_after(in_vain: usize) -> Work {
-    if in_vain < IN_VAIN { POINT } else { POINT.times(ENOUGH) }
+/// used more than [`REDUCED_SHARE`].
+pub(super) fn work_limit_after(in_vain: usize) -> WorkShare {
+    if in_vain < EXPENSIVE_FAILURES { POINT_LIMIT } else { POINT_LIMIT.times(REDUCED_SHARE) }
 }
 
 /// Work relative to the limit of one search.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Work {
+pub(super) struct WorkShare {
     /// Multiplications of Newton steps and evaluations.
-    pub eliminated: f64,
+    pub multiplications: f64,
     /// Time steps of laws with memory.
-    pub marched: f64,
+    pub time_steps: f64,
 }
 
-impl Work {
+impl WorkShare {
     /// Returns the sum.
-    pub fn and(self, other: Work) -> Work {
-        Work { eliminated: self.eliminated + other.eliminated, marched: self.marched + other.marched }
+    pub fn and(self, other: WorkShare) -> WorkShare {
+        WorkShare {
+            multiplications: self.multiplications + other.multiplications,
+            time_steps: self.time_steps + other.time_steps,
+        }
     }
 
     /// Returns both parts multiplied by `share`.
-    pub fn times(self, share: f64) -> Work {
-        Work { eliminated: share * self.eliminated, marched: share * self.marched }
+    pub fn times(self, share: f64) -> WorkShare {
+        WorkShare { multiplications: share * self.multiplications, time_steps: share * self.time_steps }
     }
 
     /// Returns the smaller of each part.
-    pub fn and_at_most(self, other: Work) -> Work {
-        Work { eliminated: self.eliminated.min(other.eliminated), marched: self.marched.min(other.marched) }
+    pub fn and_at_most(self, other: WorkShare) -> WorkShare {
+        WorkShare {
+            multiplications: self.multiplications.min(other.multiplications),
+            time_steps: self.time_steps.min(other.time_steps),
+        }
     }
 
     /// Returns true if either part exceeds that of `limit`.
-    pub fn is_beyond(self, limit: Work) -> bool {
-        self.eliminated > limit.eliminated || self.marched > limit.marched
+    pub fn exceeds(self, limit: WorkShare) -> bool {
+        self.multiplications > limit.multiplications || self.time_steps > limit.time_steps
     }
 }

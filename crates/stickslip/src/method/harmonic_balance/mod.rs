@@ -15,96 +15,57 @@
 //!
 //! The solver and its options:
 //! - `options`: number of harmonics, number of samples, tolerance;
-//! - `balance`: the solver of a system, with its warm starts;
-//! - `length`: the number of harmonics, doubled until the estimated error meets the tolerance;
-//! - `kept`: the set of harmonics in a series;
-//! - `recent`: the last orbits, for warm starts and the secant predictor;
-//! - `in_time`: initial guesses from time integration;
+//! - `solver`: the solver of a system, with its warm starts;
+//! - `warm_start`: the last orbits, for warm starts and the secant predictor;
 //! - `subharmonic`: orbits of several periods of the excitation;
 //! - `static_equilibrium`: the equilibrium under the constant loads, by harmonic 0 alone;
-//! - `other_histories`: sensitivity of amplitudes to the history of permanently stuck joints;
-//! - `budget`, `work`, `storage`: work limits, operation counts, estimates of memory.
+//! - `budget`, `cost_model`, `memory_estimate`: work limits, operation counts, estimates of
+//!   memory.
 //!
-//! The equations:
-//! - `equations`: residual and Jacobian along the joints;
-//! - `ports`: harmonics of joint forces from harmonics of joint motions, with exact
-//!   derivatives;
-//! - `penalty`, `hold`: parameter ε of rigid contacts; regularization of singular equations;
-//! - `closed`: mean position of bodies that only contacts support;
-//! - `linear`: the Jacobian as a matrix; `sparse`: large systems in banded form;
-//! - `rest`, `receptance`, `modal`, `uncoupled`, `waves`: receptances of the linear part.
-//!
-//! The nonlinear solution:
-//! - `solve`: Newton's method with line search, and the order in which the other searches
+//! The equations and their solution:
+//! - `equations/`: residual and Jacobian along the joints, set of harmonics, scaling;
+//! - `aft/`: harmonics of joint forces from harmonics of joint motions, with exact derivatives;
+//! - `dynamics/`: receptances of the linear part;
+//! - `linear_solve/`: the linear system of a Newton step;
+//! - `newton`: Newton's method with line search, and the order in which the other searches
 //!   follow;
-//! - `interior`: interior point method for rigid friction;
-//! - `proximal`: proximal point method for forces that the equations leave undetermined;
-//! - `ease`: parameters of the homotopies;
-//! - `coupled`: Newton steps by GMRES;
-//! - `clusters`, `window`: nonlinear elimination of contacts that dominate the residual;
-//! - `found_by`: the search that found a solution.
+//! - `globalization/`: these searches.
 //!
 //! Results:
-//! - `estimate`, `sampling`: truncation error; sampling error;
-//! - `path`: displacements, energies and evidence of an orbit from its harmonics.
-//!
-//! Continuation and nonlinear modes:
-//! - `branch`: the equations with a parameter;
-//! - `mode`, `arc`: nonlinear modes and arc-length steps along them;
-//! - `open`: the minimum-norm step of a singular system.
+//! - `accuracy/`: number of harmonics, truncation error, sampling error;
+//! - `postprocess`: displacements, energies and evidence of an orbit from its harmonics;
+//! - `modes/`: nonlinear modes, and branches of orbits with a parameter.
 
-mod arc;
-mod balance;
-mod branch;
+mod accuracy;
+mod aft;
 mod budget;
-mod closed;
-mod clusters;
-mod coupled;
-mod ease;
+mod cost_model;
+mod dynamics;
 mod equations;
-mod estimate;
-mod found_by;
-mod hold;
-mod in_time;
-mod interior;
-mod kept;
-mod length;
-mod linear;
-mod modal;
-mod mode;
-mod open;
+mod globalization;
+mod linear_solve;
+mod memory_estimate;
+mod modes;
+mod newton;
 mod options;
-mod other_histories;
-mod path;
-mod penalty;
-mod ports;
-mod proximal;
-mod recent;
-mod receptance;
-mod rest;
-mod sampling;
-mod solve;
-mod sparse;
+mod postprocess;
+mod solver;
 mod static_equilibrium;
-mod storage;
 mod subharmonic;
-mod uncoupled;
-mod waves;
-mod window;
-mod work;
+mod warm_start;
 
-use super::option::{PERIOD, periods};
+use super::options::{PERIOD, periods};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver};
 use crate::dimension::Dimension;
 use crate::model::System;
-pub(crate) use arc::{ModeArc, Step as ModeStep};
-use balance::Balance;
-pub(crate) use branch::BranchEquations;
-pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
+pub use cost_model::{doubling_work, factor_bytes, orbit_work, point_work_limit, step_work};
+pub(crate) use modes::branch_equations::BranchEquations;
+pub(crate) use modes::mode_continuation::{ModeArc, ModeStep};
+pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState};
 pub use options::{HarmonicBalance, NAME};
+use solver::HarmonicBalanceSolver;
 pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
-pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
 
 /// Entry of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -152,6 +113,6 @@ impl Method for HarmonicBalance {
         false
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        Ok(Box::new(Balance::new(system.clone(), *self, 1)?))
+        Ok(Box::new(HarmonicBalanceSolver::new(system.clone(), *self, 1)?))
     }
 }

@@ -1,6 +1,6 @@
 //! Options of harmonic balance: number of harmonics, number of samples, tolerance.
 
-use super::ports::{Port, Ports};
+use super::aft::{Port, Ports};
 use crate::method::{MethodError, Options};
 use crate::model::System;
 
@@ -10,7 +10,7 @@ pub const NAME: &str = "harmonic-balance";
 /// Default tolerance.
 pub(super) const TOLERANCE: f64 = 1e-3;
 /// Highest harmonic of the first series if the user gives none.
-pub(super) const FIRST: usize = 7;
+pub(super) const FIRST_HARMONICS: usize = 7;
 /// Least number of samples per period. Sliders and stops need samples only to separate turning
 /// points. Laws with memory need [`samples_for`] the tolerance.
 const SAMPLES: usize = 1024;
@@ -20,17 +20,17 @@ const SAMPLES_PER_HARMONIC: usize = 16;
 /// samples resolve a change of sign only to one sample spacing. The number grows with the
 /// harmonics, so that the longer series detects the sampling error of the shorter one.
 const SAMPLES_OF_STEEP: usize = 128;
-/// Relative error of the motion that laws with memory showed at [`AT`] samples. Measured on
-/// hysteresis in a plane and on contacts that open. The number of samples grows with the
-/// tolerance from there, and the error estimate includes the rest.
-const SEEN: f64 = 2e-5;
-/// Number of samples to which [`SEEN`] belongs.
-const AT: f64 = 1024.0;
+/// Relative error of the motion that laws with memory showed at [`SAMPLING_ERROR_SAMPLES`]
+/// samples. Measured on hysteresis in a plane and on contacts that open. The number of samples
+/// grows with the tolerance from there, and the error estimate includes the rest.
+const SAMPLING_ERROR: f64 = 2e-5;
+/// Number of samples to which [`SAMPLING_ERROR`] belongs.
+const SAMPLING_ERROR_SAMPLES: f64 = 1024.0;
 /// Largest number of samples that a tolerance asks for.
-const MOST: f64 = 65536.0;
+const MOST_SAMPLES: f64 = 65536.0;
 /// Share of the tolerance that the sampling error of laws with a step may use. The truncation
 /// error hides an error of this size.
-pub(super) const LEFT: f64 = 0.05;
+pub(super) const SAMPLING_SHARE: f64 = 0.05;
 
 /// Harmonic balance: the orbit as a Fourier series.
 ///
@@ -78,12 +78,12 @@ impl HarmonicBalance {
     /// The user's number of samples applies to the user's number of harmonics. The finer
     /// solution that checks the error takes as many samples as it needs, so that its estimate
     /// shows if the user's number is too small. For `steep`, see [`Ports::has_steep`] and
-    /// [`Level::jumps`](equations::Level::jumps).
+    /// `Discretization::states_cross_within_sample`.
     pub(super) fn samples_at(&self, top: usize, ports: &Ports, steep: bool) -> usize {
         let each = if steep { SAMPLES_OF_STEEP } else { SAMPLES_PER_HARMONIC };
-        let remembered = ports.iter().any(Port::marches);
+        let remembered = ports.iter().any(Port::has_memory_steps);
         let tolerance = self.tolerance.unwrap_or(TOLERANCE);
-        let steps = !ports.is_empty() && ports.iter().all(Port::steps);
+        let steps = !ports.is_empty() && ports.iter().all(Port::uses_return_map);
         let (few, least) = match remembered {
             true if steps => (samples_of_steps(tolerance), 0),
             true => (samples_for(tolerance), SAMPLES),
@@ -111,7 +111,7 @@ impl HarmonicBalance {
             );
         }
         if let Some(samples) = self.samples {
-            let least = 4 * (self.harmonics.unwrap_or(FIRST.max(highest)) + 1);
+            let least = 4 * (self.harmonics.unwrap_or(FIRST_HARMONICS.max(highest)) + 1);
             if samples < least || samples % 2 == 1 {
                 return option("samples", format!("must be even and at least {least}, found {samples}"));
             }
@@ -128,12 +128,12 @@ impl HarmonicBalance {
 /// Returns the samples per period that laws with memory need for a relative error of the
 /// motion.
 pub(super) fn samples_for(tolerance: f64) -> usize {
-    (AT * (SEEN / tolerance).sqrt().max(1.0)).min(MOST) as usize
+    (SAMPLING_ERROR_SAMPLES * (SAMPLING_ERROR / tolerance).sqrt().max(1.0)).min(MOST_SAMPLES) as usize
 }
 
 /// Returns the same number for laws with a step only. These are exact along a straight path of
 /// any length, so a larger tolerance needs fewer samples.
 pub(super) fn samples_of_steps(tolerance: f64) -> usize {
-    let fewer = (SEEN / (LEFT * tolerance)).sqrt().min(1.0);
+    let fewer = (SAMPLING_ERROR / (SAMPLING_SHARE * tolerance)).sqrt().min(1.0);
     (samples_for(tolerance) as f64 * fewer) as usize
 }

@@ -14,11 +14,11 @@
 //!
 //! Sources: Siewert, Panning, Wallaschek, Richter (2010); Zucca, Firrone, Gola (2012).
 
-use super::equations::{Level, Solution, Tether};
-use super::path;
-use super::ports::{Ports, StaticState};
-use super::rest::Rest;
-use super::sparse::Sparse;
+use super::aft::{Ports, StaticState};
+use super::dynamics::banded::BandedForm;
+use super::dynamics::linear_dynamics::LinearDynamics;
+use super::equations::{Discretization, HarmonicSolution, ProximalSprings};
+use super::postprocess;
 use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::Arc;
@@ -29,17 +29,17 @@ const ITERATIONS: usize = 60;
 const POINTS: usize = 60;
 /// Stiffness of the springs of the first proximal point, relative to closed contacts. Nothing
 /// slides far at that point.
-const STIFFEST: f64 = 1.0;
+const FIRST_STIFFNESS: f64 = 1.0;
 /// Number of samples of a constant motion.
 const SAMPLES: usize = 8;
 
 /// Returns the static equilibrium of a system, as an orbit at rest. Returns `None` as
 /// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
-    let (ports, around) = Ports::of_sector(system).ok()?;
-    let rest = Rest::new(system, &ports);
+    let (ports, around) = Ports::for_sector(system).ok()?;
+    let dynamics = LinearDynamics::new(system, &ports);
     let system = Arc::new(system.clone());
-    static_equilibrium(&system, (&ports, around.as_ref()), &rest).map(|found| found.orbit)
+    static_equilibrium(&system, (&ports, around.as_ref()), &dynamics).map(|found| found.orbit)
 }
 
 /// Static equilibrium of a system.
@@ -55,37 +55,41 @@ pub(super) struct SolvedEquilibrium {
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, around): (&Ports, Option<&Ports>),
-    rest: &Rest,
+    dynamics: &LinearDynamics,
 ) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
-    let omega = scale_of_rates(system);
-    let sparse = Sparse::new(system, ports, &harmonics);
-    let mut level = Level::new(harmonics, SAMPLES, ports, sparse);
-    level.drive(system, ports, rest, omega).ok()?;
-    let start = if level.stands() { level.at_rest(1.0) } else { level.unhindered() };
+    let omega = characteristic_rate(system);
+    let banded = BandedForm::new(system, ports, &harmonics);
+    let mut discretization = Discretization::new(harmonics, SAMPLES, ports, banded);
+    discretization.set_frequency(system, ports, dynamics, omega).ok()?;
+    let start = if discretization.is_held_by_contacts() {
+        discretization.static_solution(1.0)
+    } else {
+        discretization.frictionless_motion()
+    };
     let mut solution = start;
-    found(&mut level, ports, omega, &mut solution)?;
+    solve_static(&mut discretization, ports, omega, &mut solution)?;
     let mut states = vec![StaticState::default(); ports.len()];
     for (p, port) in ports.iter().enumerate() {
-        level.sample(ports, p, omega, &solution);
-        states[p].states.clone_from(&level.alternation.state);
+        discretization.sample(ports, p, omega, &solution);
+        states[p].states.clone_from(&discretization.aft.state);
         for (to, c) in states[p].displacement.iter_mut().zip(&solution.c[port.range()]) {
             *to = c.re;
         }
     }
-    let x = path::places(&mut level, rest, omega, &solution).ok()?;
-    let setting = path::Setting {
+    let x = postprocess::places(&mut discretization, dynamics, omega, &solution).ok()?;
+    let setting = postprocess::OrbitInput {
         system,
         ports,
-        around,
+        ring_ports: around,
         omega,
-        first: 1,
-        odd: false,
+        excitation_harmonic: 1,
+        half_period: false,
         truncation: None,
         tolerance: 0.0,
-        judge: None,
+        orbit_check: None,
     };
-    let orbit = path::orbit(setting, &mut level, &solution, x)?;
+    let orbit = postprocess::orbit(setting, &mut discretization, &solution, x)?;
     Some(SolvedEquilibrium { orbit, states })
 }
 
@@ -98,24 +102,29 @@ pub(super) fn static_equilibrium(
 /// structure that sinks under its load.
 ///
 /// Source: Rockafellar, "Monotone operators and the proximal point algorithm" (1976).
-fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) -> Option<()> {
+fn solve_static(
+    discretization: &mut Discretization,
+    ports: &Ports,
+    omega: f64,
+    solution: &mut HarmonicSolution,
+) -> Option<()> {
     let begin = solution.clone();
-    if level.polish(ports, omega, solution, ITERATIONS).is_ok() {
+    if discretization.newton_from(ports, omega, solution, ITERATIONS).is_ok() {
         return Some(());
     }
-    if !level.stands() {
+    if !discretization.is_held_by_contacts() {
         return None;
     }
     *solution = begin;
-    let (mut share, mut softer) = (STIFFEST, 0.1f64);
+    let (mut share, mut softer) = (FIRST_STIFFNESS, 0.1f64);
     for _ in 0..POINTS {
         let anchor = solution.c.iter().map(|c| c.re).collect();
-        level.tether = Some(Tether { share, anchor });
+        discretization.tether = Some(ProximalSprings { relative_stiffness: share, anchor });
         let mut next = solution.clone();
-        let tied = level.polish(ports, omega, &mut next, ITERATIONS).is_ok();
-        level.tether = None;
+        let tied = discretization.newton_from(ports, omega, &mut next, ITERATIONS).is_ok();
+        discretization.tether = None;
         if !tied {
-            if share >= STIFFEST {
+            if share >= FIRST_STIFFNESS {
                 return None;
             }
             share /= softer;
@@ -123,7 +132,7 @@ fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) 
             continue;
         }
         *solution = next.clone();
-        if level.polish(ports, omega, &mut next, ITERATIONS).is_ok() {
+        if discretization.newton_from(ports, omega, &mut next, ITERATIONS).is_ok() {
             *solution = next;
             return Some(());
         }
@@ -134,7 +143,7 @@ fn found(level: &mut Level, ports: &Ports, omega: f64, solution: &mut Solution) 
 
 /// Returns a rate of the system, 1/s, from its largest stiffness and mass. Equations at rest
 /// need one.
-fn scale_of_rates(system: &System) -> f64 {
+fn characteristic_rate(system: &System) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let rate = (stiffness / mass).sqrt();
     if rate.is_finite() && rate > 0.0 { rate } else { 1.0 }
@@ -169,13 +178,13 @@ mod tests {
 
     fn equilibrium(system: &Arc<System>) -> Option<SolvedEquilibrium> {
         let ports = Ports::new(system).unwrap();
-        static_equilibrium(system, (&ports, None), &Rest::new(system, &ports))
+        static_equilibrium(system, (&ports, None), &LinearDynamics::new(system, &ports))
     }
 
     /// In stick, `z (kn sin² + kt cos²) = Q`. In slip, `z kn (sin² + µ sin cos) = Q`. The
     /// friction coefficient selects the case.
     #[test]
-    fn a_wedge_sinks_until_its_faces_carry_the_load() {
+    fn the_equilibrium_of_a_wedge_is_exact() {
         let (sine, cosine) = ANGLE.to_radians().sin_cos();
         for (friction, sticks) in [(0.9, true), (0.25, false)] {
             let SolvedEquilibrium { orbit, states } = equilibrium(&wedge(500.0, friction)).unwrap();
@@ -190,7 +199,7 @@ mod tests {
 
     /// A load that pulls the wedge out has no equilibrium.
     #[test]
-    fn a_load_that_nothing_carries_has_none() {
+    fn an_unsupported_load_has_no_equilibrium() {
         assert!(equilibrium(&wedge(-500.0, 0.25)).is_none());
     }
 }

@@ -1,10 +1,10 @@
 //! Orbits of several periods of the excitation.
 
-use super::balance::Balance;
-use super::kept::Kept;
+use super::equations::harmonic_set::HarmonicSet;
+use super::solver::HarmonicBalanceSolver;
 use super::{HarmonicBalance, NAME};
-use crate::method::option::PERIOD;
-use crate::method::repeated::Afresh;
+use crate::method::options::PERIOD;
+use crate::method::orbit_search::cold_restart::ColdRestart;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use num_complex::Complex64;
@@ -40,7 +40,7 @@ impl Method for Subharmonic {
         false
     }
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-        let highest = Kept::new(system, |z| z != Complex64::new(0.0, 0.0)).highest;
+        let highest = HarmonicSet::new(system, |z| z != Complex64::new(0.0, 0.0)).highest;
         self.balance.check(highest)?;
         let (period, times) = (self.period.max(1), |count: usize| count.saturating_mul(self.period.max(1)));
         let too_high = |_| {
@@ -51,6 +51,6 @@ impl Method for Subharmonic {
         let HarmonicBalance { harmonics, samples, tolerance } = self.balance;
         let balance = HarmonicBalance { harmonics: harmonics.map(times), samples: samples.map(times), tolerance };
         let slowed = system.subharmonic(u32::try_from(period).map_err(too_high)?);
-        Ok(Box::new(Afresh(Balance::new(slowed, balance, period)?)))
+        Ok(Box::new(ColdRestart(HarmonicBalanceSolver::new(slowed, balance, period)?)))
     }
 }

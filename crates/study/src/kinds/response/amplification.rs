@@ -17,7 +17,7 @@ use crate::run::work::UnitTask;
 use crate::syntax::key::{Key, ValueType, default};
 use stickslip::curve::adaptive::AdaptiveCurve;
 use stickslip::curve::peak::{self, CurvePoint, Peak};
-use stickslip::method::advised;
+use stickslip::method::solver_with_alternatives;
 use stickslip::model::Model;
 use stickslip::orbit::Orbit;
 
@@ -96,7 +96,7 @@ fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
             curve.into_iter().map(|(point, ())| point).collect()
         }
         _ => {
-            let mut solver = advised(method, &system).map_err(|error| error.to_string())?;
+            let mut solver = solver_with_alternatives(method, &system).map_err(|error| error.to_string())?;
             let mut points: Vec<CurvePoint> = Vec::new();
             for index in work.points.clone().take_while(|_| !work.context.stopped()) {
                 let start = points.last().and_then(|point| point.start.as_deref());

@@ -42,7 +42,7 @@ use stickslip::curve::adaptive::AdaptiveCurve;
 use stickslip::curve::bidirectional_sweep::{self, BidirectionalSweep, OtherOrbit};
 use stickslip::curve::peak::CurvePoint;
 use stickslip::dimension::Dimension;
-use stickslip::method::{MethodError, OrbitError, advised};
+use stickslip::method::{MethodError, OrbitError, solver_with_alternatives};
 use stickslip::orbit::Orbit;
 
 pub(super) const KIND: Kind = Kind {
@@ -350,7 +350,7 @@ fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result
     // the peak search needs the points of the adjacent units on both sides; each unit computes
     // them again
     let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
-    let mut solver = advised(&*prepared.method, &prepared.system)?;
+    let mut solver = solver_with_alternatives(&*prepared.method, &prepared.system)?;
     let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
         Ok(orbit) => point(&orbit),
         Err(_) => CurvePoint::failed(work.omega(index)),

@@ -51,7 +51,7 @@ pub(super) fn distinct_cases(study: &Study) -> f64 {
 /// not support them, the first method that does is used.
 fn solver<'a>(prepared: &PreparedCase, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     prepared.method.solver(system).or_else(|error| {
-        let others = method::ways(system).methods.into_iter().filter_map(method::find);
+        let others = method::alternatives(system).methods.into_iter().filter_map(method::find);
         let mut takes = others.filter_map(|row| (row.build)(&Options::new()).ok()?.solver(system).ok());
         takes.next().ok_or(error)
     })

@@ -22,7 +22,7 @@ use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optio
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::method::WIDTH;
-use stickslip::method::time_history::{Excitation, Instant, TimeHistory, TimeHistoryError};
+use stickslip::method::time_history::{Excitation, TimeHistory, TimeHistoryError, TimeSample};
 use stickslip::model::Model;
 use stickslip::orbit::Sample;
 
@@ -251,7 +251,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
         let end = transient.visit(&prepared.system, &mut |instant| {
-            let Instant { time, omega, state: sample, since } = instant;
+            let TimeSample { time, omega, state: sample, between: since } = instant;
             rows.varied(case);
             if work.several_frequencies() {
                 rows.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));

@@ -1,0 +1,234 @@
+//! Number of harmonics of an orbit: the user's, or doubled until the estimated error meets the
+//! tolerance.
+
+use super::truncation_error::{ComparedSolution, truncation_error};
+use crate::method::OrbitError;
+use crate::method::harmonic_balance::aft::Port;
+use crate::method::harmonic_balance::budget::{self, WorkShare};
+use crate::method::harmonic_balance::equations::{self, Discretization, HarmonicSolution};
+use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
+use crate::method::harmonic_balance::options::{NAME, TOLERANCE};
+use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
+use crate::orbit::Orbit;
+use nalgebra::DVector;
+use num_complex::Complex64;
+use std::iter::successors;
+
+/// Highest harmonic that the method chooses. The error estimate takes twice as many.
+const MOST_HARMONICS: usize = 511;
+/// Highest order at which the truncation error of rigid friction decays with the number of
+/// harmonics. Orders of 1 to 3/2 are usual, see [`truncation_error`]. The larger value avoids
+/// that a sufficient series is refused: 80 masses had an error of 3.0e-3 with 31 harmonics and
+/// less than 1e-3 with 63.
+const ORDER: f64 = 2.0;
+/// Least share of the previous error estimate that remains after a doubling with rigid or steep
+/// friction. A smaller distance is not believed, because two solutions may be close by chance: a
+/// distance of 1.3e-3 was seen with an error of 1e-2.
+const LEAST_ERROR_RATIO: f64 = 0.1;
+/// Reduction of the residual to which the finer solution of an error estimate is solved. The
+/// relative error of the estimate is about as large. With elastic friction one Newton step
+/// reaches it.
+const ESTIMATE_REDUCTION: f64 = 1e-3;
+
+impl HarmonicBalanceSolver {
+    /// Finds the orbit with the user's number of harmonics and estimates its error.
+    pub(crate) fn with_given_harmonics(
+        &mut self,
+        top: usize,
+        omega: f64,
+        warm: Option<(usize, HarmonicSolution)>,
+    ) -> Result<Orbit, OrbitError> {
+        let motion = self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.solve_error(l))?;
+        let x = self.places(top, omega, &motion).map_err(|l| self.solve_error(l))?;
+        let truncation = if self.can_estimate_error(top, WorkShare::default()) {
+            // the orbit is found; its error estimate gets a budget as large as that of a point
+            self.discretizations.values_mut().for_each(Discretization::begin_point);
+            self.estimate_error(top, omega, &motion, &x).ok().map(|(error, _)| error)
+        } else {
+            None
+        };
+        self.make_orbit(top, omega, motion, x, truncation)
+    }
+
+    /// Returns the truncation error of `motion` and the finer solution from which it is
+    /// estimated.
+    ///
+    /// The finer solution has twice the harmonics. For laws with memory it also has twice the
+    /// samples.
+    pub(crate) fn estimate_error(
+        &mut self,
+        top: usize,
+        omega: f64,
+        motion: &HarmonicSolution,
+        x: &[DVector<Complex64>],
+    ) -> Result<(f64, HarmonicSolution), SolveError> {
+        let double = self.harmonic_set.doubled(top);
+        let start = self.refined_guess(top, motion);
+        let (few, many) = (self.harmonic_set.up_to(top), self.harmonic_set.up_to(double));
+        let coarse = equations::with_harmonics(motion, &few, &many);
+        let states = self.discretizations.get(&top).map(|discretization| discretization.states.clone());
+        self.discretization(double, omega)?;
+        let finer = self.discretizations.get_mut(&double).expect("made above");
+        finer.extends_shorter = true;
+        let goal = if self.ports.iter().any(Port::has_memory_steps) {
+            StopCriterion::Solved
+        } else {
+            StopCriterion::Share(ESTIMATE_REDUCTION)
+        };
+        let better = match finer.solve_twice_the_samples(&self.ports, omega, &start, &coarse, states.as_deref()) {
+            Some(better) => better,
+            None => {
+                let solved = finer.solve_to(&self.ports, omega, start, goal)?;
+                finer
+                    .correct_twice_the_samples(&self.ports, omega, &solved, &coarse)
+                    .map_or(solved, |(motion, _)| motion)
+            }
+        };
+        if finer.uses_krylov() {
+            self.comparisons.insert(top, [motion.clone(), better.clone()]);
+        }
+        let y = self.places(double, omega, &better)?;
+        let finer = self.discretizations.get_mut(&double).expect("solved");
+        let coarse = ComparedSolution { harmonics: &few, places: x, along: &motion.c };
+        let at = (self.harmonic_set, omega, self.steep);
+        let error = truncation_error(
+            self.system.place_axes(),
+            &self.ports,
+            &self.receptance,
+            at,
+            &coarse,
+            (finer, &better, &y),
+        );
+        Ok((error, better))
+    }
+
+    /// Returns an initial guess with twice the harmonics.
+    ///
+    /// It is the solution plus the correction that the finer series made at the last
+    /// comparison.
+    pub(crate) fn refined_guess(&self, top: usize, motion: &HarmonicSolution) -> HarmonicSolution {
+        let harmonics = |top: usize| self.harmonic_set.up_to(top);
+        let (few, many) = (harmonics(top), harmonics(self.harmonic_set.doubled(top)));
+        let mut start = equations::with_harmonics(motion, &few, &many);
+        if let Some([coarse, fine]) = self.comparisons.get(&top) {
+            let coarse = equations::with_harmonics(coarse, &few, &many);
+            let add = |to: &mut [Complex64], coarse: &[Complex64], fine: &[Complex64]| {
+                to.iter_mut().zip(fine.iter().zip(coarse)).for_each(|(to, (fine, coarse))| *to += fine - coarse);
+            };
+            add(&mut start.c, &coarse.c, &fine.c);
+            add(&mut start.force, &coarse.force, &fine.force);
+        }
+        start
+    }
+
+    /// Returns the first doubled number of harmonics that may meet the tolerance with rigid
+    /// friction. `times` is the ratio of the error at `top` to the tolerance.
+    pub(crate) fn needed_harmonics(&self, top: usize, times: f64) -> usize {
+        let least = top as f64 * times.powf(1.0 / ORDER);
+        let doubled = successors(Some(top), |top| Some(self.harmonic_set.doubled(*top)));
+        doubled
+            .skip(1)
+            .find(|top| *top as f64 >= least || *top > MOST_HARMONICS * self.harmonic_set.count_factor)
+            .expect("they grow")
+    }
+
+    /// Returns true if a series with twice the harmonics can be solved and compared.
+    fn can_double(&self, top: usize) -> bool {
+        let double = self.harmonic_set.doubled(top);
+        double <= MOST_HARMONICS * self.harmonic_set.count_factor
+            && self.can_estimate_error(double, self.work_used(None))
+    }
+
+    /// Doubles the harmonics until the tolerance is met.
+    ///
+    /// The result is not the finest solution, but the last one whose error is known.
+    pub(crate) fn with_chosen_harmonics(
+        &mut self,
+        top: usize,
+        omega: f64,
+        warm: Option<(usize, HarmonicSolution)>,
+    ) -> Result<Orbit, OrbitError> {
+        let mut returned = None;
+        // if the return defect exceeds the tolerance, the orbit is still returned, and its
+        // evidence shows it
+        self.double_until_tolerance(top, omega, warm, &mut returned).or_else(|error| returned.ok_or(error))
+    }
+
+    /// Doubles the harmonics. `returned` keeps an orbit whose return defect exceeds the
+    /// tolerance.
+    fn double_until_tolerance(
+        &mut self,
+        mut top: usize,
+        omega: f64,
+        warm: Option<(usize, HarmonicSolution)>,
+        returned: &mut Option<Orbit>,
+    ) -> Result<Orbit, OrbitError> {
+        let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
+        let first = top;
+        let mut motion =
+            self.solve(top, omega, warm.as_ref().map(|(t, m)| (*t, m))).map_err(|l| self.solve_error(l))?;
+        let mut x = self.places(top, omega, &motion).map_err(|l| self.solve_error(l))?;
+        // the error is unknown until two solutions can be compared
+        let (mut checked, mut estimate) = (top, 1.0);
+        let mut needed = None;
+        while top <= MOST_HARMONICS * self.harmonic_set.count_factor
+            && self.can_estimate_error(top, self.work_used(None))
+        {
+            let (mut error, finer) = match self.estimate_error(top, omega, &motion, &x) {
+                Ok(compared) => compared,
+                // the error of the last solution is known
+                Err(_) if top > first && self.ports.has_forces() => {
+                    needed = self.is_budget_used().then(|| self.harmonic_set.doubled(top));
+                    break;
+                }
+                Err(_) if top > first && !self.is_budget_used() => break,
+                Err(error) => return Err(self.solve_error(error)),
+            };
+            if (self.ports.has_forces() || self.steep) && top > first {
+                error = error.max(LEAST_ERROR_RATIO * estimate);
+            }
+            // friction that falls with velocity makes chance agreement frequent, so one
+            // comparison is not enough
+            let shown = top > first || !(self.steep && self.ports.has_falling());
+            if error <= tolerance && shown {
+                let orbit = self.make_orbit(top, omega, motion.clone(), x.clone(), Some(error))?;
+                let judged = orbit.evidence.error_estimate.unwrap_or(error);
+                let before = returned.as_ref().and_then(|orbit| orbit.evidence.error_estimate);
+                let closer = before.is_none_or(|before| judged <= 0.5 * before);
+                if judged <= tolerance || !closer || !self.can_double(top) {
+                    return Ok(orbit);
+                }
+                if returned.is_none() {
+                    self.limit = Some(budget::to_improve(self.work_used(None)));
+                }
+                *returned = Some(orbit);
+                error = judged;
+            }
+            (checked, estimate) = (top, error);
+            if self.ports.has_forces() && top > first {
+                let enough = self.needed_harmonics(top, error / tolerance);
+                if !self.can_estimate_error(enough, self.work_used(None)) {
+                    needed = Some(enough);
+                    break;
+                }
+            }
+            top = self.harmonic_set.doubled(top);
+            // the comparison solved the finer series less accurately, or with other samples
+            motion = self.solve(top, omega, Some((top, &finer))).map_err(|l| self.solve_error(l))?;
+            x = self.places(top, omega, &motion).map_err(|l| self.solve_error(l))?;
+        }
+        let harmonics = checked / self.periods;
+        let state =
+            self.orbit_of(top, omega, &motion, x, None).map_or_else(|_| Vec::new(), |orbit| orbit.initial_state);
+        Err(OrbitError::Truncation {
+            method: NAME,
+            omega: self.excitation_frequency,
+            harmonics,
+            needed: needed.map(|needed| needed / self.periods),
+            estimate,
+            tolerance,
+            state,
+            advice: String::new(),
+        })
+    }
+}

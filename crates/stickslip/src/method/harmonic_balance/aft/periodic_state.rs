@@ -1,0 +1,688 @@
+//! Laws with memory: integration of their states through the samples of a period until the
+//! states repeat, with the exact derivative of the computed result.
+//!
+//! A step computes states and forces from the previous states and its inputs. The inputs are
+//! linear in the harmonics of the motion. The states `z` at t = 0 are periodic if `z = F(z)`,
+//! with the map `F` over one period. Newton's method solves this with `Π`, the product of the
+//! steps' derivatives; if it does not converge, the integration continues for more periods.
+//!
+//! The derivative by a harmonic of the motion follows from `δz = Π δz + δq`. If some state is
+//! never forgotten, as in a permanently stuck contact, `1 - Π` is singular. Along such
+//! directions, states and derivatives are those of a joint that moves straight from static
+//! equilibrium to the beginning of the period.
+
+use super::frequency_time::{FrequencyTime, amplitude_factor};
+use super::workspace::{PERIODICITY_TOLERANCE, StepWorkspace, derivative_batch};
+use crate::law::MAX_DIRECTIONS;
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::ops::Range;
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
+use stickslip_numerics::interrupt;
+
+/// Replaces [`PERIODICITY_TOLERANCE`] if the change over a period no longer decreases.
+const ROUNDED: f64 = 1e-9;
+/// Maximum number of periods with derivatives; hysteresis that slips forgets in a few.
+const PERIODS: usize = 60;
+/// Maximum number of initial periods without derivatives, and the ratio of successive changes
+/// above which they end. A period with derivatives costs as much as three without.
+const PLAIN_PERIODS: usize = 6;
+const SLOW_RATIO: f64 = 0.03;
+/// Ratio to the least change so far that a step of Broyden's method must reach.
+/// Two misses in a row end the iteration.
+const BROYDEN_REDUCTION: f64 = 0.3;
+/// Singular values of `1 - Π` below this belong to states that are never forgotten.
+const NEUTRAL_SINGULAR_VALUE: f64 = 1e-9;
+/// Number of harmonics up to which a matrix product transforms derivatives, instead of FFTs.
+const MATRIX_HARMONICS: usize = 16;
+
+/// A law with memory as a sequence of steps.
+pub(super) trait StepSequence {
+    fn states(&self) -> usize;
+    /// Returns the size of the states.
+    fn state_scale(&self) -> f64;
+    fn axes(&self) -> usize;
+    /// Returns the number of inputs of a step for each axis. Inputs are ordered
+    /// by kind, then by axis.
+    fn inputs(&self) -> usize;
+    /// Tells whether the last derivative of a step is that by ω, at fixed displacements.
+    fn knows_frequency(&self) -> bool {
+        false
+    }
+    /// Returns the factors `w` of the inputs `Re(U w)` along an axis, for the
+    /// motion `Re(U e^{jhθ})` and a step that ends where `e^{jhθ}` equals `at`.
+    /// `angle` is the length of a step.
+    fn input_factors(&self, h: usize, angle: f64, at: Complex64) -> [Complex64; 4];
+    /// Returns these factors for the initial step.
+    fn initial_input_factors(&self, h: usize) -> [Complex64; 4];
+    /// Takes all steps of a period: from sample 0 to sample 1, and at last from
+    /// the last sample to sample 0. Replaces the states `z` at sample 0 by
+    /// those after the period, and writes the forces at the samples.
+    ///
+    /// `rows`, [sample], receives the derivatives of the step that ends at the sample: those of
+    /// the states after it, then those of the forces. Its columns are the inputs, the states
+    /// before, and ω if that is known. Returns false if a step has no solution.
+    fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    /// Takes the initial step, straight from static equilibrium to sample 0.
+    /// Returns false if it has no solution.
+    fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+}
+
+impl FrequencyTime {
+    /// Computes the forces along the axes and their derivative. The forces are
+    /// NaN if no periodic states are found.
+    pub(super) fn periodic_response(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        force: &mut [Complex64],
+        tangent: Option<&mut [f64]>,
+    ) {
+        let nh = self.harmonics.len();
+        let mut memory = std::mem::take(&mut self.workspace);
+        if let Some(product) = self.find_periodic_state(sequence, &mut memory, tangent.is_some()) {
+            for a in 0..sequence.axes() {
+                self.add_force(a, &mut force[a * nh..(a + 1) * nh]);
+            }
+            if let Some(tangent) = tangent
+                && !self.memory_tangent(sequence, &mut memory, &product, tangent)
+            {
+                force.fill(Complex64::new(f64::NAN, 0.0));
+            }
+        } else {
+            self.state.clear();
+            force.fill(Complex64::new(f64::NAN, 0.0));
+        }
+        self.workspace = memory;
+    }
+
+    /// Finds periodic states, into `self.state`, and the forces. With `linear`,
+    /// computes the derivatives of all steps and returns Π; otherwise returns
+    /// an arbitrary matrix. `None` if no periodic states are found.
+    fn find_periodic_state(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        memory: &mut StepWorkspace,
+        linear: bool,
+    ) -> Option<DMatrix<f64>> {
+        let m = sequence.states();
+        let scale = sequence.state_scale();
+        let known = std::mem::take(&mut self.known_state);
+        let mut z = DVector::zeros(m);
+        let begun = m > 0 && known.state.len() == m;
+        if begun {
+            z.copy_from_slice(&known.state);
+        } else {
+            let mut force = [0.0; MAX_DIRECTIONS];
+            if !sequence.initial_step(z.as_mut_slice(), &mut force, None) {
+                return None;
+            }
+        }
+        if m > 0 && !linear && known.forgetting_inverse.len() == m * m {
+            let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
+            if self.broyden(sequence, &mut z, inverse)? {
+                return Some(DMatrix::zeros(m, m));
+            }
+        } else if linear
+            && self.periodicity_tolerance > PERIODICITY_TOLERANCE
+            && known.forgetting_inverse.len() == m * m
+        {
+            // known states from other samples: one period without derivatives brings them near
+            // enough, at a third of the cost of one with derivatives
+            let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
+            let change = self.period(sequence, &z, None)? - &z;
+            z += inverse * change;
+        } else if !begun {
+            // a law that slips forgets its initial states in a few periods without derivatives
+            let mut last = f64::INFINITY;
+            for _ in 0..PLAIN_PERIODS {
+                let after = self.period(sequence, &z, None)?;
+                let gap = (&after - &z).amax() / scale;
+                z = after;
+                if gap <= PERIODICITY_TOLERANCE && !linear {
+                    self.state.clear();
+                    self.state.extend(z.iter());
+                    return Some(DMatrix::zeros(m, m));
+                }
+                if gap <= PERIODICITY_TOLERANCE || gap > SLOW_RATIO * last {
+                    break;
+                }
+                last = gap;
+            }
+        }
+        let mut last = f64::INFINITY;
+        for _ in 0..PERIODS {
+            let (after, product) = self.linear_period(sequence, &z, memory)?;
+            let gap = (&after - &z).amax() / scale;
+            if m == 0 || gap <= self.periodicity_tolerance || (gap <= ROUNDED && gap >= 0.5 * last) {
+                self.state.clear();
+                self.state.extend(z.iter());
+                return Some(product);
+            }
+            // Newton step while the change halves, otherwise one more period
+            if gap < 0.5 * last || last.is_infinite() {
+                z += pseudo_inverse(DMatrix::identity(m, m) - product) * (after - &z);
+            } else {
+                z = after;
+            }
+            last = gap;
+        }
+        None
+    }
+
+    /// Finds periodic states from those of a nearby motion by Broyden's method. The initial
+    /// inverse Jacobian is that of the nearby motion. No derivatives are needed, which cost as
+    /// much as three periods. Returns whether the states were found, into `self.state`. If not,
+    /// `z` is the last iterate. `None` if a step has no solution.
+    ///
+    /// Source: Broyden, "A class of methods for solving nonlinear simultaneous
+    /// equations" (1965), his good method.
+    fn broyden(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        z: &mut DVector<f64>,
+        mut inverse: DMatrix<f64>,
+    ) -> Option<bool> {
+        let scale = sequence.state_scale();
+        let mut change = self.period(sequence, z, None)? - &*z;
+        let mut best = change.amax() / scale;
+        let mut waited = 0;
+        while best > PERIODICITY_TOLERANCE {
+            let step = &inverse * &change;
+            *z += &step;
+            let after = self.period(sequence, z, None)? - &*z;
+            let gap = after.amax() / scale;
+            (best, waited) = if gap < BROYDEN_REDUCTION * best { (gap, 0) } else { (best.min(gap), waited + 1) };
+            if waited > 1 || !gap.is_finite() {
+                return Some(false);
+            }
+            // the step that the inverse predicts for this change of the gap
+            let seen = &inverse * (&change - &after);
+            let size = step.dot(&seen);
+            if size != 0.0 {
+                inverse += (&step - &seen) * (step.transpose() * &inverse) / size;
+            }
+            change = after;
+        }
+        self.state.clear();
+        self.state.extend(z.iter());
+        Some(true)
+    }
+
+    /// Integrates one period and returns the states after it. `None` if a step has no solution.
+    fn period(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        z: &DVector<f64>,
+        mut rows: Option<&mut Vec<f64>>,
+    ) -> Option<DVector<f64>> {
+        interrupt::check();
+        let n = self.samples();
+        let (m, d) = (sequence.states(), sequence.axes());
+        let size = (m + d) * width(sequence);
+        if let Some(rows) = rows.as_deref_mut() {
+            rows.resize(n * size, 0.0);
+        }
+        let mut z = z.clone();
+        self.law_steps += n;
+        sequence.period(z.as_mut_slice(), &mut self.force, rows.map(|rows| &mut rows[..])).then_some(z)
+    }
+
+    /// Integrates one period with derivatives. Returns the states after it and Π, and writes
+    /// the derivatives of the forces by the initial states.
+    fn linear_period(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        z: &DVector<f64>,
+        memory: &mut StepWorkspace,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let after = self.period(sequence, z, Some(&mut memory.rows))?;
+        let n = self.samples();
+        memory.by_state.resize(n * sequence.axes() * sequence.states(), 0.0);
+        Some((after, PeriodDerivatives::new(sequence, &memory.rows, n).product(&mut memory.by_state)))
+    }
+
+    /// Adds the derivative of the forces. Returns false if the first period has no solution.
+    fn memory_tangent(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        memory: &mut StepWorkspace,
+        product: &DMatrix<f64>,
+        tangent: &mut [f64],
+    ) -> bool {
+        let (n, nh) = (self.samples(), self.harmonics.len());
+        let (m, d) = (sequence.states(), sequence.axes());
+        let size = 2 * nh * d;
+        let open = DMatrix::identity(m, m) - product;
+        let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL_SINGULAR_VALUE;
+        let inverse = pseudo_inverse(open);
+        self.forgetting_inverse.clear();
+        if !neutral {
+            self.forgetting_inverse.extend(inverse.transpose().iter());
+        }
+        // states that are never forgotten have the derivative of the first period
+        let beginning = if neutral {
+            let mut first = std::mem::take(&mut memory.first);
+            let rows = self.first_period(sequence, &mut first);
+            memory.first = first;
+            match rows {
+                Some(rows) => Some(rows),
+                None => return false,
+            }
+        } else {
+            None
+        };
+        let wide = 2 * nh;
+        let few = nh <= MATRIX_HARMONICS;
+        if few {
+            self.fill_projection(&mut memory.projection);
+            memory.of_states.resize(wide * d * m, 0.0);
+            let shape = ProductShape { rows: d * m, inner: n, columns: wide };
+            multiply_blocked(&memory.by_state, &memory.projection, &mut memory.of_states, shape, Transpose::Yes);
+        }
+        // a force that depends only on the end of the step has a slope at every sample
+        let one = Complex64::new(1.0, 0.0);
+        let ends = |h: &usize| sequence.inputs() == 2 && sequence.input_factors(*h, TAU / n as f64, one)[1] == one;
+        let by_ends = few && self.harmonics.iter().all(ends);
+        let own = if by_ends { d - PeriodDerivatives::new(sequence, &memory.rows, n).momentary() } else { d };
+        for a in own..d {
+            self.momentary_tangent(sequence, &memory.rows, a, tangent);
+        }
+        // few harmonics: all axes at once; a long series: one axis and a group
+        // of harmonics at a time
+        let (together, count) = if few { (d, nh) } else { (1, derivative_batch(d, n, nh).0) };
+        let moved = if own == 0 { 0 } else { d };
+        for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
+            self.fill_input_factors(sequence, memory, range.clone());
+            for first in (0..moved).step_by(together.max(1)) {
+                let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
+                let tall = together * wide_here;
+                self.differentiate_forces(
+                    sequence,
+                    memory,
+                    steps,
+                    (DerivativeVariable::Solution { first }, together, wide_here, own),
+                );
+                if few {
+                    // [sample][axis][column] times the projection on the harmonics
+                    memory.spectrum.resize(own * tall * wide, 0.0);
+                    let shape = ProductShape { rows: own * tall, inner: n, columns: wide };
+                    multiply_blocked(&memory.columns, &memory.projection, &mut memory.spectrum, shape, Transpose::Yes);
+                    for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
+                        for (a, values) in values.chunks_exact(tall).enumerate() {
+                            let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
+                            row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
+                            let by_state = memory.of_states[(to * d + a) * m..][..m].iter();
+                            by_state.zip(memory.shift.chunks_exact(tall)).for_each(|(by, shift)| add(row, *by, shift));
+                        }
+                    }
+                    continue;
+                }
+                memory.shift_columns(m, tall);
+                memory.signal.resize(n, 0.0);
+                for (a, column) in (0..d).flat_map(|a| (0..tall).map(move |column| (a, column))) {
+                    for i in 0..n {
+                        memory.signal[i] = memory.columns[(i * d + a) * tall + column];
+                    }
+                    let sums = self.fourier.transform(&mut memory.signal);
+                    for (l, &to) in self.harmonics.iter().enumerate() {
+                        let value = sums[to] * amplitude_factor(to, n);
+                        let at = (a * wide + 2 * l) * size + first * wide + 2 * range.start + column;
+                        tangent[at] += value.re;
+                        if to > 0 {
+                            tangent[at + size] += value.im;
+                        }
+                    }
+                }
+            }
+        }
+        if sequence.knows_frequency() {
+            self.differentiate_forces(
+                sequence,
+                memory,
+                (beginning.as_deref(), &inverse),
+                (DerivativeVariable::Frequency, 1, 1, d),
+            );
+            memory.shift_columns(m, 1);
+            memory.signal.resize(n, 0.0);
+            for a in 0..d {
+                for i in 0..n {
+                    memory.signal[i] = memory.columns[i * d + a];
+                }
+                self.add_by_frequency(a, &mut memory.signal);
+            }
+        }
+        true
+    }
+
+    /// Adds the derivative of the force along axis `a` by the displacement at
+    /// the end of the step, at every sample.
+    fn momentary_tangent(&mut self, sequence: &dyn StepSequence, rows: &[f64], a: usize, tangent: &mut [f64]) {
+        let (m, d, width) = (sequence.states(), sequence.axes(), width(sequence));
+        self.reserve_slopes(1);
+        for b in 0..d {
+            let slopes = rows.chunks_exact((m + d) * width).map(|rows| rows[(m + a) * width + d + b]);
+            self.slopes[0].iter_mut().zip(slopes).for_each(|(to, slope)| *to = slope);
+            if self.slope_spectrum(0, 0) {
+                self.add_slope(tangent, (a, b), d, |_| Complex64::new(1.0, 0.0));
+            }
+        }
+    }
+
+    /// Fills the matrix from a signal to its harmonics: real and imaginary parts, 2 × harmonics
+    /// for each sample. A mean has no imaginary part.
+    fn fill_projection(&self, projection: &mut Vec<f64>) {
+        let n = self.samples();
+        if projection.len() == 2 * self.harmonics.len() * n {
+            return;
+        }
+        projection.clear();
+        for i in 0..n {
+            for &h in &self.harmonics {
+                let wave = self.rotations[h * i % n] * amplitude_factor(h, n);
+                projection.extend([wave.re, if h == 0 { 0.0 } else { -wave.im }]);
+            }
+        }
+    }
+
+    /// Fills the derivatives of the inputs by the parts of some harmonics of a motion:
+    /// [sample][kind][part], followed by those of the initial step.
+    fn fill_input_factors(
+        &self,
+        sequence: &dyn StepSequence,
+        StepWorkspace { input_factors: waves, steps, .. }: &mut StepWorkspace,
+        range: Range<usize>,
+    ) {
+        let (n, kinds, harmonics) = (self.samples(), sequence.inputs(), &self.harmonics[range]);
+        // all steps have these factors, rotated on the unit circle
+        let one = Complex64::new(1.0, 0.0);
+        let each = harmonics.iter().map(|&h| sequence.input_factors(h, TAU / n as f64, one));
+        let fixed: Vec<[Complex64; 4]> =
+            each.chain(harmonics.iter().map(|&h| sequence.initial_input_factors(h))).collect();
+        if waves.len() == 2 * (n + 1) * kinds * harmonics.len() && *steps == fixed {
+            return;
+        }
+        waves.clear();
+        let mut at = vec![0; harmonics.len()];
+        for _ in 0..n {
+            for kind in 0..kinds {
+                for ((at, fixed), &h) in at.iter().zip(&fixed).zip(harmonics) {
+                    waves.extend(<[f64; 2]>::from(parts(fixed[kind] * self.rotations[*at], h)));
+                }
+            }
+            for (at, &h) in at.iter_mut().zip(harmonics) {
+                *at = (*at + h) % n;
+            }
+        }
+        for kind in 0..kinds {
+            let first = fixed[harmonics.len()..].iter().zip(harmonics);
+            waves.extend(first.flat_map(|(first, &h)| <[f64; 2]>::from(parts(first[kind], h))));
+        }
+        *steps = fixed;
+    }
+
+    /// Computes the derivative of the sampled forces by the inputs at fixed states at t = 0,
+    /// into `memory.columns`: [sample][axis][column], for the first `own` axes. Writes the
+    /// changes of these states that keep them periodic into `memory.shift`.
+    ///
+    /// The columns are the parts of the harmonics of the motion along `count` axes, or the
+    /// frequency. `beginning` contains the steps of the first period if some state is never
+    /// forgotten; the states at t = 0 then change with the inputs.
+    fn differentiate_forces(
+        &self,
+        sequence: &dyn StepSequence,
+        memory: &mut StepWorkspace,
+        (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
+        (input, count, wide, own): (DerivativeVariable, usize, usize, usize),
+    ) {
+        let n = self.samples();
+        let (m, d) = (sequence.states(), sequence.axes());
+        let width = width(sequence);
+        let size = (m + d) * width;
+        let by = InputLayout { input, kinds: sequence.inputs(), axes: d, width, wide, tall: count * wide };
+        let tall = by.tall;
+        let (mut start, mut next) = (vec![0.0; m * tall], vec![0.0; m * tall]);
+        let table = &memory.input_factors;
+        let at = |i: usize| &table[i * by.kinds * wide..][..by.kinds * wide];
+        let none = Vec::new();
+        let waves = |i: usize| if matches!(input, DerivativeVariable::Frequency) { &none[..] } else { at(i) };
+        if let Some(beginning) = beginning {
+            // the factors of the initial step follow those of the samples
+            by.advance(&memory.first[..m * width], waves(n), &next, &mut start);
+            for step in 1..=n {
+                let i = step % n;
+                by.advance(&beginning[i * size..][..m * width], waves(i), &start, &mut next);
+                std::mem::swap(&mut start, &mut next);
+            }
+        }
+        // one period from the initial change
+        memory.columns.resize(n * own * tall, 0.0);
+        let mut s = start.clone();
+        for step in 1..=n {
+            let i = step % n;
+            let (states, forces) = memory.rows[i * size..(i + 1) * size].split_at(m * width);
+            by.advance(states, waves(i), &s, &mut next);
+            let columns = &mut memory.columns[i * own * tall..][..own * tall];
+            let forces = &forces[..own * width];
+            let same = forces.iter().zip(states).take_while(|(a, b)| a == b).count() / width;
+            // forces that are states have the same derivatives
+            let (alike, other) = columns.split_at_mut(same * tall);
+            alike.copy_from_slice(&next[..same * tall]);
+            by.advance(&forces[same * width..], waves(i), &s, other);
+            std::mem::swap(&mut s, &mut next);
+        }
+        // the states at t = 0 change so that they stay periodic
+        memory.shift.clear();
+        memory.shift.resize(m * tall, 0.0);
+        for (r, shift) in memory.shift.chunks_exact_mut(tall).enumerate() {
+            for t in 0..m {
+                let weight = inverse[(r, t)];
+                let gap = s[t * tall..].iter().zip(&start[t * tall..]);
+                shift.iter_mut().zip(gap).for_each(|(shift, (s, start))| *shift += (s - start) * weight);
+            }
+        }
+    }
+
+    /// Computes the derivatives of the steps of the first period, and of the
+    /// initial step into `first`. Restores `self.force`.
+    fn first_period(&mut self, sequence: &mut dyn StepSequence, first: &mut Vec<f64>) -> Option<Vec<f64>> {
+        let (m, d) = (sequence.states(), sequence.axes());
+        first.resize((m + d) * width(sequence), 0.0);
+        let mut z = DVector::zeros(m);
+        let mut force = [0.0; MAX_DIRECTIONS];
+        if !sequence.initial_step(z.as_mut_slice(), &mut force, Some(first)) {
+            return None;
+        }
+        let forces = self.force.clone();
+        let mut rows = Vec::new();
+        let run = self.period(sequence, &z, Some(&mut rows));
+        self.force = forces;
+        run.map(|_| rows)
+    }
+}
+
+impl StepWorkspace {
+    /// Adds to the columns the effect of the changes of the states at t = 0 on the forces.
+    fn shift_columns(&mut self, states: usize, wide: usize) {
+        if states == 0 {
+            return;
+        }
+        for (column, by_state) in self.columns.chunks_exact_mut(wide).zip(self.by_state.chunks_exact(states)) {
+            by_state.iter().zip(self.shift.chunks_exact(wide)).for_each(|(by, shift)| add(column, *by, shift));
+        }
+    }
+}
+
+/// The derivatives of all steps of a period: [sample][state, then force]. The columns are the
+/// inputs, then from `before` on the states before the step.
+struct PeriodDerivatives<'a> {
+    rows: &'a [f64],
+    width: usize,
+    before: usize,
+    states: usize,
+    axes: usize,
+    samples: usize,
+}
+
+impl<'a> PeriodDerivatives<'a> {
+    fn new(sequence: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
+        let (states, axes) = (sequence.states(), sequence.axes());
+        PeriodDerivatives { rows, width: width(sequence), before: sequence.inputs() * axes, states, axes, samples }
+    }
+
+    /// Returns the number of trailing forces that depend only on the end of the step at every
+    /// sample. The inputs are the displacements before and after the step.
+    fn momentary(&self) -> usize {
+        let size = (self.states + self.axes) * self.width;
+        let remember = |a: usize| {
+            let row = |rows: &'a [f64]| &rows[(self.states + a) * self.width..][..self.width];
+            let mut rows = self.rows[..self.samples * size].chunks_exact(size).map(row);
+            rows.any(|row| row[..self.axes].iter().chain(&row[2 * self.axes..]).any(|x| *x != 0.0))
+        };
+        (0..self.axes).rev().take_while(|a| !remember(*a)).count()
+    }
+
+    /// Returns Π, the derivative of the states after a period by those before
+    /// it. Writes the derivative of the forces at the samples by these states
+    /// into `forces`, [sample][axis][state].
+    fn product(&self, forces: &mut [f64]) -> DMatrix<f64> {
+        match self.states {
+            0 => DMatrix::zeros(0, 0),
+            1 => self.product_static::<1>(forces),
+            2 => self.product_static::<2>(forces),
+            _ => self.product_dynamic(forces),
+        }
+    }
+
+    /// Computes the product for a fixed number of states; most laws have one or two.
+    fn product_static<const M: usize>(&self, forces: &mut [f64]) -> DMatrix<f64> {
+        let mut product: [[f64; M]; M] = std::array::from_fn(|s| std::array::from_fn(|t| f64::from(u8::from(s == t))));
+        for step in 1..=self.samples {
+            let i = step % self.samples;
+            let rows = &self.rows[i * (M + self.axes) * self.width..][..(M + self.axes) * self.width];
+            let (states, own) = rows.split_at(M * self.width);
+            let times = |row: &[f64]| -> [f64; M] {
+                let row = &row[self.before..self.before + M];
+                std::array::from_fn(|t| row.iter().zip(&product).map(|(x, p)| x * p[t]).sum())
+            };
+            let out = forces[i * self.axes * M..][..self.axes * M].chunks_exact_mut(M);
+            own.chunks_exact(self.width).zip(out).for_each(|(row, out)| out.copy_from_slice(&times(row)));
+            product = std::array::from_fn(|s| times(&states[s * self.width..]));
+        }
+        DMatrix::from_fn(M, M, |s, t| product[s][t])
+    }
+
+    fn product_dynamic(&self, forces: &mut [f64]) -> DMatrix<f64> {
+        let m = self.states;
+        let mut product = DMatrix::identity(m, m);
+        for step in 1..=self.samples {
+            let i = step % self.samples;
+            let size = (m + self.axes) * self.width;
+            let rows = DMatrix::from_row_slice(m + self.axes, self.width, &self.rows[i * size..(i + 1) * size]);
+            let next = rows.columns(self.before, m) * &product;
+            let out = &mut forces[i * self.axes * m..][..self.axes * m];
+            out.iter_mut().enumerate().for_each(|(at, out)| *out = next[(m + at / m, at % m)]);
+            product = next.rows(0, m).into_owned();
+        }
+        product
+    }
+}
+
+/// Returns the number of derivatives of a step: by its inputs, by the states
+/// before it, and by ω if that is known.
+fn width(sequence: &dyn StepSequence) -> usize {
+    sequence.inputs() * sequence.axes() + sequence.states() + usize::from(sequence.knows_frequency())
+}
+
+/// The variables of a derivative.
+#[derive(Clone, Copy)]
+enum DerivativeVariable {
+    /// The harmonics of the motion along this axis and the next ones.
+    Solution { first: usize },
+    /// The frequency ω.
+    Frequency,
+}
+
+/// Returns the derivatives of `Re(U wave)` by the real and imaginary part of U, of harmonic `h`.
+fn parts(wave: Complex64, h: usize) -> (f64, f64) {
+    (wave.re, if h == 0 { 0.0 } else { -wave.im })
+}
+
+/// Layout of the derivatives of a step by its inputs.
+struct InputLayout {
+    input: DerivativeVariable,
+    kinds: usize,
+    axes: usize,
+    width: usize,
+    /// Number of columns of one axis, and of all.
+    wide: usize,
+    tall: usize,
+}
+
+impl InputLayout {
+    /// Multiplies `rows` by the inputs, [kind][column of any axis], and by the states,
+    /// [state][column]. Writes the result into `out`, [row][column].
+    #[inline]
+    fn advance(&self, rows: &[f64], waves: &[f64], states: &[f64], out: &mut [f64]) {
+        for (row, out) in rows.chunks_exact(self.width).zip(out.chunks_exact_mut(self.tall)) {
+            let before = &row[self.kinds * self.axes..];
+            for (number, out) in out.chunks_exact_mut(self.wide).enumerate() {
+                let states = states.chunks_exact(self.tall).map(|state| &state[number * self.wide..][..self.wide]);
+                match self.input {
+                    // most laws: two inputs and two states, all at once
+                    DerivativeVariable::Solution { first } if self.kinds == 2 && states.len() == 2 => {
+                        let weights = [row[first + number], row[self.axes + first + number], before[0], before[1]];
+                        let mut states = states;
+                        let (Some(one), Some(two)) = (states.next(), states.next()) else { continue };
+                        let (from, to) = waves.split_at(self.wide);
+                        mix(weights, [from, to, one, two], out);
+                        continue;
+                    }
+                    DerivativeVariable::Solution { first } => {
+                        out.fill(0.0);
+                        for (kind, wave) in waves.chunks_exact(self.wide).enumerate() {
+                            add(out, row[kind * self.axes + first + number], wave);
+                        }
+                    }
+                    DerivativeVariable::Frequency => out.fill(row[self.width - 1]),
+                }
+                before.iter().zip(states).for_each(|(weight, state)| add(out, *weight, state));
+            }
+        }
+    }
+}
+
+/// Computes the weighted sum of inputs and states. An open contact has only zero weights; one
+/// that sticks along another axis has no weights of inputs.
+#[inline]
+fn mix(weights: [f64; 4], [from, to, one, two]: [&[f64]; 4], out: &mut [f64]) {
+    let states = one.iter().zip(two);
+    if weights == [0.0; 4] {
+        out.fill(0.0);
+    } else if weights[..2] == [0.0; 2] {
+        out.iter_mut().zip(states).for_each(|(out, (one, two))| *out = weights[2] * one + weights[3] * two);
+    } else {
+        for ((out, (from, to)), (one, two)) in out.iter_mut().zip(from.iter().zip(to)).zip(states) {
+            *out = (weights[0] * from + weights[1] * to) + (weights[2] * one + weights[3] * two);
+        }
+    }
+}
+
+/// Adds `weight` times `values`. Most weights of a step are zero.
+#[inline]
+fn add(to: &mut [f64], weight: f64, values: &[f64]) {
+    if weight != 0.0 {
+        to.iter_mut().zip(values).for_each(|(to, value)| *to += weight * value);
+    }
+}
+
+/// Returns the pseudo-inverse, with singular values below [`NEUTRAL_SINGULAR_VALUE`] taken as
+/// zero.
+fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let m = matrix.nrows();
+    if m == 0 {
+        return matrix;
+    }
+    let svd = matrix.svd(true, true);
+    svd.pseudo_inverse(NEUTRAL_SINGULAR_VALUE).unwrap_or_else(|_| DMatrix::zeros(m, m))
+}

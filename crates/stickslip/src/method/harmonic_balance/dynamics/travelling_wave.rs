@@ -1,0 +1,130 @@
+//! Dynamic stiffness of a tuned ring in travelling waves, from one sector.
+
+use super::uncoupled_modes::UndampedResonance;
+use crate::method::harmonic_balance::equations::regularization::regularizing_stiffness;
+use crate::model::CyclicSymmetry;
+use crate::structure::{DynamicStiffness, RingSector, Structure, Wave, WaveStiffness, unit_root};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Factored dynamic stiffness at a complex rate (1/s), for an excitation frequency (rad/s). It
+/// is singular at a resonance without damping.
+#[derive(Debug, Clone)]
+pub(crate) struct FactoredStiffness<F = DynamicStiffness> {
+    pub rate: Complex64,
+    pub omega: f64,
+    pub factor: Result<Arc<F>, UndampedResonance>,
+}
+
+/// Waves on a ring: one for each nodal diameter that a harmonic has used.
+#[derive(Debug, Clone)]
+pub(crate) struct TravellingWaves {
+    pub cyclic: CyclicSymmetry,
+    pub sector: RingSector,
+    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, UndampedResonance>>>,
+    factors: RefCell<Vec<(usize, FactoredStiffness<WaveStiffness>)>>,
+}
+
+impl TravellingWaves {
+    pub fn new(structure: &Structure, cyclic: CyclicSymmetry) -> Option<Self> {
+        let sector = RingSector::from_ring(structure, cyclic.sectors)?;
+        Some(TravellingWaves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
+    }
+
+    /// Replaces complex forces on the first sector by its displacements in a wave, column by
+    /// column.
+    fn solve(
+        &self,
+        diameter: usize,
+        (s, omega): (Complex64, f64),
+        loads: &mut [Complex64],
+    ) -> Result<(), UndampedResonance> {
+        self.factor(diameter, s, omega)?.solve(loads);
+        Ok(())
+    }
+
+    /// Returns the factored dynamic stiffness. It is kept until the excitation frequency
+    /// changes.
+    fn factor(&self, diameter: usize, s: Complex64, omega: f64) -> Result<Arc<WaveStiffness>, UndampedResonance> {
+        let mut factors = self.factors.borrow_mut();
+        factors.retain(|(_, kept)| kept.omega == omega);
+        if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
+            return kept.factor.clone();
+        }
+        let mut met = self.met.borrow_mut();
+        let wave = met
+            .entry(diameter)
+            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| UndampedResonance))
+            .clone()?;
+        let factor =
+            wave.dynamic_stiffness(s, regularizing_stiffness(s, omega)).map(Arc::new).map_err(|_| UndampedResonance);
+        factors.push((diameter, FactoredStiffness { rate: s, omega, factor: factor.clone() }));
+        factor
+    }
+
+    /// Returns `Wᴴ` in a wave, n × q: the forces on the first sector under unit forces along
+    /// the axes of its joints. Rows of neighbouring sectors enter with their phase.
+    fn columns(&self, diameter: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<Complex64> {
+        let n = self.sector.dofs();
+        let mut columns = DMatrix::from_element(n, directions.len(), ZERO);
+        for (q, rows) in directions.iter().enumerate() {
+            rows.iter().for_each(|&(i, w)| columns[(i % n, q)] += self.phase(diameter, i / n).conj() * w);
+        }
+        columns
+    }
+
+    /// Returns the phase of a sector in a wave.
+    fn phase(&self, diameter: usize, sector: usize) -> Complex64 {
+        unit_root((diameter * sector) as i64, self.cyclic.sectors)
+    }
+
+    /// Returns the receptance of the axes in a wave, q × q.
+    pub fn receptance(
+        &self,
+        diameter: usize,
+        at: (Complex64, f64),
+        directions: &[Vec<(usize, f64)>],
+    ) -> Result<DMatrix<Complex64>, UndampedResonance> {
+        let columns = self.columns(diameter, directions);
+        let mut moved = columns.clone();
+        self.solve(diameter, at, moved.as_mut_slice())?;
+        Ok(columns.adjoint() * moved)
+    }
+
+    /// Returns the displacement along each axis under a unit force along that axis alone,
+    /// without forces on the other sectors, at a real rate. It is the mean over all waves.
+    pub fn diagonal_receptance(
+        &self,
+        (rate, omega): (f64, f64),
+        directions: &[Vec<(usize, f64)>],
+    ) -> Result<Vec<f64>, UndampedResonance> {
+        let sectors = self.cyclic.sectors;
+        let mut own = vec![0.0; directions.len()];
+        for diameter in 0..=sectors / 2 {
+            // a wave and its reverse have the same stiffness
+            let both = if (2 * diameter).is_multiple_of(sectors) { 1.0 } else { 2.0 };
+            let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions)?;
+            own.iter_mut().enumerate().for_each(|(q, own)| *own += both * receptance[(q, q)].re / sectors as f64);
+        }
+        Ok(own)
+    }
+
+    /// Returns the displacements of the ring under forces that travel around it.
+    pub fn respond(
+        &self,
+        diameter: usize,
+        at: (Complex64, f64),
+        force: &DVector<Complex64>,
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
+        let n = self.sector.dofs();
+        let mut one = force.as_slice()[..n].to_vec();
+        self.solve(diameter, at, &mut one)?;
+        let phases: Vec<Complex64> = (0..self.cyclic.sectors).map(|k| self.phase(diameter, k)).collect();
+        Ok(DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n]))
+    }
+}

@@ -1,0 +1,892 @@
+//! Newton steps by GMRES, for structures that couple many joints: the Jacobian
+//! `δ r_y - r_u R f_y` is applied as a product and not formed.
+//!
+//! Laws couple harmonics, the structure couples joints. A product applies the laws and then the
+//! structure. GMRES takes a few tens of products if its preconditioner is close to the Jacobian.
+//! The preconditioner has the equations with the mean stiffness of every joint over the period:
+//! - Receptances as matrices: one complex matrix over the axes per harmonic, with the mean
+//!   stiffness at that harmonic. Rigid friction couples the lowest harmonics by more than their
+//!   mean; these harmonics are factored together.
+//! - Large structures in modes: `R = S + Φ diag(g) Φᵀ`. The residual flexibility S of modes far
+//!   above the harmonics is the same for all harmonics. So is the factor of `1 + S K` with one
+//!   stiffness for all. The other modes enter by Woodbury's formula, with one row per mode.
+//!
+//! Preconditioners are kept from step to step, and in modes from frequency to
+//! frequency, for as long as they help.
+//!
+//! Memory: per harmonic two complex matrices over the axes; in modes, two real
+//! matrices over the axes and one over axes and modes.
+
+use super::linearization::LinearizedEquations;
+use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Port, Ports};
+use crate::method::harmonic_balance::dynamics::linear_dynamics::CACHED;
+use crate::method::harmonic_balance::dynamics::receptance::{ModalReceptance, Receptance};
+use crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE;
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip_numerics::complex_gemv::ComplexGemv;
+use stickslip_numerics::dense::{ComplexLu, DenseLu, ProductShape, Transpose, multiply_blocked};
+use stickslip_numerics::gmres::{Gmres, GmresLimits};
+
+const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+
+/// Number of unknowns from which GMRES is faster than elimination, with derivatives by all
+/// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
+/// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. The second limit applies with
+/// rigid friction, whose lowest harmonics are eliminated in any case.
+const KRYLOV_UNKNOWNS: usize = 200;
+const MANY_OF_FORCES: usize = 400;
+/// Number of unknowns up to which the Jacobian is formed if GMRES does not
+/// converge: 130 MB, seconds.
+pub(crate) const FORMED_UNKNOWNS: usize = 4096;
+/// Number of unknowns from which GMRES is used for few directions with rigid
+/// friction, whose series are long. Measured: a step of 10 joints with 128
+/// harmonics, 2560 unknowns, takes 80 products, an eighth of its elimination.
+const KRYLOV_LONG_SERIES: usize = 2048;
+/// Number of unknowns of the lowest harmonics that are factored together to precondition such a
+/// step. Measured: with a quarter of the harmonics a step takes 80 products, with an eighth
+/// 150. With none, each harmonic by its mean, it does not converge in hundreds.
+const LOWEST_UNKNOWNS: usize = 1000;
+/// Tells whether a discretization with `size` unknowns uses GMRES.
+pub(crate) fn uses_krylov(size: usize, ports: &Ports) -> bool {
+    let many = if ports.has_forces() { MANY_OF_FORCES } else { KRYLOV_UNKNOWNS };
+    let many = size >= many && ports.count() >= KRYLOV_AXES;
+    size > FORMED_UNKNOWNS || many || (size > KRYLOV_LONG_SERIES && ports.has_forces())
+}
+
+/// Relative tolerance of GMRES, as a share of Newton's residual, and its upper bound.
+/// Derivatives of laws cost as much as tens of products, so that fewer Newton steps count more.
+const FORCING_TERM: f64 = 0.1;
+const COARSEST: f64 = 1e-6;
+/// Upper bound with modes, whose products cost more than derivatives do: for 1000 nodes one
+/// product takes 50 ms, all derivatives 0.3 s.
+const COARSEST_OF_MODES: f64 = 1e-2;
+/// Lower bound with coarse derivatives, which have an error of this size. Measured: with a
+/// tenth of it, a point of 16 nodes takes 2 % longer.
+const FINEST_OF_SKETCHES: f64 = 1e-2;
+/// Maximum number of Krylov vectors, and of products.
+const VECTORS: usize = 80;
+const PRODUCTS: usize = 320;
+/// Relative residual of the linear equations up to which a step is used.
+const USEFUL: f64 = 0.1;
+/// Number of products beyond which a kept preconditioner is replaced.
+const KEPT_PRODUCTS: usize = 25;
+/// Number of products that later steps may take in total in excess of the step for which a
+/// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
+const EXCESS_PRODUCTS: usize = 10;
+/// Modes with frequencies above this multiple of the highest harmonic respond almost statically.
+const ABOVE: f64 = 3.0;
+
+/// Residual flexibility of the modes above a bound, from a discarded split.
+type KeptResidualFlexibility = (f64, Arc<Vec<f64>>);
+
+/// GMRES and the preconditioners that it keeps.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NewtonKrylov {
+    gmres: Gmres,
+    /// Preconditioner for receptances as matrices, with the derivatives of this
+    /// motion or a nearby one.
+    harmonics: Option<BlockPreconditioner>,
+    split: Option<ModalPreconditioner>,
+    above: Option<KeptResidualFlexibility>,
+    /// Forces of a product, and the motions that they cause.
+    force: Vec<Complex64>,
+    moved: Vec<Complex64>,
+    /// Forces of one port, real and imaginary parts.
+    parts: Vec<f64>,
+}
+
+/// The state in which a Newton step begins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepStart {
+    /// The length of motions, m, see `Discretization::motion_scale`.
+    pub length: f64,
+    /// The size of the residual.
+    pub residual: f64,
+    /// True if derivatives, or all of the equations, use the coarse sampling,
+    /// see `Discretization::complete_derivatives`.
+    pub coarse: bool,
+    /// True if the derivatives are those of the last step, whose preconditioner then fits.
+    pub same_derivatives: bool,
+}
+
+impl NewtonKrylov {
+    /// Returns the memory of the kept preconditioner, bytes.
+    #[cfg(test)]
+    pub(crate) fn bytes(&self) -> usize {
+        let Some(BlockPreconditioner { lowest, others, .. }) = &self.harmonics else { return 0 };
+        let of = |answer: &BlockSolver| match answer {
+            BlockSolver::Inverse(inverse) => inverse.bytes(),
+            BlockSolver::Factor(factor) => factor.bytes(),
+        };
+        others.iter().map(of).sum::<usize>() + lowest.transposed.bytes()
+    }
+
+    /// Computes the Newton step. `step` contains the residual in units on
+    /// entry, and the step on return. Returns whether it was found, and the
+    /// number of products. If it was not found, `step` is the residual again.
+    pub(crate) fn step(
+        &mut self,
+        linear: &LinearizedEquations<'_>,
+        receptance: &mut Receptance,
+        step: &mut [f64],
+        near: StepStart,
+    ) -> (bool, usize) {
+        let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
+        let (residual, finest) = (near.residual, if near.coarse { FINEST_OF_SKETCHES } else { 0.0 });
+        let wanted = (FORCING_TERM * residual)
+            .min(coarsest)
+            .max(FORCING_TERM * RESIDUAL_TOLERANCE / residual.max(RESIDUAL_TOLERANCE))
+            .max(finest);
+        let limits = GmresLimits { tolerance: wanted, restart: VECTORS, products: PRODUCTS };
+        let right = step.to_vec();
+        let (mut fresh, mut products) = (false, 0);
+        let NewtonKrylov { gmres, harmonics, split, above, force, moved, parts } = self;
+        // with unknown forces, the samples that slip couple the lowest harmonics
+        harmonics.take_if(|_| !near.same_derivatives && linear.ports.has_forces());
+        let found = loop {
+            let Some(preconditioner) =
+                linear.preconditioner(receptance, (&mut *harmonics, &mut *split, &mut *above), &mut fresh)
+            else {
+                break false;
+            };
+            let most =
+                if fresh { limits } else { GmresLimits { products: KEPT_PRODUCTS, restart: KEPT_PRODUCTS, ..limits } };
+            let outcome = gmres.solve(
+                step,
+                most,
+                |v, out| linear.multiply(receptance, (&mut *force, &mut *moved, &mut *parts), v, out),
+                |v| preconditioner.apply(linear, v),
+            );
+            products += outcome.products;
+            if let Some(known) = harmonics.as_mut().filter(|_| fresh) {
+                known.products = outcome.products;
+            }
+            harmonics.take_if(|known| {
+                known.excess += outcome.products.saturating_sub(known.products);
+                known.excess > EXCESS_PRODUCTS
+            });
+            if fresh || outcome.solved {
+                break outcome.solved || outcome.residual <= USEFUL;
+            }
+            // the stiffness of another motion
+            *harmonics = None;
+            *above = split.take().map(|split| (split.bound, split.residual_flexibility));
+            step.copy_from_slice(&right);
+        };
+        if !found {
+            step.copy_from_slice(&right);
+        }
+        (found && step.iter().all(|d| d.is_finite()), products)
+    }
+}
+
+/// Returns the number of entries in the factor of the lowest harmonics.
+pub(crate) fn lowest_factor_entries(ports: &Ports, harmonics: usize) -> usize {
+    (2 * ports.count() * lowest_count(ports, harmonics)).pow(2)
+}
+
+/// Returns the number of lowest harmonics that are factored together; zero if it would be one.
+fn lowest_count(ports: &Ports, harmonics: usize) -> usize {
+    let count = if ports.has_forces() { LOWEST_UNKNOWNS / (2 * ports.count()) } else { 0 };
+    if count < 2 { 0 } else { count.min(harmonics) }
+}
+
+impl LinearizedEquations<'_> {
+    /// Multiplies the Jacobian by a step, both in units.
+    fn multiply(
+        &self,
+        receptance: &mut Receptance,
+        (force, moved, parts): (&mut Vec<Complex64>, &mut Vec<Complex64>, &mut Vec<f64>),
+        v: &[f64],
+        out: &mut [f64],
+    ) {
+        let nh = self.harmonics.len();
+        let pair = 2 * nh;
+        force.resize(v.len() / 2, ZERO);
+        moved.resize(v.len() / 2, ZERO);
+        // f_y
+        for (p, port) in self.ports.iter().enumerate() {
+            let wide = pair * port.axes;
+            let unit = port.unit(self.length);
+            let v = &v[port.first_axis * pair..][..wide];
+            let force = &mut force[port.first_axis * nh..][..wide / 2];
+            if port.is_force() {
+                force.iter_mut().zip(v.chunks_exact(2)).for_each(|(f, v)| *f = Complex64::new(v[0], v[1]) * unit);
+                continue;
+            }
+            parts.resize(wide, 0.0);
+            // the tangent is row-major, so that v multiplies its transpose from the left
+            multiply_blocked(
+                v,
+                self.tangent(p, port),
+                parts,
+                ProductShape { rows: 1, inner: wide, columns: wide },
+                Transpose::No,
+            );
+            force.iter_mut().zip(parts.chunks_exact(2)).for_each(|(f, z)| *f = Complex64::new(z[0], z[1]) * unit);
+        }
+        receptance.apply(force, moved);
+        for (p, port) in self.ports.iter().enumerate() {
+            let wide = pair * port.axes;
+            let range = port.first_axis * pair..port.first_axis * pair + wide;
+            let unit = port.unit(self.length);
+            let (v, out, units) = (&v[range.clone()], &mut out[range.clone()], &self.units[range]);
+            let moved = &moved[port.first_axis * nh..][..wide / 2];
+            if !port.is_force() {
+                for (i, out) in out.iter_mut().enumerate() {
+                    let u = moved[i / 2];
+                    *out = (unit * v[i] + if i % 2 == 0 { u.re } else { u.im }) / units[i];
+                }
+                continue;
+            }
+            // λ minus T times the change of λ + ε u', with u = -R f
+            let penalty = self.penalty[p];
+            let changed: Vec<f64> = moved
+                .iter()
+                .enumerate()
+                .flat_map(|(i, u)| {
+                    let rate =
+                        if penalty.is_finite() { penalty * self.harmonics[i % nh] as f64 * self.omega } else { 0.0 };
+                    let z = Complex64::new(v[2 * i], v[2 * i + 1]) * unit - Complex64::new(0.0, rate) * u;
+                    [z.re, z.im]
+                })
+                .collect();
+            for (i, (out, row)) in out.iter_mut().zip(self.tangent(p, port).chunks_exact(wide)).enumerate() {
+                let kept = 1.0 + self.homotopy.diagonal_term(self.harmonics[i % pair / 2]);
+                *out = (kept * unit * v[i] - dot(row, &changed)) / units[i];
+            }
+        }
+    }
+
+    /// Returns the complex mean of a port's tangent at harmonic number `k`,
+    /// between two of its axes.
+    fn mean(&self, tangent: &[f64], axes: usize, (a, b): (usize, usize), k: usize) -> Complex64 {
+        let pair = 2 * self.harmonics.len();
+        let wide = pair * axes;
+        let at = |i: usize, j: usize| tangent[(a * pair + 2 * k + i) * wide + b * pair + 2 * k + j];
+        if self.harmonics[k] == 0 {
+            return Complex64::new(at(0, 0), 0.0);
+        }
+        Complex64::new(at(0, 0) + at(1, 1), at(1, 0) - at(0, 1)) * 0.5
+    }
+
+    /// Returns a kept preconditioner, or a new one. `None` if it is singular.
+    /// `fresh` becomes true if it belongs to this motion.
+    fn preconditioner<'b>(
+        &self,
+        receptance: &Receptance,
+        (harmonics, kept, above): (
+            &'b mut Option<BlockPreconditioner>,
+            &'b mut Option<ModalPreconditioner>,
+            &mut Option<KeptResidualFlexibility>,
+        ),
+        fresh: &mut bool,
+    ) -> Option<Preconditioner<'b>> {
+        match receptance {
+            Receptance::Formed(formed) => {
+                *fresh = harmonics.is_none();
+                if harmonics.is_none() {
+                    let lowest = self.lowest(&formed.matrices)?;
+                    let rest = formed.matrices.iter().enumerate().skip(lowest.count);
+                    let others = rest.map(|(k, matrix)| self.harmonic_block(k, matrix)).collect::<Option<_>>()?;
+                    *harmonics = Some(BlockPreconditioner { lowest, others, products: 0, excess: 0 });
+                }
+                harmonics.as_ref().map(Preconditioner::Harmonics)
+            }
+            Receptance::Modal(modal) => {
+                let (bound, usable) = (ModalPreconditioner::bound(modal), kept.take());
+                let usable = usable.filter(|split| split.bound == bound);
+                *fresh = usable.is_none();
+                let mut split = match usable {
+                    Some(split) => split,
+                    None => ModalPreconditioner::new(
+                        modal,
+                        (bound, above.take().filter(|(of, _)| *of == bound).map(|(_, above)| above)),
+                        |p, port, a, b| {
+                            let tangent = self.tangent(p, port);
+                            let (first, count) = (usize::from(modal.closed.is_some()), self.harmonics.len());
+                            let means = (first..count).map(|k| self.mean(tangent, port.axes, (a, b), k).re);
+                            means.sum::<f64>() / (count - first).max(1) as f64
+                        },
+                        self.ports,
+                    )?,
+                };
+                split.excitation(modal)?;
+                Some(Preconditioner::Split(kept.insert(split)))
+            }
+        }
+    }
+
+    /// Factors the equations of the lowest harmonics, if forces are unknown.
+    fn lowest(&self, receptance: &[DMatrix<Complex64>]) -> Option<LowestHarmonicsFactor> {
+        let count = lowest_count(self.ports, self.harmonics.len());
+        let mut matrix = Vec::new();
+        self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
+        // the matrix is row-major: its transpose is factored
+        let transposed = DenseLu::new(matrix, 2 * count * self.ports.count()).ok()?;
+        Some(LowestHarmonicsFactor { count, transposed })
+    }
+
+    /// Factors the equations of one harmonic with the mean tangents.
+    fn harmonic_block(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<BlockSolver> {
+        let size = receptance.nrows();
+        let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
+        let mut matrix = vec![ZERO; size * size];
+        // R f_y
+        for (p, port) in self.ports.iter().enumerate() {
+            for b in 0..port.axes {
+                let column = &mut matrix[(port.first_axis + b) * size..][..size];
+                if port.is_force() {
+                    column.copy_from_slice(moved(port.first_axis + b));
+                    continue;
+                }
+                for a in 0..port.axes {
+                    let stiffness = self.mean(self.tangent(p, port), port.axes, (a, b), k);
+                    column.iter_mut().zip(moved(port.first_axis + a)).for_each(|(out, r)| *out += r * stiffness);
+                }
+            }
+        }
+        let h = self.harmonics[k];
+        for (p, port) in self.ports.iter().enumerate() {
+            if !port.is_force() {
+                port.range().for_each(|q| matrix[q * size + q] += 1.0);
+                continue;
+            }
+            let penalty = self.penalty[p];
+            let rate = if penalty.is_finite() { Complex64::new(0.0, penalty * h as f64 * self.omega) } else { ZERO };
+            let turn: Vec<Complex64> = (0..port.axes * port.axes)
+                .map(|ab| self.mean(self.tangent(p, port), port.axes, (ab / port.axes, ab % port.axes), k))
+                .collect();
+            for column in matrix.chunks_exact_mut(size) {
+                let moved: Vec<Complex64> = port.range().map(|q| column[q] * rate).collect();
+                for (a, q) in port.range().enumerate() {
+                    column[q] = (0..port.axes).map(|b| turn[a * port.axes + b] * moved[b]).sum();
+                }
+            }
+            for (a, q) in port.range().enumerate() {
+                matrix[q * size + q] += 1.0 + self.homotopy.diagonal_term(h);
+                for (b, column) in port.range().enumerate() {
+                    matrix[column * size + q] -= turn[a * port.axes + b];
+                }
+            }
+        }
+        ComplexLu::new(matrix, size).ok().map(|factor| BlockSolver::new(factor, size))
+    }
+}
+
+/// The solver of one harmonic. A matrix that fits in the cache is inverted: the
+/// inverse is exact enough for a preconditioner. It takes a fifth of the time
+/// of triangular solutions, whose rows are too short for blocks.
+#[derive(Debug, Clone)]
+enum BlockSolver {
+    Inverse(ComplexGemv),
+    Factor(ComplexLu),
+}
+
+impl BlockSolver {
+    fn new(factor: ComplexLu, size: usize) -> Self {
+        if size > CACHED {
+            return BlockSolver::Factor(factor);
+        }
+        let mut inverse = vec![ZERO; size * size];
+        inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
+        factor.solve(&mut inverse);
+        BlockSolver::Inverse(ComplexGemv::new(&inverse, size))
+    }
+
+    fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
+        match self {
+            BlockSolver::Inverse(inverse) => inverse.apply(right, memory),
+            BlockSolver::Factor(factor) => factor.solve(right),
+        }
+    }
+}
+
+/// The factor of the lowest harmonics together.
+#[derive(Debug, Clone)]
+struct LowestHarmonicsFactor {
+    count: usize,
+    /// The transposed Jacobian, in units.
+    transposed: DenseLu<f64>,
+}
+
+impl LowestHarmonicsFactor {
+    /// Returns the step of these harmonics alone, from the residual of all; both in units.
+    fn apply(&self, v: &[f64], pair: usize) -> Vec<f64> {
+        let mut own: Vec<f64> = v.chunks_exact(pair).flat_map(|v| &v[..2 * self.count]).copied().collect();
+        self.transposed.solve_adjoint(&mut own);
+        own
+    }
+}
+
+/// Preconditioner with the lowest harmonics together, and the others one by one.
+#[derive(Debug, Clone)]
+struct BlockPreconditioner {
+    lowest: LowestHarmonicsFactor,
+    others: Vec<BlockSolver>,
+    /// Products of the step for which it was made, and the total excess of later steps over it.
+    products: usize,
+    excess: usize,
+}
+
+enum Preconditioner<'a> {
+    Harmonics(&'a BlockPreconditioner),
+    Split(&'a mut ModalPreconditioner),
+}
+
+impl Preconditioner<'_> {
+    /// Replaces a residual in units by a step in units.
+    fn apply(&self, linear: &LinearizedEquations, v: &mut [f64]) {
+        let nh = linear.harmonics.len();
+        let together = match self {
+            Preconditioner::Harmonics(harmonics) => harmonics.lowest.apply(v, 2 * nh),
+            Preconditioner::Split(_) => Vec::new(),
+        };
+        v.iter_mut().zip(linear.units).for_each(|(v, unit)| *v *= unit);
+        match self {
+            Preconditioner::Harmonics(BlockPreconditioner { lowest, others, .. }) => {
+                let (mut column, mut memory) = (vec![ZERO; v.len() / (2 * nh)], Vec::new());
+                for (k, factor) in (lowest.count..).zip(others) {
+                    for (c, v) in column.iter_mut().zip(v.chunks_exact(2 * nh)) {
+                        *c = Complex64::new(v[2 * k], v[2 * k + 1]);
+                    }
+                    factor.apply(&mut column, &mut memory);
+                    for (c, v) in column.iter().zip(v.chunks_exact_mut(2 * nh)) {
+                        (v[2 * k], v[2 * k + 1]) = (c.re, c.im);
+                    }
+                }
+            }
+            Preconditioner::Split(split) => split.apply(v),
+        }
+        for port in linear.ports.iter() {
+            let unit = port.unit(linear.length);
+            v[2 * nh * port.first_axis..2 * nh * (port.first_axis + port.axes)].iter_mut().for_each(|v| *v /= unit);
+        }
+        if let Preconditioner::Harmonics(BlockPreconditioner {
+            lowest: LowestHarmonicsFactor { count: count @ 1.., .. },
+            ..
+        }) = self
+        {
+            let steps = v.chunks_exact_mut(2 * nh).zip(together.chunks_exact(2 * count));
+            steps.for_each(|(v, own)| v[..2 * count].copy_from_slice(own));
+        }
+    }
+}
+
+/// Number of harmonics above which derivatives of laws do not fit in the cache.
+const CACHED_HARMONICS: usize = 64;
+/// Cost factor of products with the derivatives of unknown forces, whose series are long: every
+/// product reads them from memory. Measured: 21 ms a product of 11 joints with 512 harmonics.
+const UNCACHED_COST: f64 = 8.0;
+
+/// Returns the multiplications in a product with the Jacobian: of the structure
+/// over the axes, and of the laws over the harmonics.
+pub(crate) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
+    let of_law = |port: &Port| {
+        (2 * harmonics * port.axes).pow(2) as f64
+            * if port.is_force() && harmonics > CACHED_HARMONICS { UNCACHED_COST } else { 1.0 }
+    };
+    4.0 * harmonics as f64 * (ports.count() as f64).powi(2) + ports.iter().map(of_law).sum::<f64>()
+}
+
+/// Returns the multiplications in a step by GMRES, with the lowest harmonics of
+/// unknown forces factored together.
+pub(crate) fn krylov_step_work(ports: &Ports, harmonics: usize) -> f64 {
+    let together = if ports.has_forces() { LOWEST_UNKNOWNS.min(2 * harmonics * ports.count()) } else { 0 };
+    VECTORS as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
+}
+
+/// The preconditioner `(1 + R K)⁻¹` with one real K for all harmonics, for a structure in modes.
+#[derive(Debug, Clone)]
+struct ModalPreconditioner {
+    /// Frequency, rad/s, up to which modes are taken individually.
+    bound: f64,
+    /// True if the mean has closed contacts. These already precondition it.
+    closed: bool,
+    /// Numbers of these modes.
+    low_modes: Vec<usize>,
+    /// Residual flexibility S of the other modes, with the springs in series. It does not
+    /// depend on the stiffness of the joints.
+    residual_flexibility: Arc<Vec<f64>>,
+    /// `1 + S K`, factored.
+    factor: DenseLu<f64>,
+    /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
+    modal_stiffness: Vec<f64>,
+    solved_modes: Vec<f64>,
+    /// `Φᵀ K (1 + S K)⁻¹ Φ`.
+    core: Vec<f64>,
+    /// `core` plus the dynamic stiffness of the modes, factored, per harmonic
+    /// at one excitation frequency.
+    harmonics: Vec<ComplexLu>,
+    omega: f64,
+}
+
+impl ModalPreconditioner {
+    /// Returns the bound, rounded up so that nearby frequencies share it.
+    fn bound(modal: &ModalReceptance) -> f64 {
+        let top = modal.rates.iter().map(|s| s.im).fold(modal.omega, f64::max);
+        ABOVE * top.log2().ceil().exp2()
+    }
+
+    /// Creates the split from `stiffness(p, port, a, b)` of the joints. `above`
+    /// is S, if it is known for this bound.
+    fn new(
+        modal: &ModalReceptance,
+        (bound, above): (f64, Option<Arc<Vec<f64>>>),
+        stiffness: impl Fn(usize, &Port, usize, usize) -> f64,
+        ports: &Ports,
+    ) -> Option<Self> {
+        let structure = &modal.structure;
+        let (p, n) = (structure.axes, structure.modal_coefficients().len());
+        let is_low = |own: &[f64; 3]| own[2] <= bound * bound * own[0];
+        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.modal_coefficients()[m]));
+        let column = |m: usize| &structure.at[m * p..(m + 1) * p];
+        let above = above.unwrap_or_else(|| {
+            let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
+            let weighted: Vec<f64> = high
+                .iter()
+                .flat_map(|&m| column(m).iter().map(move |a| a / structure.modal_coefficients()[m][2]))
+                .collect();
+            let mut sum = vec![0.0; p * p];
+            multiply_blocked(
+                &weighted,
+                &above,
+                &mut sum,
+                ProductShape { rows: p, inner: high.len(), columns: p },
+                Transpose::Yes,
+            );
+            (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);
+            Arc::new(sum)
+        });
+        let mut matrix = vec![0.0; p * p];
+        let mut pull = vec![0.0; low.len() * p];
+        for (number, port) in ports.iter().enumerate() {
+            for (a, row) in port.range().enumerate() {
+                for (b, q) in port.range().enumerate() {
+                    let k = stiffness(number, port, a, b);
+                    let moved = &above[row * p..(row + 1) * p];
+                    matrix[q * p..(q + 1) * p].iter_mut().zip(moved).for_each(|(out, s)| *out += s * k);
+                    for (pull, &m) in pull[q * low.len()..].iter_mut().zip(&low) {
+                        *pull += structure.at[m * p + row] * k;
+                    }
+                }
+            }
+        }
+        (0..p).for_each(|q| matrix[q * p + q] += 1.0);
+        let factor = DenseLu::new(matrix, p).ok()?;
+        let mut moved: Vec<f64> = low.iter().flat_map(|&m| column(m)).copied().collect();
+        factor.solve(&mut moved);
+        let l = low.len();
+        let mut core = vec![0.0; l * l];
+        multiply_blocked(&pull, &moved, &mut core, ProductShape { rows: l, inner: p, columns: l }, Transpose::No);
+        let closed = modal.closed.is_some();
+        Some(ModalPreconditioner {
+            bound,
+            closed,
+            low_modes: low,
+            residual_flexibility: above,
+            factor,
+            modal_stiffness: pull,
+            solved_modes: moved,
+            core,
+            harmonics: Vec::new(),
+            omega: f64::NAN,
+        })
+    }
+
+    /// Prepares the factors for an excitation frequency.
+    fn excitation(&mut self, modal: &ModalReceptance) -> Option<()> {
+        if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
+            return Some(());
+        }
+        let l = self.low_modes.len();
+        self.harmonics.clear();
+        for rate in &modal.rates {
+            let mut matrix: Vec<Complex64> = self.core.iter().map(|x| Complex64::new(*x, 0.0)).collect();
+            for (i, &m) in self.low_modes.iter().enumerate() {
+                matrix[i * l + i] += modal.structure.stiffness(m, *rate, modal.omega).ok()?;
+            }
+            self.harmonics.push(ComplexLu::new(matrix, l).ok()?);
+        }
+        self.omega = modal.omega;
+        Some(())
+    }
+
+    /// Applies the preconditioner to [axis][harmonic]:
+    /// `(1 + R K)⁻¹ v = y - (1 + S K)⁻¹ Φ (1/g + core)⁻¹ Φᵀ K y`, with `y = (1 + S K)⁻¹ v`.
+    fn apply(&self, v: &mut [f64]) {
+        let (nh, l) = (self.harmonics.len(), self.low_modes.len());
+        let wide = 2 * nh;
+        let p = v.len() / wide;
+        let mut columns = vec![0.0; v.len()];
+        for (q, v) in v.chunks_exact(wide).enumerate() {
+            v.iter().enumerate().for_each(|(i, v)| columns[i * p + q] = *v);
+        }
+        self.factor.solve(&mut columns);
+        if l > 0 {
+            let mut pulled = vec![0.0; l * wide];
+            multiply_blocked(
+                &self.modal_stiffness,
+                &columns,
+                &mut pulled,
+                ProductShape { rows: l, inner: p, columns: wide },
+                Transpose::No,
+            );
+            for (k, factor) in self.harmonics.iter().enumerate() {
+                let (re, im) = pulled[2 * k * l..2 * (k + 1) * l].split_at_mut(l);
+                let mut modal: Vec<Complex64> = re.iter().zip(&*im).map(|(re, im)| Complex64::new(*re, *im)).collect();
+                factor.solve(&mut modal);
+                for (i, z) in modal.iter().enumerate() {
+                    (re[i], im[i]) = (z.re, z.im);
+                }
+            }
+            let mut moved = vec![0.0; p * wide];
+            multiply_blocked(
+                &self.solved_modes,
+                &pulled,
+                &mut moved,
+                ProductShape { rows: p, inner: l, columns: wide },
+                Transpose::No,
+            );
+            columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
+        }
+        for (q, v) in v.chunks_exact_mut(wide).enumerate() {
+            let first = if self.closed { 2 } else { 0 };
+            v.iter_mut().enumerate().skip(first).for_each(|(i, v)| *v = columns[i * p + q]);
+        }
+    }
+}
+
+/// Returns `a · b`.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};
+    use crate::method::harmonic_balance::budget::{POINT_LIMIT, WorkShare};
+    use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+    use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
+    use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
+    use crate::method::harmonic_balance::globalization::homotopy::GIVEN_EQUATIONS;
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use std::sync::Arc;
+
+    /// Returns a pseudo-random value between -1 and 1.
+    fn noise(i: usize) -> f64 {
+        ((i * 7919 + 13) as f64).sin()
+    }
+
+    /// A structure that couples all coordinates, with damping proportional to
+    /// stiffness, on contacts with the ground.
+    fn system(joints: &[(SharedLaw, usize)]) -> System {
+        let n = joints.iter().map(|joint| joint.1).sum();
+        let spread = DMatrix::from_fn(n, n, |i, k| noise(i * n + k) / (n as f64).sqrt());
+        let stiffness = &spread * spread.transpose() * 2.0 + DMatrix::identity(n, n);
+        let mass = DMatrix::from_fn(n, n, |i, k| if i == k { 1.0 + 0.2 * noise(i) } else { 0.0 });
+        let names = (0..n).map(|i| format!("{i}")).collect();
+        let structure = Structure::new(names, mass, &stiffness * 0.04, stiffness).unwrap();
+        let mut builder = System::builder(structure);
+        let mut first = 0;
+        for (number, (law, directions)) in joints.iter().enumerate() {
+            let axes = (first..first + directions).map(|i| Axis::new(vec![(i, 1.0)])).collect();
+            builder = builder.joint(format!("{number}"), law.clone(), axes);
+            first += directions;
+        }
+        for i in 0..n {
+            builder = builder.force(i, 1, Complex64::new(noise(3 * i + 1), noise(3 * i + 2)));
+        }
+        builder.build().unwrap()
+    }
+
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum SolverForm {
+        Eliminated,
+        Formed,
+        Modal,
+        /// Matrices with a coarse sampling first.
+        Sketched,
+    }
+
+    /// Returns the solution, the number of products, and the number of steps of laws with memory.
+    fn solve(system: &System, omega: f64, harmonics: &[usize], form: SolverForm) -> (HarmonicSolution, usize, usize) {
+        let ports = Ports::new(system).unwrap();
+        let dynamics = LinearDynamics::new(system, &ports);
+        let mut discretization = Discretization::new(harmonics.to_vec(), 1024, &ports, None);
+        discretization.newton_krylov = (form != SolverForm::Eliminated).then(NewtonKrylov::default);
+        if form == SolverForm::Sketched {
+            discretization.create_coarse_sampling();
+        }
+        discretization.set_frequency(system, &ports, &dynamics, omega).unwrap();
+        if form == SolverForm::Modal {
+            let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
+            let structure = Arc::new(UncoupledDynamics::new(system.structure(), &directions).unwrap());
+            let series = vec![0.0; ports.count()];
+            discretization.receptance =
+                Receptance::Modal(ModalReceptance::new((&structure, None), (harmonics, omega), &series).unwrap());
+        }
+        let start = discretization.initial_guess(system, &ports, None, omega);
+        let found = discretization.solve(&ports, omega, start);
+        let found = found.unwrap_or_else(|error| panic!("{form:?} at {omega}: {error:?}"));
+        (found, discretization.products, discretization.aft.law_steps)
+    }
+
+    fn agree(system: &System, harmonics: &[usize], forms: &[SolverForm]) {
+        for omega in [0.6, 1.7] {
+            let (expected, ..) = solve(system, omega, harmonics, SolverForm::Eliminated);
+            let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
+            for form in forms {
+                let (found, products, _) = solve(system, omega, harmonics, *form);
+                assert!(products > 0 && products < 60 * found.iterations, "{products} in {}", found.iterations);
+                for (a, b) in found.c.iter().zip(&expected.c) {
+                    assert!((a - b).norm() < 1e-8 * size, "{omega}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    /// Elimination, GMRES with receptances and GMRES with modes find the same motion.
+    #[test]
+    fn gmres_finds_the_motion_of_elimination() {
+        let contact = |i: usize| -> (SharedLaw, usize) {
+            let stiffness = 1.5 + 0.5 * noise(i);
+            match i % 2 {
+                0 => (Arc::new(Jenkins2d { stiffness, limit: 0.4 }), 2),
+                _ => (Arc::new(Jenkins { stiffness, limit: 0.3 }), 1),
+            }
+        };
+        let contacts: Vec<_> = (0..14).map(contact).collect();
+        agree(&system(&contacts), &[0, 1, 2, 3], &[SolverForm::Formed, SolverForm::Modal]);
+    }
+
+    /// With a coarse sampling first, the search finds the motion of all
+    /// samples, in fewer steps of the laws.
+    #[test]
+    fn coarse_sampling_finds_the_motion_of_all_samples() {
+        let contact = |i: usize| -> (SharedLaw, usize) {
+            (Arc::new(Jenkins2d { stiffness: 1.5 + 0.5 * noise(i), limit: 0.2 + 0.1 * noise(5 * i) }), 2)
+        };
+        let system = system(&(0..12).map(contact).collect::<Vec<_>>());
+        for omega in [0.6, 1.1, 1.7] {
+            let (expected, _, all) = solve(&system, omega, &[0, 1, 2, 3], SolverForm::Formed);
+            let (found, _, few) = solve(&system, omega, &[0, 1, 2, 3], SolverForm::Sketched);
+            let size = expected.c.iter().map(|c| c.norm()).fold(0.0, f64::max);
+            let apart = found.c.iter().zip(&expected.c).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(apart < 1e-8 * size, "{omega}: {apart:.1e} of {size:.1e}");
+            assert!(few < all, "{omega}: {few} steps, {all} without");
+        }
+    }
+
+    /// Products are the work of a search; shortened steps are not. The next
+    /// point has its full budget.
+    #[test]
+    fn products_count_as_work() {
+        let contacts: Vec<(SharedLaw, usize)> =
+            (0..201).map(|_| (Arc::new(Jenkins2d { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 2)).collect();
+        let system = system(&contacts);
+        let ports = Ports::new(&system).unwrap();
+        let mut discretization = Discretization::new(vec![1], 64, &ports, None);
+        discretization.begin_search(&ports);
+        discretization.evaluations = 10_000;
+        assert!(discretization.newton_krylov.is_some() && !discretization.is_budget_used(&ports));
+        discretization.products = 1_000_000;
+        assert!(discretization.is_budget_used(&ports));
+        discretization.begin_point();
+        assert!(!discretization.is_budget_used(&ports));
+    }
+
+    /// Work of earlier searches of a point, here or at other discretizations, reduces
+    /// the budget of the next search.
+    #[test]
+    fn searches_of_a_point_share_its_budget() {
+        let joints: Vec<_> = (0..3).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
+        let ports = Ports::new(&system(&joints)).unwrap();
+        let mut discretization = Discretization::new(vec![1, 3], 64, &ports, None);
+        discretization.aft.law_steps = usize::MAX / 2;
+        assert!(discretization.is_budget_used(&ports));
+        discretization.begin_search(&ports);
+        assert!(
+            discretization.work_before.exceeds(POINT_LIMIT) && discretization.is_budget_used(&ports),
+            "the point has nothing left"
+        );
+        let share = |share: f64| WorkShare {
+            multiplications: share * POINT_LIMIT.multiplications,
+            time_steps: share * POINT_LIMIT.time_steps,
+        };
+        (discretization.work_before, discretization.work_elsewhere) = (share(0.6), share(0.3));
+        assert!(!discretization.is_budget_used(&ports));
+        discretization.work_elsewhere = share(0.5);
+        assert!(discretization.is_budget_used(&ports));
+        discretization.begin_point();
+        assert!(!discretization.is_budget_used(&ports));
+    }
+
+    /// GMRES also solves for unknown forces, of rigid friction together with elastic friction.
+    #[test]
+    fn gmres_solves_for_unknown_forces() {
+        let laws: [SharedLaw; 3] = [
+            Arc::new(Coulomb { limit: 0.3 }),
+            Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 }),
+            Arc::new(Dahl { stiffness: 1.5, limit: 0.3 }),
+        ];
+        let joints: Vec<_> = (0..18).map(|i| (laws[i % 3].clone(), 1)).collect();
+        agree(&system(&joints), &[1, 3, 5], &[SolverForm::Formed]);
+    }
+
+    /// A few joints with rigid friction and long series: GMRES converges with
+    /// the lowest harmonics factored together.
+    #[test]
+    fn factored_lowest_harmonics_precondition_long_series() {
+        let laws: [SharedLaw; 2] = [Arc::new(Coulomb { limit: 0.3 }), Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 })];
+        let joints: Vec<_> = (0..12).map(|i| (laws[usize::from(i % 3 == 2)].clone(), 1)).collect();
+        let harmonics: Vec<usize> = (1..128).step_by(2).collect();
+        assert!(LOWEST_UNKNOWNS < 24 * harmonics.len(), "some are left to their means");
+        agree(&system(&joints), &harmonics, &[SolverForm::Formed]);
+    }
+
+    /// With few joints and long series, products with the laws dominate the
+    /// work, and they end a search.
+    #[test]
+    fn products_with_laws_count_as_work() {
+        let joints: Vec<_> = (0..10).map(|_| (Arc::new(Coulomb { limit: 0.3 }) as SharedLaw, 1)).collect();
+        let system = system(&joints);
+        let ports = Ports::new(&system).unwrap();
+        let mut discretization = Discretization::new((1..512).step_by(2).collect(), 8192, &ports, None);
+        discretization.begin_search(&ports);
+        discretization.products = 1_000;
+        assert!(discretization.newton_krylov.is_some() && !discretization.is_budget_used(&ports));
+        discretization.products = 2_000;
+        assert!(discretization.is_budget_used(&ports));
+    }
+
+    /// The Jacobian is formed on request, also if modes would replace the receptances.
+    #[test]
+    fn the_matrix_is_formed_where_it_is_needed() {
+        let contacts: Vec<(SharedLaw, usize)> =
+            (0..201).map(|_| (Arc::new(Jenkins { stiffness: 2.0, limit: 0.3 }) as SharedLaw, 1)).collect();
+        let system = system(&contacts);
+        let ports = Ports::new(&system).unwrap();
+        let dynamics = LinearDynamics::new(&system, &ports);
+        assert!(dynamics.modes_for(&ports).is_some());
+        for needed in [false, true] {
+            let discretization = Discretization::new(vec![1], 64, &ports, None);
+            let mut discretization = if needed { discretization.with_matrix() } else { discretization };
+            discretization.set_frequency(&system, &ports, &dynamics, 0.7).unwrap();
+            let mut motion = discretization.initial_guess(&system, &ports, None, 0.7);
+            discretization.evaluate(
+                &ports,
+                0.7,
+                &mut motion,
+                GIVEN_EQUATIONS,
+                1.0,
+                crate::method::harmonic_balance::equations::DerivativeScope::All,
+            );
+            assert_eq!(discretization.assemble(&ports, 0.7, GIVEN_EQUATIONS, 1.0), needed);
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! Nonlinear modes, and branches of orbits with a parameter.
+//!
+//! - `nonlinear_mode`: equations of a nonlinear mode, its linear start and its results
+//! - `mode_continuation`: arc-length continuation of a mode
+//! - `branch_equations`: equations of an orbit with a parameter, for continuation
+
+pub(super) mod branch_equations;
+pub(super) mod mode_continuation;
+pub(super) mod nonlinear_mode;

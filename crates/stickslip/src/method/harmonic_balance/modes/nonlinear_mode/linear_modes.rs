@@ -1,0 +1,194 @@
+//! Linear modes of the structure without its joints, where nonlinear modes begin.
+
+use super::{ModeEquations, ModeState, PlacedPort, ZERO};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use stickslip_numerics::eigen;
+
+/// Share of the joints' stiffness that separates equal modes of a structure without joints.
+const JOINT_SHARE: f64 = 1e-9;
+/// Relative distance of two squared frequencies up to which modes count as equal. It is well
+/// above [`JOINT_SHARE`].
+const EQUAL_FREQUENCIES: f64 = 1e-7;
+/// Rounding error of squared frequencies relative to the largest, per degree of freedom.
+const SQUARE: f64 = 64.0 * f64::EPSILON;
+/// Share of the size of a mode below which an entry is ignored.
+const NEGLIGIBLE_ENTRY: f64 = 1e-6;
+/// Iterations between the frequency and the stiffness of joints at small amplitude, which may
+/// depend on the frequency.
+const ITERATIONS: usize = 5;
+
+/// Linear mode of the structure without its joints.
+#[derive(Debug, Clone)]
+pub(crate) struct LinearMode {
+    /// Squared frequency, (rad/s)².
+    pub squared_frequency: f64,
+    /// Shape φ with φᴴ M φ = 1, 1/√kg.
+    ///
+    /// It is real, unless neither the structure nor its joints separate a pair of equal modes.
+    /// Then it is one of the two travelling waves `(φ₁ ± jφ₂)/√2`. These do not depend on the
+    /// basis φ₁, φ₂ of the pair.
+    pub shape: DVector<Complex64>,
+    /// For such a wave, the standing mode of the pair with the same number.
+    pub standing_mode: Option<DVector<f64>>,
+}
+
+impl LinearMode {
+    /// Returns the standing mode in place of a wave, or `None` for a mode that is not a wave.
+    pub fn standing(&self) -> Option<LinearMode> {
+        let shape = real(self.standing_mode.as_ref()?);
+        Some(LinearMode { squared_frequency: self.squared_frequency, shape, standing_mode: None })
+    }
+}
+
+fn real(shape: &DVector<f64>) -> DVector<Complex64> {
+    shape.map(|x| Complex64::new(x, 0.0))
+}
+
+/// Returns the travelling waves of a pair of real modes.
+///
+/// In the first wave a place leads the previous ones, as under a positive engine order with
+/// places numbered sector by sector. The first place with a significant phase decides.
+fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
+    let size = one.amax().max(other.amax());
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let wave = one.zip_map(other, |re, im| Complex64::new(half * re, half * im));
+    let from = wave.iter().find(|x| x.norm() > NEGLIGIBLE_ENTRY * size).copied().unwrap_or(ZERO);
+    let leads =
+        wave.iter().map(|x| (from.conj() * x).im).find(|leads| leads.abs() > NEGLIGIBLE_ENTRY * size * from.norm());
+    let back = wave.map(|x| x.conj());
+    if leads.is_some_and(|leads| leads < 0.0) { [back, wave] } else { [wave, back] }
+}
+
+impl ModeEquations<'_> {
+    /// Returns the linear modes of the structure without its joints, by rising frequency.
+    pub fn linear_modes(&self) -> Vec<LinearMode> {
+        let n = self.system.dofs();
+        if n == 0 {
+            return Vec::new(); // the motion of every place is given
+        }
+        let mut stiffness = self.system.structure().stiffness().clone();
+        // keep a small share of the joints' stiffness, so that equal blades move with or
+        // against each other as the joints couple them
+        for PlacedPort { port, directions: w } in self.motion_ports.iter().chain(&self.force_ports) {
+            let kt = port.stiffness();
+            let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
+            for w in w {
+                stiffness += w * w.transpose() * (JOINT_SHARE * kt);
+            }
+        }
+        let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
+        let lower = factor.l();
+        let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
+        let Some(eigen) = eigen::symmetric(&inverse * stiffness * inverse.transpose()) else { return Vec::new() };
+        let shapes = inverse.transpose() * eigen.eigenvectors;
+        let mut modes: Vec<(f64, DVector<f64>)> =
+            (0..n).map(|k| (eigen.eigenvalues[k].max(0.0), shapes.column(k).into_owned())).collect();
+        modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let rounding = SQUARE * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
+        let equal = |a: &(f64, DVector<f64>), b: &(f64, DVector<f64>)| b.0 - a.0 <= rounding;
+        let mut found = Vec::with_capacity(n);
+        for group in modes.chunk_by(equal) {
+            match group {
+                [(square, one), (_, other)] => {
+                    let made = |(shape, stands): (_, &DVector<f64>)| LinearMode {
+                        squared_frequency: *square,
+                        shape,
+                        standing_mode: Some(stands.clone()),
+                    };
+                    found.extend(waves(one, other).into_iter().zip([one, other]).map(made));
+                }
+                _ => found.extend(group.iter().map(|(square, shape)| LinearMode {
+                    squared_frequency: *square,
+                    shape: real(shape),
+                    standing_mode: None,
+                })),
+            }
+        }
+        found
+    }
+
+    /// Returns a linear mode at amplitude `a`. Forces along laws of velocity are zero. Returns
+    /// `None` if its frequency is zero.
+    pub fn linear_state(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
+        let (n, nh) = (self.system.dofs(), self.aft.harmonics.len());
+        let omega = mode.squared_frequency.sqrt();
+        let mut x = vec![ZERO; nh * n];
+        for i in 0..n {
+            x[self.first * n + i] = a * mode.shape[i];
+        }
+        let damping = self.system.structure().damping().map(|c| Complex64::new(c, 0.0));
+        let dissipated = mode.shape.dotc(&(damping * &mode.shape)).re;
+        let force = vec![ZERO; nh * self.force_axes()];
+        (omega > 0.0).then(|| ModeState { x, force, omega, damping: dissipated / (2.0 * omega) })
+    }
+
+    /// Returns the linear mode number `index`, by rising frequency, with all joints at their
+    /// stiffness at small amplitude, as a motion of amplitude `a`.
+    ///
+    /// A mode that begins at its small end starts there. Returns `None` with rigid friction,
+    /// which has no stiffness.
+    pub fn small_amplitude_mode(&self, index: usize, a: f64) -> Option<ModeState> {
+        if !self.force_ports.is_empty() {
+            return None;
+        }
+        let (n, structure) = (self.system.dofs(), self.system.structure());
+        let mut square = structure.stiffness().amax() / structure.mass().amax();
+        let mut found = None;
+        for _ in 0..ITERATIONS {
+            let omega = square.sqrt();
+            let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
+            stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
+            for PlacedPort { port, directions: w } in &self.motion_ports {
+                let holds = port.small_motion_stiffness(omega);
+                for (i, v) in w.iter().enumerate() {
+                    for (k, w) in w.iter().enumerate() {
+                        stiffness += (v * w.transpose()).map(|product| holds[(i, k)] * product);
+                    }
+                }
+            }
+            let inverse = structure.mass().clone().cholesky()?.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+            let eigen = eigen::symmetric(&inverse * stiffness.map(|k| k.re) * inverse.transpose())?;
+            let mut order: Vec<usize> = (0..n).collect();
+            order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+            let shape = real(&(inverse.transpose() * eigen.eigenvectors.column(*order.get(index)?)));
+            // φᴴ M φ = 1, so ω² + 2 j ζ ω² = φᴴ (K + j ω C) φ
+            let whole = shape.dotc(&(stiffness * &shape));
+            square = whole.re;
+            if square.is_nan() || square <= 0.0 {
+                return None;
+            }
+            found = Some((shape, whole.im / (2.0 * square)));
+        }
+        let (shape, damping) = found?;
+        let nh = self.aft.harmonics.len();
+        let mut x = vec![ZERO; nh * n];
+        x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
+        Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
+    }
+
+    /// Returns the modal amplitude, m √kg, above which friction is weak in the linear mode
+    /// `index`.
+    ///
+    /// There the first harmonic of friction is at most `share` of the inertia forces. It is also
+    /// at most `apart` times the difference of squared frequencies to every other mode.
+    pub fn weak_friction_amplitude(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
+        let Some(mode) = modes.get(index) else { return 0.0 };
+        // the force of an unbounded law is weak at small amplitudes, if at all
+        let bounded = self.motion_ports.iter().chain(&self.force_ports).filter(|placed| placed.port.scale.is_finite());
+        let forces: Vec<(&DVector<f64>, f64)> =
+            bounded.flat_map(|placed| placed.directions.iter().map(|w| (w, placed.port.scale))).collect();
+        let along = |w: &DVector<f64>, shape: &DVector<Complex64>| -> Complex64 {
+            w.iter().zip(shape.iter()).map(|(w, x)| x * *w).sum()
+        };
+        let onto = |shape: &DVector<Complex64>| -> f64 {
+            forces.iter().map(|(w, limit)| limit * along(w, shape).norm()).sum()
+        };
+        let own = onto(&mode.shape) / (share * mode.squared_frequency);
+        let others = modes.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| {
+            let gap = (other.squared_frequency - mode.squared_frequency).abs();
+            if gap <= EQUAL_FREQUENCIES * mode.squared_frequency { 0.0 } else { onto(&other.shape) / (apart * gap) }
+        });
+        4.0 / std::f64::consts::PI * others.fold(own, f64::max)
+    }
+}

@@ -1,0 +1,205 @@
+//! Classification of the motion from static equilibrium where no orbit was found.
+//!
+//! The motion is integrated in time. It settles, repeats after several periods, drifts away, or
+//! does none of these. If it settles, the caller can search for the orbit again from its end.
+
+use crate::law::Contact;
+use crate::method::flow::Flow;
+use crate::method::flow::average_acceleration::equal_steps::AverageAccelerationFlow;
+use crate::method::flow::integrator_choice::IntegratorKind;
+use crate::model::{Axis, System};
+use crate::orbit::{ObservedMotion, Path, Sample, Symmetry};
+use std::collections::VecDeque;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Limits of the systems that are integrated; each step multiplies full matrices.
+const LARGEST: usize = 100;
+const JOINTS: usize = 60;
+/// Steps per period. With 256 steps the ringing of stuck contacts keeps motions from settling that
+/// settle with 1024.
+const STEPS: usize = 1024;
+/// Periods over which the excitation grows from zero. An excitation that starts at once excites
+/// vibrations of stuck contacts, which hardly anything damps.
+const GROWTH: usize = 160;
+/// Periods until the first classification. While the motion has not settled, the number doubles
+/// up to [`MOST_PERIODS`]. This is ten times the decay time of a mode with 0.1 % of critical
+/// damping.
+const PERIODS: usize = 80;
+const MOST_PERIODS: usize = 1280;
+/// Number of last returns that the classification uses.
+const WINDOW: usize = 33;
+/// Largest number of periods after which a motion may repeat.
+const REPEATS: usize = 8;
+/// Relative distance, in amplitudes, below which two returns count as equal. It covers the end
+/// of a transient and the error of the steps.
+const EQUAL_DISTANCE: f64 = 2e-3;
+/// Largest ratio of the distances between returns, half a window apart, of a settling motion.
+/// Beats exceed it now and then; the test applies it twice to make errors rare.
+const SETTLING_RATIO: f64 = 0.9;
+/// Displacement over the window, in amplitudes, above which a place drifts.
+const DRIFT_DISTANCE: f64 = 2.0;
+/// Instants of the last period at which the contacts are sampled.
+const INSTANTS: usize = 128;
+
+/// A motion that was integrated: its behaviour, its last period, and its state at the end.
+type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
+
+/// Classifies the motion from a state and returns it with its last period and its last state.
+///
+/// Returns `None` if no integration in equal steps takes the system, or if it breaks down.
+pub(crate) fn classify_motion(system: &System, omega: f64, mut start: Vec<f64>) -> Option<Followed> {
+    if system.dofs() > LARGEST
+        || system.joints().len() > JOINTS
+        || IntegratorKind::of(system, None) != IntegratorKind::Incremental
+    {
+        return None;
+    }
+    let mut flow = AverageAccelerationFlow::new(system, None, "what follows a motion").ok()?;
+    flow.count = STEPS;
+    let (n, period) = (system.dofs(), TAU / omega);
+    start.resize(flow.states(), 0.0);
+    let mut state = start;
+    flow.set_excitation(system, omega);
+    let excitation = flow.excitation.clone();
+    for grown in 1..GROWTH {
+        let share = 0.5 - 0.5 * (PI * grown as f64 / GROWTH as f64).cos();
+        flow.excitation = excitation.scaled(share);
+        flow.run(&mut state, period, None).ok()?;
+    }
+    flow.excitation = excitation;
+    let mut returns = VecDeque::with_capacity(WINDOW);
+    let (mut count, mut next) = (0, PERIODS);
+    loop {
+        count += 1;
+        flow.set_recording(count == next);
+        flow.run(&mut state, period, None).ok()?;
+        if returns.len() == WINDOW {
+            returns.pop_front();
+        }
+        returns.push_back(state[..2 * n].to_vec());
+        if count < next {
+            continue;
+        }
+        let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
+        let samples: Vec<_> = (0..INSTANTS).map(|i| path.sample(period * i as f64 / INSTANTS as f64)).collect();
+        let course = classified(system, omega, (count, returns.make_contiguous()), &samples);
+        let may_settle = matches!(course, ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. });
+        if !may_settle || 2 * next > MOST_PERIODS {
+            return Some((course, path, state));
+        }
+        next *= 2;
+    }
+}
+
+fn classified(
+    system: &System,
+    omega: f64,
+    (periods, returns): (usize, &[Vec<f64>]),
+    samples: &[Sample],
+) -> ObservedMotion {
+    let n = system.dofs();
+    // displacements, and velocities over Ω
+    let unit = |i: usize| if i < n { 1.0 } else { omega };
+    let velocities = returns.iter().flat_map(|state| &state[n..]).chain(samples.iter().flat_map(|now| &now.velocity));
+    let swing = velocities.fold(0.0, |m: f64, v| m.max(v.abs() / omega));
+    let last = returns.len() - 1;
+    let apart_at = |end: usize, p: usize| {
+        let pairs = (0..=REPEATS).map(|k| (&returns[end - k], &returns[end - k - p]));
+        let each = pairs.flat_map(|(a, b)| a.iter().zip(b).enumerate().map(|(i, (a, b))| (a - b).abs() / unit(i)));
+        each.fold(0.0, f64::max)
+    };
+    let apart = |p: usize| apart_at(last, p);
+    if let Some(periods) = (1..=REPEATS).find(|p| apart(*p) <= EQUAL_DISTANCE * swing) {
+        return if periods == 1 { ObservedMotion::Settles } else { ObservedMotion::Repeats { periods } };
+    }
+    if apart(1) <= SETTLING_RATIO * apart_at(last / 2, 1)
+        && apart_at(last / 2, 1) <= SETTLING_RATIO * apart_at(REPEATS + 1, 1)
+    {
+        return ObservedMotion::Settling { periods };
+    }
+    let open = |j: usize| {
+        samples.iter().filter(|now| now.joints[j].contact == Contact::Open).count() as f64 / samples.len() as f64
+    };
+    let widest = (0..system.joints().len()).map(|j| (j, open(j))).fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+    let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
+    let share = widest.1;
+    // a drift has the same direction in both halves of the window
+    let moved =
+        |axis: &Axis, from: usize, to: usize| axis.component(&returns[to][..n]) - axis.component(&returns[from][..n]);
+    let displacements = system.place_axes().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
+    let farthest = displacements.map(|(axis, place)| {
+        let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
+        let steady =
+            halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();
+        (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, place)
+    });
+    let farthest = farthest.fold((0.0, ""), |a, (way, place)| if way > a.0 { (way, place.as_str()) } else { a });
+    if farthest.0 > DRIFT_DISTANCE * swing {
+        let (way, place) = (farthest.0, farthest.1.to_owned());
+        return ObservedMotion::Drifts { place, drift: way, periods: last, joint, open_fraction: share };
+    }
+    ObservedMotion::Irregular { periods, joint, open_fraction: share }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::FrictionContact;
+    use crate::structure::Structure;
+    use nalgebra::DMatrix;
+    use num_complex::Complex64;
+
+    const OMEGA: f64 = 200.0;
+
+    /// Returns a mass of 1 kg along (x, z) on a contact with a preload of 10 N and a friction
+    /// coefficient of 0.5. A harmonic force of 1 N acts along x, and the constant `load` along
+    /// both.
+    fn block(load: [f64; 2]) -> System {
+        let law = FrictionContact { tangential: 1e5, normal: 2e5, friction: 0.5, preload: 10.0, tangents: 1 };
+        let names = vec!["x".into(), "z".into()];
+        let one = DMatrix::identity(2, 2);
+        let structure = Structure::new(names, one.clone(), one * 60.0, DMatrix::zeros(2, 2)).unwrap();
+        let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
+        let mut builder = System::builder(structure).joint("foot", Arc::new(law), axes);
+        for (row, load) in load.into_iter().enumerate() {
+            builder = builder.force(row, 0, Complex64::new(load, 0.0));
+        }
+        builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
+    }
+
+    /// The block settles on its foot. A drag of 2 N above the friction moves it at
+    /// `2 N/(60 kg/s)`; a lift of 3 N moves it at `3 N/(60 kg/s)`. Damping alone then balances
+    /// the excess load.
+    #[test]
+    fn a_block_stays_slides_or_leaves() {
+        assert_eq!(classify_motion(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
+        for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
+            let (course, ..) = classify_motion(&block(load), OMEGA, Vec::new()).unwrap();
+            let ObservedMotion::Drifts { ref place, drift, periods, open_fraction, .. } = course else {
+                panic!("{course}")
+            };
+            assert_eq!(place, along);
+            let expected = speed * periods as f64 * TAU / OMEGA;
+            assert!((drift / expected - 1.0).abs() < 1e-3, "{drift} {expected}");
+            assert_eq!(open_fraction, if along == "z" { 1.0 } else { 0.0 });
+            assert!(course.to_string().contains(&format!("`{along}`")), "{course}");
+        }
+    }
+
+    /// The classification distinguishes a motion that repeats every third period from a slowly
+    /// settling and from an irregular one.
+    #[test]
+    fn what_repeats_is_told_from_what_does_not() {
+        let system = block([0.0, 10.0]);
+        let returns = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
+        let path = classify_motion(&system, OMEGA, Vec::new()).unwrap().1;
+        let samples = [path.sample(0.0)];
+        let third = classified(&system, OMEGA, (PERIODS, &returns(&|k| (k % 3) as f64)), &samples);
+        assert_eq!(third, ObservedMotion::Repeats { periods: 3 });
+        let slow = classified(&system, OMEGA, (PERIODS, &returns(&|k| (-0.02 * k as f64).exp())), &samples);
+        assert_eq!(slow, ObservedMotion::Settling { periods: PERIODS });
+        let none = classified(&system, OMEGA, (PERIODS, &returns(&|k| ((k * k) as f64).sin())), &samples);
+        assert!(matches!(none, ObservedMotion::Irregular { periods: PERIODS, .. }), "{none}");
+    }
+}
