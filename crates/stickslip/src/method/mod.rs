@@ -40,7 +40,6 @@ mod ways;
 pub use crate::orbit::{IntegrationError, OrbitError};
 pub use advice::{advised, ways};
 pub use error::{MethodError, Refusal};
-pub use evidence::evidence_steps;
 use list::LIST;
 pub use option::{MethodOption, Options, WIDTH};
 pub use static_equilibrium::StaticEquilibrium;

@@ -104,7 +104,7 @@ pub(crate) use mode::{LinearMode, ModeEquations, ModeState};
 pub use options::{HarmonicBalance, NAME};
 pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
-pub use work::{doubling_work, factor_bytes, most_work, orbit_work, step_work};
+pub use work::{factor_bytes, orbit_work};
 
 /// Entry of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
