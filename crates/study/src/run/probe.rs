@@ -10,7 +10,6 @@ use crate::case::study::Study;
 use crate::check::summary;
 use crate::kinds;
 use crate::kinds::kind::Probe;
-use crate::run::runner::CheckedStudy;
 use crate::run::work::{Computed, Context, PreparedCase, Share, UnitTask, WorkUnits};
 use crate::syntax::format::{format_estimate, plural_suffix};
 use std::fmt;
@@ -91,16 +90,20 @@ fn plural(noun: &str) -> String {
     if noun.ends_with("ch") { format!("{noun}es") } else { format!("{noun}s") }
 }
 
-/// Expects the time of a run. `stop` ends the probes early.
+/// Expects the time of a run. `first` is the first case, if it is prepared; `stop` ends the probes
+/// early.
 ///
 /// Returns `None` if the number of points is unknown, if a probe failed, or after a stop.
-pub(super) fn expected_time(checked: &CheckedStudy, stop: &Arc<AtomicBool>) -> Option<ExpectedTime> {
-    let study = checked.study();
+pub(super) fn expected_time(
+    study: &Study,
+    first: Option<Arc<PreparedCase>>,
+    stop: &Arc<AtomicBool>,
+) -> Option<ExpectedTime> {
     if study.is_adaptive() {
         return None;
     }
     let plan = Plan::new(study);
-    let (study, first, ended) = (study.clone(), checked.first_case(), stop.clone());
+    let (study, ended) = (study.clone(), stop.clone());
     let (send, receive) = mpsc::channel();
     std::thread::Builder::new()
         .spawn(move || {
@@ -364,7 +367,7 @@ fn compute(study: &Study, probe: Probe, task: &UnitTask<'_>) -> Computed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::check;
+    use crate::run::{CheckedStudy, check};
     use crate::{read_study, templates};
 
     fn couple(edits: &[(&str, &str)]) -> CheckedStudy {

@@ -109,11 +109,6 @@ impl CheckedStudy {
         &self.summary
     }
 
-    /// Returns the first case, if it is kept.
-    pub(super) fn first_case(&self) -> Option<Arc<PreparedCase>> {
-        self.first.clone()
-    }
-
     /// Computes a few points of the study and extrapolates the time of a run on one thread.
     ///
     /// This takes at most about a second, and less if `stop` is set. It has no influence on a
@@ -129,7 +124,7 @@ impl CheckedStudy {
     /// assert!(time.to_string().contains("on one thread"));
     /// ```
     pub fn expected_time(&self, stop: &Arc<AtomicBool>) -> Option<ExpectedTime> {
-        probe::expected_time(self, stop)
+        probe::expected_time(&self.study, self.first.clone(), stop)
     }
 
     /// Returns the checked study without its prepared first case, for callers that hold many
