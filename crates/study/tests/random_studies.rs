@@ -27,7 +27,7 @@ use stickslip_study::{Study, read_study};
 const STUDIES: usize = 1000;
 const SEED: u64 = 1;
 /// Number of solver steps after which a study ends: Newton steps, switches, time steps.
-const STEPS: u64 = 20_000;
+const STEPS: u64 = 10_000;
 /// Number of studies with the most steps that are printed.
 const LONGEST: usize = 8;
 /// Largest memory of the whole process, bytes.
