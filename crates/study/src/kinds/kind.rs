@@ -36,7 +36,7 @@ pub enum Probe {
         /// Computes the points of a unit, without what belongs to the whole curve.
         compute: fn(&UnitTask<'_>) -> Computed,
         /// Computations that are not measured although they may take most of the time.
-        excluded: Option<&'static str>,
+        excluded: fn(&Study) -> Option<&'static str>,
     },
     /// The beginning of a unit. The kind reports the computed part to [`UnitTask::share`].
     Unit {

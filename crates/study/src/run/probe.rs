@@ -93,15 +93,12 @@ fn plural(noun: &str) -> String {
 /// Expects the time of a run. `first` is the first case, if it is prepared; `stop` ends the probes
 /// early.
 ///
-/// Returns `None` if the number of points is unknown, if a probe failed, or after a stop.
+/// Returns `None` if a probe failed, or after a stop.
 pub(super) fn expected_time(
     study: &Study,
     first: Option<Arc<PreparedCase>>,
     stop: &Arc<AtomicBool>,
 ) -> Option<ExpectedTime> {
-    if study.is_adaptive() {
-        return None;
-    }
     let plan = Plan::new(study);
     let (study, ended) = (study.clone(), stop.clone());
     let (send, receive) = mpsc::channel();
@@ -126,6 +123,8 @@ pub(super) fn expected_time(
 #[derive(Debug, Clone, Copy)]
 struct Plan {
     probe: Probe,
+    /// Computations that the probes do not contain, in words.
+    excluded: Option<&'static str>,
     cases: usize,
     /// Frequencies of a case.
     frequencies: usize,
@@ -159,7 +158,13 @@ impl Plan {
         let kind = kinds::kind_of(study);
         let cases = study.cases();
         let frequencies = (study.points() / cases.max(1)).max(1);
-        Plan { probe: kind.probe, cases, frequencies, units: WorkUnits::new(study, (kind.unit_size)(study)) }
+        // the number of adaptive frequencies is known at the end of a curve only
+        let probe = if study.is_adaptive() { Probe::Unit { name: "case" } } else { kind.probe };
+        let excluded = match probe {
+            Probe::Points { excluded, .. } => excluded(study),
+            Probe::Unit { .. } => None,
+        };
+        Plan { probe, excluded, cases, frequencies, units: WorkUnits::new(study, (kind.unit_size)(study)) }
     }
 
     /// Returns the number of parts of the study of which a probe computes one or two.
@@ -209,13 +214,13 @@ impl Plan {
         let (parts, units) = (self.parts() as f64, self.units.len() as f64);
         let (first, other) = (mean(&|one| one.first), mean(&|one| one.other));
         let preparing = units * mean(&|one| one.preparing);
-        let (seconds, probes, excluded) = match self.probe {
-            Probe::Points { excluded, .. } => {
+        let (seconds, probes) = match self.probe {
+            Probe::Points { .. } => {
                 // a unit of frequencies and each case begin without a warm start
                 let cold = units.max(self.cases as f64).min(parts);
                 let points = all.iter().map(|one| one.points).sum();
                 let probes = format!("{points} probe point{}", plural_suffix(points));
-                (cold * first + (parts - cold) * other, probes, excluded)
+                (cold * first + (parts - cold) * other, probes)
             }
             Probe::Unit { name } => {
                 let whole = all.iter().all(|one| one.complete);
@@ -225,11 +230,11 @@ impl Plan {
                     (count, true) => format!("{count} {}", plural(name)),
                     (count, false) => format!("parts of {count} {}", plural(name)),
                 };
-                (parts * first, probes, None)
+                (parts * first, probes)
             }
         };
         let seconds = seconds + preparing;
-        seconds.is_finite().then_some(ExpectedTime::Extrapolated { seconds, probes, excluded })
+        seconds.is_finite().then_some(ExpectedTime::Extrapolated { seconds, probes, excluded: self.excluded })
     }
 }
 
@@ -293,7 +298,10 @@ fn measure(
         let (finished, share) = (finished.clone(), share.clone());
         let (of_probe, of_all, stop) = (limits.probe, limits.all, limits.stop.clone());
         StopFlag::with_callback(move || {
-            let any = share.get() > 0.0 || !finished.lock().unwrap_or_else(PoisonError::into_inner).is_empty();
+            let any = match probe {
+                Probe::Points { .. } => !finished.lock().unwrap_or_else(PoisonError::into_inner).is_empty(),
+                Probe::Unit { .. } => share.get() > 0.0,
+            };
             stop.load(Ordering::Relaxed) || Instant::now() >= if any { of_probe } else { of_all }
         })
     };
@@ -408,15 +416,12 @@ mod tests {
         assert_eq!(unknown.to_string(), "more than 1 s on one thread for one of 964 points");
     }
 
-    /// A stop ends the probes; adaptive frequencies have an unknown number of points.
     #[test]
-    fn without_probes_there_is_no_time() {
+    fn a_stop_ends_the_probes() {
         let (running, stopped) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(true)));
         let checked = couple(&[]);
         assert!(checked.expected_time(&running).is_some());
         assert_eq!(checked.expected_time(&stopped), None);
-        let adaptive = couple(&[("points = 241", "tolerance = \"1 %\"")]);
-        assert_eq!(adaptive.expected_time(&running), None);
     }
 
     /// Probes of every kind have a time.
@@ -430,6 +435,7 @@ mod tests {
             of("orbit"),
             of("hysteresis"),
             of("performance"),
+            drive.replace("points = 241", "tolerance = \"10 %\""),
             "kind = \"transient\"\nfrequency = \"121 Hz\"\ncycles = 20".to_owned(),
             "kind = \"campbell\"\nspeed = { from = \"10 Hz\", to = \"120 Hz\", points = 12 }".to_owned(),
         ];

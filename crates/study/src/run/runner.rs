@@ -112,7 +112,7 @@ impl CheckedStudy {
     /// Computes a few points of the study and extrapolates the time of a run on one thread.
     ///
     /// This takes at most about a second, and less if `stop` is set. It has no influence on a
-    /// later run. Returns `None` if the number of points is unknown.
+    /// later run. Returns `None` if a probe failed, or after a stop.
     ///
     /// # Example
     /// ```

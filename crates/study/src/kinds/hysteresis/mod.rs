@@ -62,7 +62,7 @@ pub(super) const KIND: Kind = Kind {
     unit_size: |_| UnitSize::Frequencies,
     size,
     warnings: excitation_warnings,
-    probe: Probe::Points { compute, excluded: None },
+    probe: Probe::Points { compute, excluded: |_| None },
     compute,
     draw: figure::draw,
 };

@@ -48,7 +48,7 @@ pub(super) const KIND: Kind = Kind {
     unit_size: orbit_sweep::grain,
     size,
     warnings: excitation_warnings,
-    probe: Probe::Points { compute, excluded: None },
+    probe: Probe::Points { compute, excluded: |_| None },
     compute,
     draw: figure::draw,
 };

@@ -44,7 +44,7 @@ pub(super) const KIND: Kind = Kind {
     unit_size: |_| UnitSize::Curve,
     size,
     warnings: sampling_warnings,
-    probe: Probe::Points { compute: probe, excluded: Some("the search for the optimum") },
+    probe: Probe::Points { compute: probe, excluded: |_| Some("the search for the optimum") },
     compute,
     draw: figure::draw,
 };

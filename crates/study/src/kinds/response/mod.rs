@@ -22,6 +22,7 @@ pub use tables::{MassCurve, ResponseCurve, curves};
 use super::shared::keys::{FREQUENCY, OUTPUT, check_output, no_requirements};
 use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of};
+use crate::case::study::Study;
 use crate::case::values::{Frequencies, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::survey::SurveyedCase;
@@ -99,7 +100,7 @@ pub(super) const KIND: Kind = Kind {
             .chain(many_peaks_warning(cases))
             .collect()
     },
-    probe: Probe::Points { compute, excluded: None },
+    probe: Probe::Points { compute, excluded: |study| refines_peaks(study).then_some("the refinement of peaks") },
     compute,
     draw: figure::draw,
 };
@@ -142,6 +143,11 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
         drawn: curves * inputs.frequencies,
         unit: inputs.orbit_bytes(),
     }
+}
+
+/// Returns whether the study requests peaks.
+fn refines_peaks(study: &Study) -> bool {
+    study.case(0).is_ok_and(|case| case.values.flag("peaks") != Some(false))
 }
 
 /// Warns of the cost of refining the peaks of thousands of places, and states the alternatives.
