@@ -408,7 +408,8 @@ mod tests {
         let time = plan.extrapolate(&[measurement(1.0, 0.1), measurement(3.0, 0.1)]).unwrap();
         let ExpectedTime::Extrapolated { seconds, .. } = &time else { panic!("{time:?}") };
         assert!((seconds - (16.0 * 2.0 + 948.0 * 0.1)).abs() < 1e-9, "{seconds}");
-        assert_eq!(time.to_string(), "about 2 minutes on one thread, from 4 probe points");
+        let words = "about 2 minutes on one thread, from 4 probe points, without the refinement of peaks";
+        assert_eq!(time.to_string(), words);
         assert_eq!(time.announcement(), None);
         let long = plan.extrapolate(&[measurement(20.0, 10.0)]).unwrap();
         assert!(long.announcement().unwrap().contains("Ctrl-C"), "{long}");
