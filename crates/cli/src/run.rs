@@ -114,6 +114,8 @@ pub fn check(request: &Request<'_>) -> Exit {
                 );
                 text.extend(study.notes().iter().map(|note| format!("  note: {note}\n")));
                 text += &summary.to_string();
+                let running = Arc::new(AtomicBool::new(false));
+                text.extend(checked.expected_time(&running).map(|time| time.summary_line()));
             }
             print(&text)
         }
@@ -251,9 +253,11 @@ fn once(
     // Each study is dropped after its run, together with its cached case.
     for checked in studies {
         let (study, summary) = (checked.study(), print_warnings(&checked));
+        let time = checked.expected_time(workers.stop);
         if std::io::stderr().is_terminal() && options.progress == crate::args::Progress::Bar {
-            complain!("{}\n{}", study.title(), summary.to_string().trim_end());
-        } else if let Some(long) = summary.long_run() {
+            let line = time.map_or_else(String::new, |time| time.summary_line());
+            complain!("{}\n{}", study.title(), format!("{summary}{line}").trim_end());
+        } else if let Some(long) = time.and_then(|time| time.announcement()) {
             complain!("{}: {long}", study.name());
         }
         match one(&checked, destination, outputs, options, workers) {

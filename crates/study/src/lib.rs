@@ -8,7 +8,7 @@
 //! - `syntax`: text, keys, units and expressions;
 //! - `compile`: from the text to compiled statements;
 //! - `case`: the cases of a study, each with its model and values;
-//! - `check`: checks and estimates before a run;
+//! - `check`: checks and sizes before a run;
 //! - [`kinds`]: the study kinds;
 //! - [`run`](mod@run): computes the units of a study;
 //! - [`results`]: tables, figures, notes and typed values.
@@ -24,7 +24,7 @@ mod syntax;
 pub use case::stress_stiffening::StiffnessExports;
 pub use case::study::{Case, MethodChoice, Study, VariedValue};
 pub use case::values::{Frequencies, Values, hertz};
-pub use check::{cost, memory_limit, summary};
+pub use check::{memory_limit, size, summary};
 pub use compile::read::{TemplateParameter, read_bytes, read_document, read_file, read_for_results, read_study};
 pub use compile::templates;
 pub use results::{dataset, decimation};

@@ -1,6 +1,7 @@
 //! The summary of a study before it is run.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::summary::{ModelSummary, OrbitCount};
 use stickslip_study::{Study, read_study, templates};
@@ -395,303 +396,22 @@ fn sizes_are_those_of_the_tables() {
     }
 }
 
+/// Probes compute a few points in advance. They leave the results of the run unchanged, and a
+/// stop ends them.
 #[test]
-fn the_time_is_estimated_within_bounds() {
-    // A run of a second must not be estimated at an hour, nor the reverse. A property test
-    // checks a factor of ten.
-    let small = summary(templates::find("element").unwrap().study).longest_time_s;
-    assert!((0.05..2.0).contains(&small), "{small}");
-    let points = |count: &str| summary(&template("blade-couple", &[("points = 241", count)])).longest_time_s;
-    let (few, many) = (points("points = 1000"), points("points = 100000"));
-    assert!(many > 50.0 * few && many < 100.0 * few, "{few} {many}");
-}
-
-/// Measured: ten million orbits of the couple take 282 s of processor time. The summary also
-/// states the longest time.
-#[test]
-fn usual_and_longest_time_are_stated() {
-    let text = template(
-        "blade-couple",
-        &[
-            ("points = 241", "points = 1000"),
-            (r#"["2 N", "4 N", "6 N", "8 N"]"#, r#"{ from = "1 N", to = "10 N", points = 10000 }"#),
-        ],
-    );
-    let summary = summary(&text);
-    assert!((140.0..1000.0).contains(&summary.usual_time_s), "{}", summary.usual_time_s);
-    assert!(summary.usual_time_s < summary.longest_time_s);
-    let said = summary.to_string();
-    assert!(said.contains("minutes on one thread, up to "), "{said}");
-}
-
-/// Steps with rigid joints need eliminations. Measured on one core: 1.3 s for a point of a ring
-/// of 96 blades without a warm start.
-#[test]
-fn rigid_joints_take_eliminations() {
-    let ring = |blades: usize| {
-        summary(&format!(
-            r#"
-schema = 1
-[[mass]]
-name = "b"
-mass = "1 kg"
-[[spring]]
-between = ["b", "ground"]
-stiffness = "k"
-damping = "0.5 kg/s"
-[[spring]]
-between = ["b", "next.b"]
-stiffness = "300 N/m"
-[[joint]]
-name = "j"
-between = ["b", "next.b"]
-law = {{ kind = "coulomb", limit = "0.5 N" }}
-[[force]]
-on = "b"
-amplitude = "1 N"
-engine_order = 3
-[parameters]
-k = "10 N/mm"
-[disk]
-sectors = {blades}
-mistuning = {{ of = "k", deviation = "1 %", seed = 7 }}
-[study]
-kind = "response"
-frequency = ["16.2 Hz"]
-peaks = false
-[method]
-kind = "harmonic-balance"
-harmonics = 15
-"#
-        ))
+fn probes_do_not_change_a_run() {
+    let text = template("blade-couple", &[("points = 241", "points = 31")]);
+    let (running, stopped) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(true)));
+    let tables = |probed: bool| {
+        let checked = check(&study(&text)).unwrap();
+        if probed {
+            assert!(checked.expected_time(&running).unwrap().to_string().contains("on one thread"));
+            assert_eq!(checked.expected_time(&stopped), None);
+        }
+        // compared as text, because missing values are NaN
+        format!("{:?}", checked.run(&Context::without_progress(1)).unwrap().tables)
     };
-    let large = ring(96);
-    assert!((0.4..4.0).contains(&large.longest_time_s), "{} s", large.longest_time_s);
-    assert!(large.usual_time_s < large.longest_time_s);
-    // with banded matrices the time is proportional to the number of blades, plus a constant
-    let growth = (ring(192).longest_time_s - large.longest_time_s) / (large.longest_time_s - ring(48).longest_time_s);
-    assert!((1.5..3.0).contains(&growth), "{growth}");
-}
-
-/// Wall times of the command, with its files:
-/// - two contacts of two directions on three bodies, followed for sixty periods, twice;
-/// - 36 mistuned sectors of two masses, event-driven, at nine distant frequencies;
-/// - a ring of 300 rigid joints with five harmonics, without a warm start.
-#[test]
-fn usual_time_agrees_with_measurements() {
-    let contacts = r#"
-schema = 1
-[parameters]
-r = 0.1
-[[mass]]
-repeat = { i = 3 }
-name = "n{i}"
-mass = "0.1 kg*i"
-directions = ["x", "z"]
-[[spring]]
-repeat = { i = 3 }
-between = ["n{i}.x", "ground"]
-stiffness = "60 N/mm"
-damping = "1 kg/s"
-[[spring]]
-repeat = { i = 3 }
-between = ["n{i}.z", "ground"]
-stiffness = "90 N/mm"
-damping = "1 kg/s"
-[[joint]]
-name = "c1"
-between = ["n1", "ground"]
-law = { kind = "friction-contact", tangential = "50 N/mm", normal = "80 N/mm", friction = 0.3, preload = "20 N" }
-[[joint]]
-name = "c3"
-between = ["n3", "n2"]
-law = { kind = "friction-contact", tangential = "30 N/mm", normal = "50 N/mm", friction = 0.2, preload = "5 N" }
-[[force]]
-on = "n1.x"
-amplitude = "r*10 N"
-[study]
-kind = "transient"
-frequency = "110 Hz"
-cycles = 60
-vary = { r = [0.1, 1e-7] }
-"#;
-    let sectors = r#"
-schema = 1
-[disk]
-sectors = 36
-mistuning = { of = "b", deviation = "1 %", seed = 3 }
-[[mass]]
-name = "b"
-mass = "0.2 kg"
-[[mass]]
-name = "d"
-mass = "1 kg"
-[[spring]]
-between = ["b", "d"]
-stiffness = "100 N/mm"
-damping = "2 kg/s"
-[[spring]]
-between = ["d", "ground"]
-stiffness = "900 N/mm"
-damping = "2 kg/s"
-[[spring]]
-between = ["d", "next.d"]
-stiffness = "300 N/mm"
-[[joint]]
-name = "s"
-between = ["b", "next.b"]
-law = { kind = "coulomb", limit = "1 N" }
-[[force]]
-on = "b"
-amplitude = "5 N"
-engine_order = 4
-[study]
-kind = "response"
-frequency = { from = "85 Hz", to = "125 Hz", points = 9 }
-peaks = false
-"#;
-    let ring = r#"
-schema = 1
-[[mass]]
-repeat = { i = 300 }
-name = "b{i}"
-mass = "0.2 kg"
-[[spring]]
-repeat = { i = 300 }
-between = ["b{i}", "ground"]
-stiffness = "100 N/mm*(1+0.01*sin(3*i))"
-damping = "0.5 kg/s"
-[[spring]]
-repeat = { i = 300, wrap = true }
-between = ["b{i}", "b{i+1}"]
-stiffness = "7 N/mm"
-[[joint]]
-repeat = { i = 300, wrap = true }
-name = "s{i}"
-between = ["b{i}", "b{i+1}"]
-law = { kind = "coulomb", limit = "1.5 N*(1+0.2*sin(i))" }
-[[force]]
-repeat = { i = 300 }
-on = "b{i}"
-amplitude = "5 N"
-phase = "-3*i*360 deg/300"
-[study]
-kind = "response"
-frequency = "112 Hz"
-peaks = false
-[method]
-kind = "harmonic-balance"
-harmonics = 5
-"#;
-    for (name, text, measured) in [("contacts", contacts, 1.07), ("sectors", sectors, 16.2), ("ring", ring, 2.1)] {
-        let summary = summary(text);
-        let usual = summary.usual_time_s;
-        assert!(usual <= summary.longest_time_s, "{name}: {usual} s, up to {} s", summary.longest_time_s);
-        assert!((measured / 3.0..3.0 * measured).contains(&usual), "{name}: {usual} s, measured {measured} s");
-    }
-}
-
-/// A place has a peak to refine if a resonance raises one of the inner frequencies above its
-/// neighbours. There is none if all resonances are nearest to the ends.
-#[test]
-fn peaks_are_refined_where_resonances_are() {
-    let seconds = |range: &str, peaks: &str| {
-        let range = format!("frequency = {{ {range}, points = 3 }}\npeaks = {peaks}");
-        let given = r#"frequency = { from = "119.5 Hz", to = "122.5 Hz", points = 241 }"#;
-        let cases = r#"vary = { Ft = { from = "1 N", to = "10 N", points = 1000 } }"#;
-        let vary = r#"vary = { Ft = ["2 N", "4 N", "6 N", "8 N"] }"#;
-        summary(&template("blade-couple", &[(given, &range), (vary, cases)])).longest_time_s
-    };
-    // at 121 Hz and below the contact's own resonance: nearest to the middle of the first
-    // range, to an end of the second
-    for (range, peak) in [(r#"from = "61 Hz", to = "181 Hz""#, true), (r#"from = "110 Hz", to = "300 Hz""#, false)] {
-        let (with, without) = (seconds(range, "true"), seconds(range, "false"));
-        assert_eq!(with > 1.2 * without, peak, "{range}: {with} s, {without} s without");
-    }
-}
-
-/// Processor times of the command, with its files: wedges under the platforms of 12 and 36
-/// blades, one preload, on one thread, and of 12 mistuned blades. The three points of the last
-/// study are distant, and every orbit of its peak has no warm start. It was stopped after 36 s.
-#[test]
-fn usual_time_of_wedges_agrees_with_measurements() {
-    let vary = r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#;
-    let mistuned = "sectors = \"N\"\nmistuning = { of = \"kx\", deviation = \"2 %\", seed = 7 }";
-    let tuned = "sectors = \"N\"";
-    for (blades, points, disk, measured) in [
-        (12, 3, tuned, 0.4),
-        (12, 61, tuned, 1.6),
-        (36, 3, tuned, 0.6),
-        (36, 61, tuned, 2.6),
-        (12, 3, mistuned, 40.0),
-        (12, 61, mistuned, 32.0),
-    ] {
-        let [blades, points] = [format!("N = {blades} "), format!("points = {points} ")];
-        let edits = [("N = 12 ", &*blades), ("points = 71 ", &points), (vary, ""), (tuned, disk)];
-        let text = template("under-platform-wedge", &edits);
-        let summary = summary(&text);
-        let usual = summary.usual_time_s;
-        assert!(usual <= summary.longest_time_s, "{blades}, {points}: {usual} s, up to {} s", summary.longest_time_s);
-        assert!(
-            (measured / 3.0..3.0 * measured).contains(&usual),
-            "{blades}, {points}: {usual} s, measured {measured} s"
-        );
-    }
-}
-
-/// Branches of tuned disks follow one sector. Measured: 2.2 s for 12 blades with wedges, and
-/// the same for 36.
-#[test]
-fn a_branch_of_a_tuned_disk_takes_the_time_of_a_sector() {
-    let kind = (r#"kind = "response""#, r#"kind = "branch""#);
-    let method = "\n[method]\nkind = \"harmonic-balance\"\nharmonics = 9\ntolerance = 0.05\n";
-    let vary = (r#"vary = { speed = ["2000 rpm", "2600 rpm", "4000 rpm", "8000 rpm"] }"#, "");
-    let seconds = |blades: &str| {
-        let edits = [kind, (", points = 71", ""), vary, (method, "\n"), ("references = true", ""), ("N = 12 ", blades)];
-        summary(&template("under-platform-wedge", &edits)).usual_time_s
-    };
-    let (few, many) = (seconds("N = 12 "), seconds("N = 36 "));
-    assert!((0.7..7.0).contains(&few) && (few - many).abs() < 0.2 * few, "{few} s, {many} s");
-}
-
-/// The search for an optimum takes most of the time of a performance study, if there is an
-/// optimum: both times are stated.
-#[test]
-fn an_optimum_takes_its_time_if_there_is_one() {
-    let small = ("points = 241", "points = 2001");
-    let kind = ("kind = \"response\"", "kind = \"performance\"");
-    let curve = summary(&template(
-        "blade-couple",
-        &[small, kind, ("kind = \"coulomb\"", "kind = \"coulomb-arctan\", alpha = \"25 s/mm\"")],
-    ));
-    let (least, place) = curve.time_without.unwrap();
-    assert!(least < 0.2 * curve.usual_time_s, "{least} s of {} s", curve.usual_time_s);
-    assert!(curve.to_string().contains(place), "{curve}");
-    // two values have none between them
-    let two = (r#"["2 N", "4 N", "6 N", "8 N"]"#, r#"["2 N", "4 N"]"#);
-    assert!(summary(&template("blade-couple", &[kind, two])).time_without.is_none());
-}
-
-/// Measured: transients of 13 points take 0.4 s with the exact law, 26 s with the smooth one.
-/// The free contact has almost no damping, but the excitation does not drive it and friction
-/// damps it, so it only counts in the longest time.
-#[test]
-fn transients_usually_die_with_the_modes_that_are_driven() {
-    let arctan = r#"law = { kind = "coulomb-arctan", limit = "Ft", alpha = "25 s/mm" }"#;
-    for (law, measured) in [(r#"law = { kind = "coulomb", limit = "Ft" }"#, 0.4), (arctan, 26.0)] {
-        let text = template(
-            "blade-couple",
-            &[
-                ("points = 241", "points = 13"),
-                (r#"vary = { Ft = ["2 N", "4 N", "6 N", "8 N"] }"#, ""),
-                (r#"law = { kind = "coulomb", limit = "Ft" }"#, law),
-            ],
-        );
-        let summary = summary(&(text + "\n[method]\nkind = \"transient\"\n"));
-        let usual = summary.usual_time_s;
-        assert!((0.5 * measured..10.0 * measured).contains(&usual), "{usual} s, measured {measured} s");
-        assert!(summary.longest_time_s > 50.0 * usual, "{} s", summary.longest_time_s);
-    }
+    assert_eq!(tables(true), tables(false));
 }
 
 /// Friction with a constant limit has one orbit. A stop, and friction that falls with velocity,
@@ -772,20 +492,6 @@ fn references_of_draws_are_missed_before_the_run() {
     let found = run(&study(&text), &Context::without_progress(1)).unwrap();
     assert!(found.tables.iter().all(|table| table.name != "references"));
     assert_eq!(found.notes.iter().filter(|note| note.contains("`references` has no effect")).count(), 1);
-}
-
-#[test]
-fn a_long_run_is_announced() {
-    let points = |law: &str, count: &str| summary(&stop(law, "").replace("points = 11", count)).long_run();
-    let smooth = "kind = \"bouc-wen\", stiffness = \"100 N/mm\", beta = \"500 1/m\", gamma = \"500 1/m\", exponent = 1";
-    assert_eq!(points(smooth, "points = 11"), None);
-    let said = points(smooth, "points = 1000000").unwrap();
-    assert!(said.contains("on one thread, up to") && said.contains("days") && said.contains("Ctrl-C"), "{said}");
-    // orbits that are hard to find at all points take days
-    let falling = "kind = \"stribeck\", limit = \"1 N\", static_limit = \"1.5 N\", velocity = \"10 mm/s\"";
-    let series = stop(falling, "[method]\nkind = \"harmonic-balance\"").replace("points = 11", "points = 1000000");
-    let said = summary(&series).long_run().unwrap();
-    assert!(said.contains("days on one thread, up to") && said.contains("Ctrl-C"), "{said}");
 }
 
 /// A mass of 2 kg on 100 N/mm, pressed by `preload` on a face of 300 N/mm, under a constant

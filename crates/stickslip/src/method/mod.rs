@@ -43,7 +43,6 @@ pub use alternatives::Alternatives;
 pub use error::{MethodError, Refusal};
 use list::LIST;
 pub use options::{MethodOption, Options, WIDTH};
-pub use orbit_search::evidence::evidence_steps;
 pub use static_equilibrium::StaticEquilibrium;
 pub use traits::{Choice, Method, MethodInfo, Solver};
 pub use with_alternatives::{alternatives, solver_with_alternatives};

@@ -178,19 +178,6 @@ impl Frequencies {
         }
     }
 
-    /// Returns the number of frequencies below `omega`, rad/s, if they are rising.
-    pub(crate) fn count_below(&self, omega: f64) -> usize {
-        let (mut low, mut high) = (0, self.len());
-        while low < high {
-            let middle = low.midpoint(high);
-            match self.get(middle).is_some_and(|at| at < omega) {
-                true => low = middle + 1,
-                false => high = middle,
-            }
-        }
-        low
-    }
-
     /// Returns all frequencies, rad/s.
     pub fn iter(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.len()).filter_map(|index| self.get(index))
@@ -414,8 +401,6 @@ mod tests {
         let most = 1_000_000_000_000;
         let range = Frequencies::Range { from: TAU, to: 101.0 * TAU, points: most + 1 };
         assert_eq!((range.lowest(), range.highest(), range.is_rising()), (Some(TAU), Some(101.0 * TAU), true));
-        assert_eq!((range.count_below(TAU), range.count_below(200.0 * TAU)), (0, most + 1));
-        assert_eq!(range.count_below(51.0 * TAU), most / 2);
         assert!(!Frequencies::Range { from: 2.0, to: 1.0, points: 3 }.is_rising());
         let list = Frequencies::List(vec![1.0, 3.0, 2.0]);
         assert_eq!((list.is_rising(), list.lowest(), list.highest()), (false, Some(1.0), Some(3.0)));

@@ -1,7 +1,7 @@
 //! A study kind: its description, and how its studies are divided, computed and drawn.
 
 use crate::case::study::Study;
-use crate::check::cost::{Cost, CostInputs};
+use crate::check::size::{PlannedSize, SizeInputs};
 use crate::check::survey::SurveyedCase;
 use crate::kinds::info::KindInfo;
 use crate::results::dataset::Figure;
@@ -15,13 +15,32 @@ pub struct Kind {
     pub info: KindInfo,
     /// Divides its studies into units of work.
     pub unit_size: fn(&Study) -> UnitSize,
-    /// Estimate of the size and the time of its studies; errs on the high side.
-    pub cost: fn(&CostInputs<'_>) -> Cost,
+    /// Counts the rows and the memory of its studies; errs on the high side.
+    pub size: fn(&SizeInputs<'_>) -> PlannedSize,
     /// Likely mistakes in a study of this kind, as sentences. The argument is a sample of
     /// cases, spread over the study.
     pub warnings: fn(&[SurveyedCase]) -> Vec<String>,
+    /// How the time of its studies is measured in advance.
+    pub probe: Probe,
     /// Computes one unit: the rows of its tables.
     pub compute: fn(&UnitTask<'_>) -> Computed,
     /// Draws the figure of finished tables. The caller sets the title.
     pub draw: fn(&FigureInput<'_>) -> Figure,
+}
+
+/// What is computed and measured to expect the time of a run.
+#[derive(Debug, Clone, Copy)]
+pub enum Probe {
+    /// Two consecutive frequencies of a case.
+    Points {
+        /// Computes the points of a unit, without what belongs to the whole curve.
+        compute: fn(&UnitTask<'_>) -> Computed,
+        /// Computations that are not measured although they may take most of the time.
+        excluded: fn(&Study) -> Option<&'static str>,
+    },
+    /// The beginning of a unit. The kind reports the computed part to [`UnitTask::share`].
+    Unit {
+        /// What the unit is.
+        name: &'static str,
+    },
 }

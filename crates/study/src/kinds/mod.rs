@@ -3,7 +3,7 @@
 //! A kind states its keys of `[study]`; the reader checks them and passes their
 //! [`Values`](crate::Values) for every case.
 //!
-//! - `NAME/mod.rs`: keys, conditions, cost and computation of a kind; `NAME/figure.rs` draws its
+//! - `NAME/mod.rs`: keys, conditions, size and computation of a kind; `NAME/figure.rs` draws its
 //!   tables, `NAME/tables.rs` reads them back as typed values;
 //! - `info`: the description of a kind: keys and conditions;
 //! - `kind`: a row of the table: how studies of the kind are divided, computed and drawn;

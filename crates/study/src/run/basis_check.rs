@@ -37,7 +37,7 @@ const CHECKED_FIRST_UNITS: usize = 16;
 /// more.
 const MAX_MODES: usize = 60;
 /// Largest number of rows for the check; reducing this size takes ten seconds.
-pub(crate) const MAX_ROWS: usize = 30_000;
+const MAX_ROWS: usize = 30_000;
 /// Difference relative to the largest amplitude above which the note becomes a warning with
 /// advice.
 const WARNING_DIFFERENCE: f64 = 0.01;
@@ -85,11 +85,6 @@ pub struct BasisDifference {
 /// first units.
 pub(crate) fn is_checked(unit: usize, points: usize) -> bool {
     unit < CHECKED_FIRST_UNITS || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
-}
-
-/// Returns the number of points solved again if joints slip at all points.
-pub(crate) fn checked_points(points: f64, cases: f64) -> f64 {
-    (POINTS as f64 * (points / BLOCK as f64).ceil().max(cases.min(CHECKED_FIRST_UNITS as f64))).min(points)
 }
 
 impl SlipReductionCheck {

@@ -1,5 +1,6 @@
 //! Runs a study.
 //!
+//! - `probe`: the expected time, from a few points that are computed in advance;
 //! - `runner`: checks a study, computes its units on all threads, and records the run;
 //! - `work`: units of work, and the results of one unit;
 //! - `result_block`: the results of consecutive units;
@@ -10,10 +11,12 @@
 pub(crate) mod basis_check;
 pub(crate) mod output_columns;
 pub(crate) mod point_row;
+mod probe;
 pub mod result_block;
 mod runner;
 pub mod work;
 
+pub use probe::ExpectedTime;
 pub use runner::{
     CONVERGED, CheckedStudy, Context, NOT_REACHED, PreparedCase, check, draw, figure_of_tables, run, units,
 };

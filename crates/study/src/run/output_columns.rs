@@ -123,7 +123,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
 const HARMONICS: usize = 5;
 /// Instants per period at which ranges are evaluated, in addition to every switch. The range of
 /// a sine has an error of 2e-6.
-pub(crate) const INSTANTS: usize = 1024;
+const INSTANTS: usize = 1024;
 
 fn joint_columns(system: &System, quantity: &str) -> Vec<String> {
     system.joints().iter().flat_map(|joint| joint.labels()).map(|label| format!("{label}_{quantity}")).collect()

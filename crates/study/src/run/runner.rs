@@ -13,12 +13,14 @@ use crate::results::drawing::FigureInput;
 use crate::results::notes::Note;
 use crate::run::basis_check::is_checked;
 use crate::run::point_row::describe_location;
+use crate::run::probe::{self, ExpectedTime};
 use crate::run::result_block::{Block, Tally};
-use crate::run::work::{UNITS_AHEAD, UnitResult, UnitTask, WorkUnits, refusal_at_location};
+use crate::run::work::{Share, UNITS_AHEAD, UnitResult, UnitTask, WorkUnits, refusal_at_location};
 use crate::syntax::error::StudyError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 use stickslip::method::Choice;
@@ -105,6 +107,24 @@ impl CheckedStudy {
     /// Returns the summary of the model, known before the run.
     pub fn summary(&self) -> &ModelSummary {
         &self.summary
+    }
+
+    /// Computes a few points of the study and extrapolates the time of a run on one thread.
+    ///
+    /// This takes at most about a second, and less if `stop` is set. It has no influence on a
+    /// later run. Returns `None` if a probe failed, or after a stop.
+    ///
+    /// # Example
+    /// ```
+    /// use std::sync::{Arc, atomic::AtomicBool};
+    /// use stickslip_study::{read_study, run::check};
+    /// let text = stickslip_study::templates::find("element").unwrap().study;
+    /// let checked = check(&read_study("element.toml", text, &[]).unwrap()).unwrap();
+    /// let time = checked.expected_time(&Arc::new(AtomicBool::new(false))).unwrap();
+    /// assert!(time.to_string().contains("on one thread"));
+    /// ```
+    pub fn expected_time(&self, stop: &Arc<AtomicBool>) -> Option<ExpectedTime> {
+        probe::expected_time(&self.study, self.first.clone(), stop)
     }
 
     /// Returns the checked study without its prepared first case, for callers that hold many
@@ -362,7 +382,7 @@ fn compute(
         _ => PreparedCase::new(study, index).map(Arc::new),
     };
     let cases = unit.cases.clone().map(prepared).collect::<Result<Vec<_>, _>>()?;
-    let work = UnitTask { study, cases, points: unit.points, context };
+    let work = UnitTask { study, cases, points: unit.points, context, share: &Share::default() };
     let mut part = (kinds::kind_of(study).compute)(&work);
     if let Ok(part) = &mut part
         && !context.stopped()

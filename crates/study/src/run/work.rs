@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use stickslip::curve::sweep::BLOCK;
 use stickslip::dimension::Dimension;
 use stickslip::method::{self, Alternatives, Method, MethodError, Options, Refusal, WIDTH};
@@ -245,6 +245,26 @@ pub struct UnitTask<'a> {
     pub points: Range<usize>,
     /// Settings of the run.
     pub context: &'a Context,
+    /// The computed part of the unit, for kinds whose points depend on each other.
+    pub share: &'a Share,
+}
+
+/// The computed part of a unit, from 0 to 1, as its kind reports it.
+#[derive(Debug, Default)]
+pub struct Share(AtomicU64);
+
+impl Share {
+    /// Sets the computed part; a smaller value than before has no effect.
+    pub(crate) fn reach(&self, share: f64) {
+        if share > self.get() {
+            self.0.store(share.min(1.0).to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// Returns the computed part.
+    pub(crate) fn get(&self) -> f64 {
+        f64::from_bits(self.0.load(Ordering::Relaxed))
+    }
 }
 
 impl UnitTask<'_> {

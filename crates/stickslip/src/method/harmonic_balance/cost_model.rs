@@ -1,8 +1,8 @@
-//! Cost model: multiplications of a Newton step and of an orbit, counted before anything is
-//! computed.
+//! Multiplications of a Newton step and of an orbit, counted before anything is computed, for
+//! method `auto`; and the memory of factors.
 
 use super::aft::Ports;
-use super::budget::{LEAST_ELIMINATIONS, POINT_LIMIT, SEARCH_MULTIPLICATIONS};
+
 use super::dynamics::banded::BandedForm;
 use super::equations::harmonic_set::HarmonicSet;
 use super::linear_solve::newton_krylov::{krylov_step_work, uses_krylov};
@@ -15,15 +15,7 @@ use num_complex::Complex64;
 ///
 /// Newton steps take most of the time of a search. The result is zero if harmonic balance does
 /// not take the system.
-///
-/// # Example
-/// ```
-/// use stickslip::method::harmonic_balance::step_work;
-/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
-/// // a matrix over the odd harmonics of one joint
-/// assert_eq!(step_work(&system, 15), 16f64.powi(3) / 3.0);
-/// ```
-pub fn step_work(system: &System, top: usize) -> f64 {
+fn step_work(system: &System, top: usize) -> f64 {
     let Ok((ports, _)) = Ports::for_sector(system) else { return 0.0 };
     let harmonics = HarmonicSet::new(system, |z| z != Complex64::new(0.0, 0.0)).up_to(top).len();
     step_multiplications(BandedForm::new(system, &ports, &[1]).as_ref(), &ports, harmonics)
@@ -52,15 +44,9 @@ pub fn factor_bytes(system: &System) -> usize {
 
 /// Returns the multiplications of one step at each series length, doubled from the first up to
 /// `longest`, plus one step at twice each length for its error estimate.
-pub fn doubling_work(system: &System, longest: f64) -> f64 {
+fn doubling_work(system: &System, longest: f64) -> f64 {
     let tops = std::iter::successors(Some(FIRST_HARMONICS), |top| ((*top as f64) < longest).then_some(2 * top));
     tops.map(|top| step_work(system, top) + step_work(system, 2 * top)).sum()
-}
-
-/// Returns the work limit, in multiplications, of a point with rigid friction if the method
-/// chooses the harmonics.
-pub fn point_work_limit(system: &System) -> f64 {
-    POINT_LIMIT.multiplications * SEARCH_MULTIPLICATIONS.max(LEAST_ELIMINATIONS * step_work(system, FIRST_HARMONICS))
 }
 
 /// Highest harmonic that rigid friction usually needs.

@@ -58,7 +58,7 @@ use super::options::{PERIOD, periods};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver};
 use crate::dimension::Dimension;
 use crate::model::System;
-pub use cost_model::{doubling_work, factor_bytes, orbit_work, point_work_limit, step_work};
+pub use cost_model::{factor_bytes, orbit_work};
 pub(crate) use modes::branch_equations::BranchEquations;
 pub(crate) use modes::mode_continuation::{ModeArc, ModeStep};
 pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState};

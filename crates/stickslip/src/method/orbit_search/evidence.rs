@@ -47,26 +47,6 @@ const TOLERANCE: f64 = 1e-8;
 /// Equal steps per return for laws with a step only; they follow the motion to about 1e-6.
 const STEPS: usize = 4096;
 
-/// Returns the number of equal steps in which each orbit by harmonic balance is integrated, and
-/// true if the derivatives are integrated too.
-///
-/// This integration takes longer than the orbit itself. Returns `None` if the orbit is not
-/// integrated, or not in equal steps.
-///
-/// # Example
-/// ```
-/// use stickslip::method::evidence_steps;
-/// let couple = stickslip::model::example::blade_couple().assemble().unwrap();
-/// assert_eq!(evidence_steps(&couple), None); // from event to event
-/// ```
-pub fn evidence_steps(system: &System) -> Option<(usize, bool)> {
-    if system.dofs() > LARGEST || IntegratorKind::of(system, None) != IntegratorKind::Incremental {
-        return None;
-    }
-    let orbit_check = OrbitCheck::new(system);
-    orbit_check.flow.as_ref().map(|_| (STEPS, !orbit_check.proven))
-}
-
 /// Integrates a system over one return and compares the end with the start.
 pub(crate) struct OrbitCheck {
     /// `None` if the system is too large, or if no integration takes its laws.

@@ -1,5 +1,5 @@
-//! Summary of a study before its run: linear modes, first slip of the joints, likely mistakes,
-//! memory and time.
+//! Summary of a study before its run: linear modes, first slip of the joints, likely mistakes
+//! and memory.
 //!
 //! All results come from the linear structure and from counting; no orbit is computed.
 //!
@@ -14,9 +14,10 @@ mod text;
 mod warnings;
 
 pub use structure::{DIRECTIONS, StructureSummary, mass_along};
+pub(crate) use text::line;
 
 use crate::case::study::Study;
-use crate::check::cost::{Cost, CostInputs, StudySize};
+use crate::check::size::{SizeInputs, StudySize};
 use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::kinds;
 use crate::run::work::WorkUnits;
@@ -57,13 +58,6 @@ pub struct ModelSummary {
     pub warnings: Vec<String>,
     /// Size of the results and the memory.
     pub size: StudySize,
-    /// Usual time on one thread, s; a rough estimate.
-    pub usual_time_s: f64,
-    /// Time without the work that only some results need, s, and the condition for it, in
-    /// words.
-    pub time_without: Option<(f64, &'static str)>,
-    /// Time if orbits are hard to find, s; a rough estimate on the high side.
-    pub longest_time_s: f64,
 }
 
 /// Number of orbits at one frequency.
@@ -124,12 +118,6 @@ pub struct JointSummary {
 /// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
 /// the model is true for all of them.
 const MAX_CHECKED_CASES: usize = 9;
-/// The summary states the longest time if it exceeds the usual time by the factor
-/// [`LONG_TIME_FACTOR`] and exceeds [`SHORT_TIME`], s.
-const LONG_TIME_FACTOR: f64 = 3.0;
-const SHORT_TIME: f64 = 5.0;
-/// Duration above which a run announces its expected time at the start, s.
-const LONG_RUN: f64 = 3600.0;
 /// Degrees of freedom above which only the first case is checked, so that a summary takes at
 /// most a second.
 const MAX_DOFS_ALL_CASES: usize = 60;
@@ -186,20 +174,7 @@ impl ModelSummary {
         });
         let joints = joints.collect();
         let kind = kinds::kind_of(study);
-        let all_inputs: Vec<CostInputs<'_>> = cases.iter().map(|one| CostInputs::new(study, one)).collect();
-        // the time of all cases if they were like this one
-        let time = |inputs: &CostInputs<'_>| inputs.seconds(&(kind.cost)(inputs));
-        let mean = |times: &dyn Fn(&CostInputs<'_>) -> f64| {
-            all_inputs.iter().map(times).sum::<f64>() / all_inputs.len() as f64
-        };
-        let (usual_seconds, seconds) = (mean(&|one| time(&one.typical())), mean(&time));
-        let (slow, usual) = (&all_inputs[0], all_inputs[0].typical());
-        let (cost, usual_cost) = ((kind.cost)(slow), (kind.cost)(&usual));
-        let whole = usual.seconds(&usual_cost);
-        let spared = usual_cost.conditional_work.map(|(work, place)| {
-            let rest = Cost { work: usual_cost.work - work, ..usual_cost };
-            (usual_seconds * usual.seconds(&rest) / whole, place)
-        });
+        let counts = SizeInputs::new(study, &cases[0]);
         Ok(ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
@@ -213,40 +188,8 @@ impl ModelSummary {
             orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| OrbitCount::new(first.system())),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
-            size: slow.size(&cost, WorkUnits::new(study, (kind.unit_size)(study)).len()),
-            usual_time_s: usual_seconds,
-            time_without: spared,
-            longest_time_s: seconds.max(usual_seconds),
+            size: counts.size(&(kind.size)(&counts), WorkUnits::new(study, (kind.unit_size)(study)).len()),
         })
-    }
-
-    /// Returns the announcement of a long run; `None` for a short one. The estimate is rough
-    /// and for one thread.
-    pub fn long_run(&self) -> Option<String> {
-        (self.longest_time_s >= LONG_RUN).then(|| {
-            let time = self.time();
-            format!(
-                "this run takes {time}; `check` estimates this in advance; Ctrl-C ends the run and keeps the \
-                finished points"
-            )
-        })
-    }
-
-    /// Describes the expected time in words.
-    pub(crate) fn time(&self) -> String {
-        let mut usual = format!("{} on one thread", crate::syntax::format::format_estimate(self.usual_time_s));
-        if let Some((seconds, place)) = self.time_without
-            && self.usual_time_s >= (LONG_TIME_FACTOR * seconds).max(SHORT_TIME)
-        {
-            usual += &format!(", {} {place}", crate::syntax::format::format_estimate(seconds));
-        }
-        if self.longest_time_s < LONG_TIME_FACTOR * self.usual_time_s || self.longest_time_s < SHORT_TIME {
-            return usual;
-        }
-        format!(
-            "{usual}, up to {} if orbits are hard to find",
-            crate::syntax::format::format_duration(self.longest_time_s)
-        )
     }
 
     /// Returns the summary for the record of a run, in SI except frequencies in Hz.
@@ -285,8 +228,6 @@ impl ModelSummary {
             "rows": self.size.rows,
             "result_bytes": self.size.results,
             "memory_bytes": self.size.memory,
-            "usual_time_s": self.usual_time_s,
-            "estimated_time_s": self.longest_time_s,
         })
     }
 }

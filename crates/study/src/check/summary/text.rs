@@ -118,6 +118,11 @@ impl ModelSummary {
     }
 }
 
+/// Returns a line of the summary.
+pub(crate) fn line(name: &str, text: &str) -> String {
+    format!("  {name:<WIDTH$} {text}\n")
+}
+
 /// Returns the joint of a direction.
 fn joint_of_direction(name: &str) -> &str {
     name.split('.').next().unwrap_or(name)
@@ -170,7 +175,7 @@ impl fmt::Display for ModelSummary {
         let dofs =
             if self.dofs == 1 { "1 degree of freedom".to_owned() } else { format!("{} degrees of freedom", self.dofs) };
         let shown = if self.case.is_empty() { String::new() } else { format!(", shown for {}", self.case) };
-        let mut line = |name: &str, text: &str| writeln!(f, "  {name:<WIDTH$} {text}");
+        let mut line = |name: &str, text: &str| f.write_str(&line(name, text));
         line("model", &format!("{dofs}, {joints} joint{}{shown}", plural_suffix(joints)))?;
         for (name, text) in self.structure.iter().flat_map(|structure| structure.lines()) {
             line(name, &text)?;
@@ -222,6 +227,6 @@ impl fmt::Display for ModelSummary {
             format_bytes(size.results),
             format_bytes(size.memory)
         );
-        line("results", &format!("{results}; {}", self.time()))
+        line("results", &results)
     }
 }

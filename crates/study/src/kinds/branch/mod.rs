@@ -13,10 +13,10 @@ use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of, largest_amplitude, peak_places};
 use crate::case::study::{Study, VariedValue, varied_text};
 use crate::case::values::{Frequencies, Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::{resonance_warnings, undamped_resonance};
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::PointRow;
@@ -75,8 +75,9 @@ pub(super) const KIND: Kind = Kind {
     },
     // the cases of one branch along a parameter differ in the last parameter only
     unit_size: |study| if along_parameter(study) { UnitSize::Curve } else { UnitSize::Case },
-    cost,
+    size,
     warnings: |cases| resonance_warnings(cases).into_iter().chain(undamped_resonance(cases)).collect(),
+    probe: Probe::Unit { name: "branch" },
     compute,
     draw: figure::draw,
 };
@@ -86,29 +87,23 @@ pub(super) const KIND: Kind = Kind {
 ///
 /// Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border of stick.
 const POINTS: f64 = 5.0;
-/// Solutions of the full equations per requested step.
-const SOLUTIONS_PER_STEP: f64 = 15.0;
 /// Peaks and turning points per branch.
 const MARKS: f64 = 2.0;
 
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let values = &inputs.case.values;
     let branches = if along_parameter(inputs.study) { inputs.curves() } else { inputs.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
-    let harmonics = values.count("harmonics").map(|h| h as f64);
-    let length = harmonics.unwrap_or(HARMONICS as f64);
+    let length = values.count("harmonics").unwrap_or(HARMONICS as u64) as f64;
     let samples = values.count("samples").unwrap_or(SERIES_SAMPLES) as f64;
     let rows = steps * POINTS;
-    Cost {
+    PlannedSize {
         tables: vec![
             inputs.orbits(rows),
             TableShape { rows: branches * MARKS, numbers: inputs.varied + 2.0, words: 0.0 },
         ],
         drawn: rows * inputs.places,
         unit: rows / branches * inputs.kept_series_bytes(length, samples) + inputs.series_bytes(length),
-        conditional_work: None,
-        work: rows * inputs.output_seconds()
-            + steps * SOLUTIONS_PER_STEP * inputs.solved_share() * inputs.series(harmonics),
     }
 }
 
@@ -297,17 +292,22 @@ fn follow(work: &UnitTask<'_>, along: Option<&VariedValue>, range: (f64, f64)) -
         let case = work.study.case_with_parameter(prepared.case.index, &along?.name, value).ok()?;
         case.model.assemble().ok()
     };
-    // the model has no excitation at an invalid value, so the branch ends before it
-    let at = |value: f64| match along {
-        None => (prepared.system.clone(), value),
-        Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
+    let steps = values.count("steps").unwrap_or(100) as f64;
+    let at = |value: f64| {
+        // derivatives evaluate values beside a point, so only whole steps count
+        work.share.reach((steps * (value - range.0) / (range.1 - range.0)).floor() / steps);
+        match along {
+            None => (prepared.system.clone(), value),
+            // the model has no excitation at an invalid value, so the branch ends before it
+            Some(_) => system(value).map_or((prepared.system.clone(), 0.0), |system| (system, work.omega(0))),
+        }
     };
     let places = peak_places(prepared);
     let trace = BranchContinuation {
         system_at: &at,
         method: method(values),
         range,
-        step: (range.1 - range.0).abs() / values.count("steps").unwrap_or(100) as f64,
+        step: (range.1 - range.0).abs() / steps,
         quantity: &|orbit| largest_amplitude(orbit, &places),
     };
     trace.branch().map_err(BranchFailure::Trace)

@@ -10,9 +10,9 @@ mod figure;
 use super::nodal_diameter::{STATES, waves};
 use super::shared::keys::no_requirements;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::FREQUENCY;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
@@ -68,8 +68,9 @@ pub(super) const KIND: Kind = Kind {
         tables: &[TABLE, CROSSINGS],
     },
     unit_size: |_| UnitSize::Case,
-    cost,
+    size,
     warnings: |_| Vec::new(),
+    probe: Probe::Unit { name: "diagram" },
     compute,
     draw: figure::draw,
 };
@@ -83,10 +84,7 @@ fn check(values: &Values, _: &Model, _: usize) -> Result<(), KeyError> {
     Err(KeyError::new("speed", message, "write { from = \"10 Hz\", to = \"120 Hz\", points = 56 }"))
 }
 
-/// Time of an eigenvalue problem per cube of its size, s.
-const EIGEN: f64 = 1e-8;
-
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let values = &inputs.case.values;
     let speeds = values.frequencies("speed").map_or(2, crate::case::values::Frequencies::len) as f64;
     let count = |key: &str, or: u64| values.count(key).unwrap_or(or) as f64;
@@ -95,19 +93,13 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
     let lines = 2.0 * waves * count("modes", 3);
     // an engine order excites the modes of one nodal diameter
     let crossings = lines / waves * count("engine_orders", 6);
-    let depends = inputs.case.parameters.contains_key(inputs.case.values.text("parameter").unwrap_or(PARAMETER));
-    let found = if depends { speeds + EVALUATIONS_PER_CROSSING * crossings } else { 1.0 };
-    // free and stuck joints for every wave; the complex problem of a wave has twice the size
-    let size = sectors.map_or(inputs.dofs, |sectors| 2.0 * inputs.dofs / sectors);
-    Cost {
+    PlannedSize {
         tables: vec![
             TableShape { rows: inputs.cases * speeds * lines, numbers: inputs.varied + 4.0, words: 1.0 },
             TableShape { rows: inputs.cases * crossings, numbers: inputs.varied + 5.0, words: 1.0 },
         ],
         drawn: inputs.cases * (speeds * lines + crossings),
         unit: speeds * lines * 8.0,
-        conditional_work: None,
-        work: inputs.cases * found * 2.0 * waves * size.powi(3) * EIGEN,
     }
 }
 
@@ -176,8 +168,6 @@ fn excited_modes(
     })
 }
 
-/// Typical number of evaluations per crossing.
-const EVALUATIONS_PER_CROSSING: f64 = 4.0;
 /// Largest number of evaluations per crossing.
 const MAX_REFINED: usize = 60;
 /// Relative change of the speed at which the search for a crossing stops: a hundred times the
@@ -273,7 +263,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let orders = values.count("engine_orders").unwrap_or(6) as usize;
     let sectors = prepared.case.model.ring.filter(|ring| ring.equal).map(|ring| ring.sectors);
     let mut before: Option<(f64, Vec<NaturalFrequency>)> = None;
-    for speed in values.frequencies("speed").into_iter().flat_map(|speeds| speeds.iter()) {
+    let speeds: Vec<f64> = values.frequencies("speed").into_iter().flat_map(|speeds| speeds.iter()).collect();
+    for (index, &speed) in speeds.iter().enumerate() {
         let place = || format!("{}speed = {} Hz", label(prepared), hertz(speed));
         if work.context.stopped() {
             part.count(place, NOT_REACHED, None);
@@ -310,6 +301,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             }
         }
         before = Some((speed, found));
+        work.share.reach((index + 1) as f64 / speeds.len() as f64);
         (work.context.finished)();
     }
     part.tables = vec![rows, crossings];

@@ -14,10 +14,10 @@ use super::shared::keys::{FREQUENCY, SAMPLES, no_requirements};
 use super::shared::orbit_sweep;
 use crate::case::names::ModelNames;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::excitation_warnings;
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{ENERGY_GAP, FREQUENCY as DRIVE, RESIDUAL};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
@@ -60,13 +60,14 @@ pub(super) const KIND: Kind = Kind {
         tables: &[LOOPS, SUMMARY],
     },
     unit_size: |_| UnitSize::Frequencies,
-    cost,
+    size,
     warnings: excitation_warnings,
+    probe: Probe::Points { compute, excluded: |_| None },
     compute,
     draw: figure::draw,
 };
 
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (values, points) = (&inputs.case.values, inputs.points());
     let loops = match values.names("loop") {
         _ if values.flag("sum") == Some(true) => MAX_DIRECTIONS as f64,
@@ -75,16 +76,13 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
     };
     let rows = points * loops * inputs.instants();
     let keys = inputs.varied + inputs.frequency_columns();
-    let read = inputs.instants() + loops * (QUADRATURE * GAUSS_5.len()) as f64;
-    Cost {
+    PlannedSize {
         tables: vec![
             TableShape { rows, numbers: keys + 3.0, words: 1.0 },
             TableShape { rows: points * loops, numbers: keys + 5.0, words: 2.0 },
         ],
         drawn: rows,
         unit: inputs.kept_orbits() + inputs.samples_bytes(),
-        conditional_work: None,
-        work: points * (inputs.orbit() + inputs.evaluation(read)),
     }
 }
 

@@ -4,10 +4,10 @@ mod figure;
 
 use super::shared::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::mode_warnings;
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{amplitude_in, first_harmonic_in, phase_of};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
@@ -55,35 +55,25 @@ pub(super) const KIND: Kind = Kind {
         tables: &["modes", "modes_summary"],
     },
     unit_size: |_| UnitSize::Case,
-    cost,
+    size,
     warnings: mode_warnings,
+    probe: Probe::Unit { name: "mode" },
     compute,
     draw: figure::draw,
 };
 
-/// Solutions of the full equations per point. Measured: 0.3 s per point for a disk of 24
-/// sectors.
-const SOLUTIONS_PER_POINT: f64 = 8.0;
-
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let values = &inputs.case.values;
     let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
     let rows = inputs.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
-    // odd harmonics, two parts each, of every degree of freedom
-    let elimination = inputs.elimination_seconds((harmonics + 1.0) * inputs.dofs);
-    Cost {
+    PlannedSize {
         tables: vec![
             TableShape { rows, numbers: inputs.varied + 4.0 + 3.0 * inputs.places, words: 0.0 },
             TableShape { rows: inputs.cases, numbers: inputs.varied + 5.0, words: 0.0 },
         ],
         drawn: 2.0 * rows,
         unit: points * inputs.series_bytes(harmonics),
-        conditional_work: None,
-        // the curve takes about 100 steps from its large end, with close modes 200, whatever is
-        // requested
-        work: (rows * SOLUTIONS_PER_POINT + inputs.cases * inputs.steps(100.0, 200.0))
-            * (inputs.series(Some(harmonics)) + elimination),
     }
 }
 

@@ -6,9 +6,9 @@ mod figure;
 use super::shared::disk_shape::place_and_sector;
 use super::shared::keys::no_requirements;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{FREQUENCY, phase_of, shape_of};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
@@ -63,8 +63,9 @@ pub(super) const KIND: Kind = Kind {
         tables: &[TABLE],
     },
     unit_size: |_| UnitSize::Case,
-    cost,
+    size,
     warnings: |_| Vec::new(),
+    probe: Probe::Unit { name: "case" },
     compute,
     draw: figure::draw,
 };
@@ -108,30 +109,21 @@ fn check_disk(model: &Model) -> Result<(), KeyError> {
     }
 }
 
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let modes = inputs.case.values.count("modes").unwrap_or(4) as f64;
     let sectors = inputs.case.model.ring.map_or(2.0, |ring| ring.sectors as f64);
     let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * inputs.dofs / sectors);
     let rows = inputs.cases * waves * 2.0 * modes;
     let shapes = 2.0 * inputs.places / sectors;
-    Cost {
+    PlannedSize {
         tables: vec![TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 }],
         drawn: rows,
         unit: if each > MAX_DENSE_SIZE { FACTOR * each } else { 8.0 * each * each },
-        conditional_work: None,
-        work: inputs.cases
-            * waves
-            * if each > MAX_DENSE_SIZE { LOWEST_MODES * each.powf(1.5) } else { EIGEN * each.powi(3) },
     }
 }
 
 /// Size above which sparse factors give only the lowest modes.
 const MAX_DENSE_SIZE: f64 = 700.0;
-/// Time of an eigenvalue problem per cube of its size, s.
-const EIGEN: f64 = 1e-8;
-/// Time of the lowest modes of a wave, free and stuck, per size to the power of 1.5, s.
-/// Measured: 8 s for a sector of 1935 rows in seven waves.
-const LOWEST_MODES: f64 = 4.6e-6;
 /// Bytes of matrices and factors per row. Measured: 0.7 GB for 61,000 rows.
 const FACTOR: f64 = 12e3;
 

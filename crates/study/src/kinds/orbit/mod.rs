@@ -5,10 +5,10 @@ mod figure;
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
 use super::shared::orbit_sweep;
 use crate::case::values::hertz;
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::excitation_warnings;
 use crate::kinds::info::KindInfo;
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::{PointRow, describe_location};
@@ -46,22 +46,20 @@ pub(super) const KIND: Kind = Kind {
         tables: &["orbit", "orbits", "multipliers"],
     },
     unit_size: orbit_sweep::grain,
-    cost,
+    size,
     warnings: excitation_warnings,
+    probe: Probe::Points { compute, excluded: |_| None },
     compute,
     draw: figure::draw,
 };
 
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let points = inputs.points();
     let rows = points * inputs.instants();
     let orbits = inputs.orbits(points);
     let wanted = inputs.case.values.flag("multipliers") == Some(true);
-    // the return check of a harmonic balance orbit takes one period; multipliers take one more,
-    // with the derivative
-    let followed = if inputs.is_series() { inputs.period() } else { 0.0 };
-    let (multipliers, map) = if wanted { (points * 2.0 * inputs.dofs, inputs.period()) } else { (0.0, 0.0) };
-    Cost {
+    let multipliers = if wanted { points * 2.0 * inputs.dofs } else { 0.0 };
+    PlannedSize {
         tables: vec![
             inputs.motion(rows),
             TableShape { numbers: orbits.numbers + 4.0, ..orbits },
@@ -70,9 +68,6 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
         // the panels beyond the limit are also built
         drawn: rows * (inputs.places + inputs.joints),
         unit: inputs.kept_orbits(),
-        conditional_work: None,
-        work: points
-            * (inputs.orbit() + followed + map + inputs.output_seconds() + inputs.evaluation(inputs.instants())),
     }
 }
 

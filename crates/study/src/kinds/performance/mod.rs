@@ -9,13 +9,14 @@ mod tables;
 pub use tables::{Optimum, PeakCurve, PerformancePoint, curves};
 
 use super::shared::keys::{FREQUENCY, check_masses, no_requirements};
+use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of, peak_places};
 use crate::case::study::{VariedValue, varied_text};
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::sampling_warnings;
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP};
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
@@ -41,31 +42,22 @@ pub(super) const KIND: Kind = Kind {
         tables: &[tables::PERFORMANCE, tables::OPTIMUM],
     },
     unit_size: |_| UnitSize::Curve,
-    cost,
+    size,
     warnings: sampling_warnings,
+    probe: Probe::Points { compute: probe, excluded: |_| Some("the search for the optimum") },
     compute,
     draw: figure::draw,
 };
 
-/// Orbits that refine a peak, and parameter values that the search for an optimum tries.
-const ORBITS_PER_PEAK: f64 = 12.0;
-const OPTIMUM: f64 = 35.0;
-
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (cases, curves) = (inputs.cases, inputs.curves());
-    let reverse_sweeps = f64::from(u8::from(bidirectional_sweep::is_followed(inputs.system())));
-    let peak = inputs.frequencies * inputs.orbit()
-        + (reverse_sweeps * inputs.frequencies + ORBITS_PER_PEAK) * inputs.unchecked_orbit();
-    let tried = if inputs.study.values_per_curve() < FEWEST_VALUES { 0.0 } else { curves * OPTIMUM };
-    Cost {
+    PlannedSize {
         tables: vec![
             TableShape { rows: cases, numbers: inputs.varied + 4.0, words: 1.0 },
             TableShape { rows: curves, numbers: inputs.varied + 2.0, words: 1.0 },
         ],
         drawn: cases,
         unit: inputs.orbit_bytes(),
-        work: (cases + tried) * peak,
-        conditional_work: (tried > 0.0).then_some((tried * peak, "if no optimum lies between the values")),
     }
 }
 
@@ -143,6 +135,13 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         }
     }
     part.tables = vec![rows, optima];
+    Ok(part)
+}
+
+/// Computes the orbits of some frequencies, as the search for a peak does.
+fn probe(work: &UnitTask<'_>) -> Computed {
+    let mut part = UnitResult::default();
+    orbit_sweep::converged_orbits(work, &mut part)?;
     Ok(part)
 }
 

@@ -22,12 +22,13 @@ pub use tables::{MassCurve, ResponseCurve, curves};
 use super::shared::keys::{FREQUENCY, OUTPUT, check_output, no_requirements};
 use super::shared::orbit_sweep;
 use super::shared::peak_of::{PEAK_OF, check_peak_of};
+use crate::case::study::Study;
 use crate::case::values::{Frequencies, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::survey::SurveyedCase;
 use crate::check::warnings::{sampling_warnings, undamped_resonance};
 use crate::kinds::info::KindInfo;
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP, amplitude_in, phase_of};
 use crate::results::drawing::{MAX_CURVES, MAX_PANELS};
 use crate::results::notes::{Note, WARNING};
@@ -90,7 +91,7 @@ pub(super) const KIND: Kind = Kind {
         true => UnitSize::Case,
         false => orbit_sweep::grain(study),
     },
-    cost,
+    size,
     warnings: |cases| {
         sampling_warnings(cases)
             .into_iter()
@@ -99,20 +100,19 @@ pub(super) const KIND: Kind = Kind {
             .chain(many_peaks_warning(cases))
             .collect()
     },
+    probe: Probe::Points { compute, excluded: |study| refines_peaks(study).then_some("the refinement of peaks") },
     compute,
     draw: figure::draw,
 };
 
-/// Peaks per mass, as some have two; and orbits that refine a peak, including those at a unit
-/// border that two units compute.
+/// Peaks per mass, as some have two.
 const PEAKS_PER_MASS: f64 = 1.3;
-const ORBITS_PER_PEAK: f64 = 6.0;
 /// Peaks of the largest amplitude of a disk: about three for twelve blades that differ by 2 %.
 const DISK_PEAKS: f64 = 3.0;
 /// Share of the points of a curve at which the reverse sweep has another orbit.
 const REVERSE_SHARE: f64 = 0.2;
 
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (points, values) = (inputs.points(), &inputs.case.values);
     let sought = values.flag("peaks") != Some(false) && inputs.frequencies > 2.0;
     let peaks = match values.names("peak_of") {
@@ -120,17 +120,9 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
         Some(_) => inputs.cases,
         None => (inputs.cases * inputs.places * PEAKS_PER_MASS).floor(),
     };
-    // a place whose peak is at an end of the range is not refined; a structure given by
-    // matrices has all its resonances in the range refined
-    let refined = match (inputs.resonances(), &inputs.case.model.substructure) {
-        (Some(resonances), Some(_)) if inputs.case.model.ring.is_none() => peaks / PEAKS_PER_MASS * resonances,
-        (Some(resonances), _) => peaks / PEAKS_PER_MASS * resonances.min(PEAKS_PER_MASS),
-        (None, _) => peaks,
-    };
     // cases that differ only in their limits share the references
     let others = references::distinct_cases(inputs.study);
     let linear = (inputs.frequencies * REFERENCE_POINTS as f64 * others).floor();
-    // a tuned disk takes the time of one sector, at the frequencies of the mistuned disk
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { inputs.cases } else { 0.0 };
     let shapes = match inputs.case.model.ring {
         Some(_) if values.names("peak_of").is_none() => peaks.min(DISK_PEAKS * inputs.cases),
@@ -139,7 +131,7 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
     };
     let reverse_points = if bidirectional_sweep::is_followed(inputs.system()) { points } else { 0.0 };
     let curves = inputs.cases.min(MAX_CURVES as f64) * inputs.places.min(MAX_PANELS as f64 + MAX_SINGLE_PLACES as f64);
-    Cost {
+    PlannedSize {
         tables: vec![
             inputs.orbits(points),
             TableShape { rows: peaks, numbers: inputs.varied + 3.0, words: 1.0 },
@@ -150,12 +142,12 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
         ],
         drawn: curves * inputs.frequencies,
         unit: inputs.orbit_bytes(),
-        conditional_work: None,
-        work: points * inputs.output_seconds()
-            + (points + REVERSE_SHARE * reverse_points + tuned * inputs.frequencies) * inputs.orbit()
-            + (reverse_points + ORBITS_PER_PEAK * refined) * inputs.unchecked_orbit()
-            + 2.0 * linear * inputs.reference(),
     }
+}
+
+/// Returns whether the study requests peaks.
+fn refines_peaks(study: &Study) -> bool {
+    study.case(0).is_ok_and(|case| case.values.flag("peaks") != Some(false))
 }
 
 /// Warns of the cost of refining the peaks of thousands of places, and states the alternatives.
@@ -165,7 +157,7 @@ fn many_peaks_warning(cases: &[SurveyedCase]) -> Option<String> {
     let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
     (sought && places >= MANY_PEAKS).then(|| {
         format!(
-            "the peaks of {places} places are refined one by one, with about {ORBITS_PER_PEAK:.0} orbits each; \
+            "the peaks of {places} places are refined one by one, with about six orbits each; \
              peak_of = \"all\" in [study] refines only the largest amplitude, and peaks = false refines none"
         )
     })
@@ -344,7 +336,7 @@ fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result
         }
     })?;
     let others = builder.compare(work, ways)?;
-    if !wanted || points.is_empty() {
+    if !wanted || points.is_empty() || work.context.stopped() {
         return Ok((Vec::new(), others));
     }
     // the peak search needs the points of the adjacent units on both sides; each unit computes

@@ -8,10 +8,10 @@ use super::shared::keys::MAX_SAMPLES;
 use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, begin_values, held_equilibrium, state_vector};
 use crate::case::names::ModelNames;
 use crate::case::values::{Values, hertz};
-use crate::check::cost::{Cost, CostInputs, TableShape};
+use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::motion_warnings;
 use crate::kinds::info::{KeyError, KindInfo};
-use crate::kinds::kind::Kind;
+use crate::kinds::kind::{Kind, Probe};
 use crate::results::decay::{Decay, PlaceMotionFn};
 use crate::results::drawing::MAX_PANELS;
 use crate::results::notes::{Note, WARNING};
@@ -98,14 +98,15 @@ pub(super) const KIND: Kind = Kind {
         tables: &["motion", "motion_summary", "decay", "decay_summary"],
     },
     unit_size: |_| UnitSize::Case,
-    cost,
+    size,
     warnings: motion_warnings,
+    probe: Probe::Unit { name: "case" },
     compute,
     draw: figure::draw,
 };
 
 /// Returns the duration of one transient (s) and the number of its samples.
-fn lengths(inputs: &CostInputs<'_>) -> (f64, f64) {
+fn lengths(inputs: &SizeInputs<'_>) -> (f64, f64) {
     let values = &inputs.case.values;
     let (low, high) = inputs.range().unzip();
     let period = |omega: f64| TAU / omega;
@@ -117,7 +118,7 @@ fn lengths(inputs: &CostInputs<'_>) -> (f64, f64) {
     (duration, step.filter(|step| *step > 0.0).map_or(0.0, |step| duration / step + 1.0))
 }
 
-fn cost(inputs: &CostInputs<'_>) -> Cost {
+fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (duration, samples) = lengths(inputs);
     let points = inputs.points();
     let table = inputs.motion(points * samples);
@@ -128,7 +129,7 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
     let free = inputs.range().is_none();
     let cycles = if free { points * periods.floor() } else { 0.0 };
     let summaries = if free { points } else { 0.0 };
-    Cost {
+    PlannedSize {
         tables: vec![
             TableShape { numbers: table.numbers + inputs.frequency_columns(), ..table },
             TableShape {
@@ -141,8 +142,6 @@ fn cost(inputs: &CostInputs<'_>) -> Cost {
         ],
         drawn: points.min(MAX_PANELS as f64) * samples * inputs.places,
         unit: 0.0,
-        conditional_work: None,
-        work: points * (periods * inputs.period() + inputs.patterns(periods) + inputs.evaluation(samples)),
     }
 }
 
@@ -224,7 +223,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         .unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, start_values), states: Vec::new() });
     let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
     let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
-    for drive in drives {
+    let motions = drives.len() as f64;
+    for (number, drive) in drives.into_iter().enumerate() {
         let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
         let fastest = match excitation {
             Excitation::Free => None,
@@ -273,6 +273,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                     largest[i] = (x.abs(), time);
                 }
             }
+            work.share.reach((number as f64 + time / duration) / motions);
             stopped = work.context.stopped();
             !stopped
         });
