@@ -110,14 +110,14 @@ fn curve(brick: &Brick, nodes: usize) -> f64 {
     let method =
         HarmonicBalance { harmonics: Some(HARMONICS), tolerance: Some(TOLERANCE), ..HarmonicBalance::default() };
     let mut solver = method.solver(&system).unwrap();
-    let (mut start, mut found, mut peak) = (None::<Vec<f64>>, Tally::default(), String::new());
+    let (mut start, mut found, mut peak) = (None, Tally::default(), String::new());
     let mut largest = 0.0;
     let whole_curve = seconds();
     for i in 0..POINTS {
         let along = i as f64 / (POINTS - 1) as f64;
         let omega = first * (RANGE[0] * (1.0 - along) + RANGE[1] * along);
         let begin = seconds();
-        let orbit = match solver.orbit(omega, start.as_deref()) {
+        let orbit = match solver.orbit_near(omega, start.as_ref()) {
             Ok(orbit) => orbit,
             Err(error) => {
                 println!("  {omega:8.1} rad/s: {:.3} s, {error}", seconds() - begin);
@@ -138,7 +138,7 @@ fn curve(brick: &Brick, nodes: usize) -> f64 {
                 share(|joint| joint.open_fraction),
             );
         }
-        start = Some(orbit.initial_state);
+        start = Some(orbit.seed());
     }
     let point = (seconds() - whole_curve) / POINTS as f64;
     println!("  {point:.3} s a point, {}; {}", found.text(), memory());

@@ -11,6 +11,7 @@ use stickslip::curve::performance::Performance;
 use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
+use stickslip::orbit::Seed;
 
 /// Numbers of blades of the chains.
 const CHAINS: [usize; 4] = [10, 30, 100, 300];
@@ -55,21 +56,21 @@ fn growth(sizes: &[usize], made: &dyn Fn(usize) -> System, harmonics: usize) -> 
 /// repeats, because an identical point would need no step.
 struct Neighbours<'a> {
     solver: Box<dyn Solver + Send + 'a>,
-    start: Vec<f64>,
+    start: Seed,
     count: u32,
 }
 
 impl<'a> Neighbours<'a> {
     fn new(system: &'a System, harmonics: usize) -> Self {
         let mut solver = balance(harmonics).solver(system).unwrap();
-        let start = solver.orbit(TAU * 121.0, None).unwrap().initial_state;
+        let start = solver.orbit(TAU * 121.0).unwrap().seed();
         Neighbours { solver, start, count: 0 }
     }
 
     fn next(&mut self) {
         self.count += 1;
         let omega = TAU * (121.0 + 0.02 * f64::from(self.count));
-        self.start = self.solver.orbit(omega, Some(&self.start)).unwrap().initial_state;
+        self.start = self.solver.orbit_near(omega, Some(&self.start)).unwrap().seed();
     }
 }
 
@@ -80,10 +81,11 @@ fn balance(harmonics: usize) -> HarmonicBalance {
 /// Computes a curve of `points` orbits from 119.5 to 122.5 Hz.
 fn curve(method: HarmonicBalance, system: &System, points: u32) {
     let mut solver = method.solver(system).unwrap();
-    let mut start: Option<Vec<f64>> = None;
+    let mut start: Option<Seed> = None;
     for i in 0..points {
-        let orbit = solver.orbit(TAU * (119.5 + 3.0 * f64::from(i) / f64::from(points - 1)), start.as_deref()).unwrap();
-        start = Some(orbit.initial_state);
+        let orbit =
+            solver.orbit_near(TAU * (119.5 + 3.0 * f64::from(i) / f64::from(points - 1)), start.as_ref()).unwrap();
+        start = Some(orbit.seed());
     }
 }
 

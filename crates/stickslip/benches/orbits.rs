@@ -7,6 +7,7 @@ use std::sync::Arc;
 use stickslip::law::{Coulomb, CoulombArctan, Iwan, SharedLaw, Stribeck};
 use stickslip::method::{Method, auto::Auto, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
+use stickslip::orbit::Seed;
 
 fn main() {
     divan::main();
@@ -28,8 +29,8 @@ fn event_driven_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let system = couple(f64::from(ft), None);
     let hertz = f64::from(centihertz) / 100.0;
     let mut solver = EventDriven.solver(&system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().initial_state;
-    bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
+    let start = solver.orbit(TAU * (hertz - 0.0125)).unwrap().seed();
+    bencher.bench_local(|| solver.orbit_near(TAU * hertz, Some(&start)).unwrap());
 }
 
 /// The complete Fig. 6: 4 x 241 orbits with amplitudes, phases, losses and stability.
@@ -38,11 +39,11 @@ fn figure_6_exact() {
     for ft in [2.0, 4.0, 6.0, 8.0] {
         let system = couple(ft, None);
         let mut solver = EventDriven.solver(&system).unwrap();
-        let mut start: Option<Vec<f64>> = None;
+        let mut start: Option<Seed> = None;
         for i in 0..241 {
-            let orbit = solver.orbit(TAU * (119.5 + f64::from(i) / 80.0), start.as_deref()).unwrap();
+            let orbit = solver.orbit_near(TAU * (119.5 + f64::from(i) / 80.0), start.as_ref()).unwrap();
             divan::black_box(orbit.is_stable());
-            start = Some(orbit.initial_state);
+            start = Some(orbit.seed());
         }
     }
 }
@@ -54,8 +55,8 @@ fn smooth_orbit_warm(bencher: Bencher, (ft, centihertz): (u32, u32)) {
     let system = couple(f64::from(ft), Some(25e3));
     let hertz = f64::from(centihertz) / 100.0;
     let mut solver = Shooting::default().solver(&system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().initial_state;
-    bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
+    let start = solver.orbit(TAU * (hertz - 0.0125)).unwrap().seed();
+    bencher.bench_local(|| solver.orbit_near(TAU * hertz, Some(&start)).unwrap());
 }
 
 /// A mass of 1 kg on a spring of 10 N/mm and a damper of 3 N s/m under 6 N, with a law to the
@@ -75,8 +76,8 @@ fn mass(law: SharedLaw) -> System {
 /// Times one orbit of method `auto`, with a warm start from 0.05 Hz below.
 fn warm(bencher: Bencher, system: &System, hertz: f64) {
     let mut solver = Auto.solver(system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.05), None).unwrap().initial_state;
-    bencher.bench_local(|| solver.orbit(TAU * hertz, Some(&start)).unwrap());
+    let start = solver.orbit(TAU * (hertz - 0.05)).unwrap().seed();
+    bencher.bench_local(|| solver.orbit_near(TAU * hertz, Some(&start)).unwrap());
 }
 
 /// Decreasing friction in a motion that sticks (4, 8 Hz), reverses immediately (12 Hz) and

@@ -86,19 +86,19 @@ impl Ours {
 /// Returns the initial state, and the median time (s) and the amplitude of the orbit.
 fn time(method: &dyn Method, system: &System, hertz: f64) -> (Vec<f64>, (f64, f64)) {
     let mut solver = method.solver(system).unwrap();
-    let start = solver.orbit(TAU * (hertz - 0.0125), None).unwrap().initial_state;
+    let start = solver.orbit(TAU * (hertz - 0.0125)).unwrap().seed();
     let mut amplitude = 0.0;
     let mut seconds: Vec<f64> = (0..RUNS)
         .map(|_| {
             let begin = Instant::now();
-            let orbit = solver.orbit(TAU * hertz, Some(&start)).unwrap();
+            let orbit = solver.orbit_near(TAU * hertz, Some(&start)).unwrap();
             let seconds = begin.elapsed().as_secs_f64();
             amplitude = orbit.places[0].amplitude();
             seconds
         })
         .collect();
     seconds.sort_by(f64::total_cmp);
-    (start, (seconds[RUNS / 2], amplitude))
+    (start.state, (seconds[RUNS / 2], amplitude))
 }
 
 fn scipy(ours: &[Ours]) -> Result<Vec<String>, String> {

@@ -23,6 +23,7 @@ use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 use stickslip::model::{System, example};
+use stickslip::orbit::Seed;
 
 const PYHARM: Peer = Peer { package: "pyharm-os", version: "1.2.2", folder: "peers-pyharm" };
 const HARMONICS: [usize; 5] = [1, 3, 5, 9, 15];
@@ -76,12 +77,12 @@ fn main() {
 fn amplitudes(harmonics: usize, system: &System, hertz: impl Iterator<Item = f64>) -> Vec<f64> {
     let method = HarmonicBalance { harmonics: Some(harmonics), samples: Some(SAMPLES), tolerance: None };
     let mut solver = method.solver(system).unwrap();
-    let mut start: Option<Vec<f64>> = None;
+    let mut start: Option<Seed> = None;
     hertz
         .map(|hertz| {
-            let orbit = solver.orbit(TAU * hertz, start.as_deref()).unwrap();
+            let orbit = solver.orbit_near(TAU * hertz, start.as_ref()).unwrap();
             let amplitude = orbit.places[0].amplitude();
-            start = Some(orbit.initial_state);
+            start = Some(orbit.seed());
             amplitude
         })
         .collect()

@@ -27,7 +27,7 @@
 //! };
 //! let system = model.assemble()?;
 //! let mut solver = method::auto::Auto.solver(&system)?;
-//! let orbit = solver.orbit(TAU * 121.0, None)?;
+//! let orbit = solver.orbit(TAU * 121.0)?;
 //!
 //! println!("{:.2} mm, {:.1} mJ a period", 1e3 * orbit.places[0].amplitude(), 1e3 * orbit.joints[0].dissipation);
 //! assert!(orbit.evidence.energy_gap < 1e-9 && orbit.evidence.residual < 1e-11);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use stickslip::law::{BoucWen, Dahl, FrictionContact, Jenkins, Jenkins2d, SharedLaw};
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Seed};
 use stickslip::structure::Structure;
 use stickslip_numerics::sparse::SparseMatrix;
 
@@ -46,11 +46,11 @@ fn ring(nodes: usize, waves: usize, directions: usize, law: SharedLaw) -> System
 fn sweep(system: &System, omegas: &[f64]) -> Vec<Orbit> {
     let method = HarmonicBalance { harmonics: Some(3), samples: Some(256), tolerance: None };
     let mut solver = method.solver(system).unwrap();
-    let mut start: Option<Vec<f64>> = None;
+    let mut start: Option<Seed> = None;
     let mut orbits = Vec::new();
     for &omega in omegas {
-        let orbit = solver.orbit(omega, start.as_deref()).unwrap_or_else(|error| panic!("{error}"));
-        start = Some(orbit.initial_state.clone());
+        let orbit = solver.orbit_near(omega, start.as_ref()).unwrap_or_else(|error| panic!("{error}"));
+        start = Some(orbit.seed());
         orbits.push(orbit);
     }
     orbits
@@ -126,11 +126,11 @@ fn iterations(blades: usize, from: f64, step: f64, points: u32) -> (f64, usize) 
     let system = mistuned(blades);
     let method = HarmonicBalance { harmonics: Some(5), samples: None, tolerance: Some(0.1) };
     let mut solver = method.solver(&system).unwrap();
-    let mut start = solver.orbit(TAU * from, None).unwrap().initial_state;
+    let mut start = solver.orbit(TAU * from).unwrap().seed();
     let counts: Vec<usize> = (1..=points)
         .map(|i| {
-            let orbit = solver.orbit(TAU * (from + step * f64::from(i)), Some(&start)).unwrap();
-            start = orbit.initial_state;
+            let orbit = solver.orbit_near(TAU * (from + step * f64::from(i)), Some(&start)).unwrap();
+            start = orbit.seed();
             orbit.evidence.iterations
         })
         .collect();

@@ -381,7 +381,7 @@ fn a_matrix_sector_with_a_joint_equals_its_ring() {
         );
         let orbit = |model: &Model| {
             let method = HarmonicBalance { harmonics: Some(9), samples: Some(768), tolerance: None };
-            method.solver(&model.assemble().unwrap()).unwrap().orbit(TAU * hertz, None).unwrap()
+            method.solver(&model.assemble().unwrap()).unwrap().orbit(TAU * hertz).unwrap()
         };
         let (one, all) = (orbit(&sector), orbit(&ring));
         assert_eq!(one.places.len(), all.places.len());

@@ -223,14 +223,14 @@ fn methods_agree_within_their_errors() {
             continue;
         }
         let Ok(mut exact) = EventDriven.solver(&system) else { continue };
-        let Ok(exact) = exact.orbit(omega, None) else { continue };
+        let Ok(exact) = exact.orbit(omega) else { continue };
         let others: [Box<dyn Method>; 2] = [
             Box::new(HarmonicBalance::default()),
             method::find("transient").map(|row| (row.build)(&settled())).unwrap().unwrap(),
         ];
         for (which, method) in others.iter().enumerate() {
             let Ok(mut solver) = method.solver(&system) else { continue };
-            let Ok(orbit) = solver.orbit(omega, None) else { continue };
+            let Ok(orbit) = solver.orbit(omega) else { continue };
             if exact.is_in_continuum() || orbit.is_in_continuum() || orbit.evidence.accuracy != Accuracy::Converged {
                 continue;
             }

@@ -8,6 +8,7 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
+use stickslip::orbit::Seed;
 use stickslip_study::templates;
 
 /// Points of a curve, 119.5 to 122.5 Hz.
@@ -37,34 +38,34 @@ fn main() {
             all.push(("Ft", limit));
             let system = templates::find(template).unwrap().model_with(&all).unwrap().assemble().unwrap();
             let mut exact = EventDriven.solver(&system).unwrap();
-            let mut start: Option<Vec<f64>> = None;
+            let mut start: Option<Seed> = None;
             let omegas: Vec<f64> =
                 (0..POINTS).map(|i| TAU * (119.5 + 3.0 * f64::from(i) / f64::from(POINTS - 1))).collect();
             let reference: Vec<Vec<f64>> = omegas
                 .iter()
                 .map(|omega| {
-                    let orbit = exact.orbit(*omega, start.as_deref()).unwrap();
+                    let orbit = exact.orbit_near(*omega, start.as_ref()).unwrap();
                     let amplitudes = orbit.places.iter().map(|p| p.amplitude()).collect();
-                    start = Some(orbit.initial_state);
+                    start = Some(orbit.seed());
                     amplitudes
                 })
                 .collect();
             for (name, method) in &methods {
                 let mut solver = method.solver(&system).unwrap();
-                let mut start: Option<Vec<f64>> = None;
+                let mut start: Option<Seed> = None;
                 let (mut worst, mut estimate, mut failed, mut reason) = (0.0f64, 0.0f64, 0, "");
                 let begin = Instant::now();
                 // many harmonics take long: every eighth point shows the reached error
                 let stride = if method.tolerance.is_some_and(|tolerance| tolerance < 1e-3) { 8 } else { 1 };
                 for (omega, judge) in omegas.iter().zip(&reference).step_by(stride) {
-                    match solver.orbit(*omega, start.as_deref()) {
+                    match solver.orbit_near(*omega, start.as_ref()) {
                         Ok(orbit) => {
                             let size = judge.iter().copied().fold(0.0, f64::max);
                             for (place, exact) in orbit.places.iter().zip(judge) {
                                 worst = worst.max((place.amplitude() - exact).abs() / size);
                             }
                             estimate = estimate.max(orbit.evidence.error_estimate.unwrap_or(0.0));
-                            start = Some(orbit.initial_state);
+                            start = Some(orbit.seed());
                         }
                         Err(error) => {
                             failed += 1;

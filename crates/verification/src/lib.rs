@@ -283,7 +283,7 @@ pub fn template_with(name: &str, changes: &[(&str, f64)], law: impl Fn(f64) -> S
 /// Returns the exact orbit at `omega` (rad/s), found without a warm start, and asserts its
 /// evidence.
 pub fn exact(system: &System, omega: f64) -> Orbit {
-    let orbit = EventDriven.solver(system).expect("exact laws").orbit(omega, None).expect("an orbit");
+    let orbit = EventDriven.solver(system).expect("exact laws").orbit(omega).expect("an orbit");
     assert!(orbit.evidence.residual < 1e-10 && orbit.evidence.energy_gap < 1e-9, "{orbit:?}");
     orbit
 }

@@ -27,7 +27,7 @@ fn mass(laws: &[SharedLaw], drive: f64, constant: f64) -> System {
 }
 
 fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// Permanently stuck inner sliders of Iwan's law, or a stuck Jenkins element, together with a

@@ -127,7 +127,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
             };
             tried += 1;
             let begun = Instant::now();
-            let found = solver.orbit(omega, None);
+            let found = solver.orbit(omega);
             let seconds = begun.elapsed().as_secs_f64();
             if seconds > SLOW {
                 println!("{seed} {laws:?} {}: {seconds:.1} s", row.name);

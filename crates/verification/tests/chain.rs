@@ -8,7 +8,7 @@ use std::sync::Arc;
 use stickslip::law::{Coulomb, Jenkins, JenkinsArctan, SharedLaw};
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Seed};
 use stickslip_verification::{close, exact, near, number, random_model, table};
 
 fn force(on: &str, amplitude: f64, phase: f64) -> Force {
@@ -53,7 +53,7 @@ fn exact_law(limit: f64) -> SharedLaw {
 
 fn shoot(model: &Model, tolerance: f64) -> Orbit {
     let system = model.assemble().unwrap();
-    Shooting { tolerance, width: None, ..Shooting::default() }.solver(&system).unwrap().orbit(OMEGA, None).unwrap()
+    Shooting { tolerance, width: None, ..Shooting::default() }.solver(&system).unwrap().orbit(OMEGA).unwrap()
 }
 
 /// Returns an excitation under which several joints slip: all blades, with the phases of an
@@ -122,7 +122,8 @@ fn chain_of_eight_exact_against_smooth() {
         let distance = |alpha: f64| {
             let system = chain(&forces, smooth_law(alpha)).assemble().unwrap();
             let mut solver = Shooting { tolerance: 1e-8, width: None, ..Shooting::default() }.solver(&system).unwrap();
-            let orbit = solver.orbit(OMEGA, Some(&start_near(&reference, alpha))).unwrap();
+            let orbit =
+                solver.orbit_near(OMEGA, Some(&Seed::from_state(OMEGA, start_near(&reference, alpha)))).unwrap();
             assert!(orbit.evidence.energy_gap < 1e-7 && orbit.evidence.residual < 1e-9, "{:?}", orbit.evidence);
             let pairs = orbit.places.iter().zip(&reference.places);
             pairs.map(|(s, e)| (s.first_harmonic - e.first_harmonic).norm() / size).fold(0.0, f64::max)
@@ -234,9 +235,9 @@ fn order_of_listing_does_not_matter() {
     let (mut compared, mut worst) = (0, 0.0f64);
     for seed in 0..150 {
         let (mut model, omega) = random_model(seed);
-        let orbit = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None);
+        let orbit = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega);
         model.joints.reverse();
-        let reversed = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None);
+        let reversed = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega);
         let (Ok(orbit), Ok(reversed)) = (orbit, reversed) else { continue };
         if model.joints.len() < 2 || orbit.is_in_continuum() {
             continue; // the offset of a stuck joint is free

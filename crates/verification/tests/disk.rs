@@ -54,7 +54,7 @@ fn whole(mut model: Model) -> Model {
 }
 
 fn orbit(model: &Model, method: &dyn Method, omega: f64) -> Orbit {
-    method.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None).unwrap()
+    method.solver(&model.assemble().unwrap()).unwrap().orbit(omega).unwrap()
 }
 
 /// Returns the largest difference of two orbits: amplitudes relative to the largest amplitude,
@@ -197,7 +197,7 @@ fn largest(model: &Model, harmonics: usize, [mut low, mut high]: [f64; 2]) -> f6
     let system = model.assemble().unwrap();
     let balance = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
     let mut solver = balance.solver(&system).unwrap();
-    let mut at = |omega: f64| solver.orbit(omega, None).unwrap().places[0].amplitude();
+    let mut at = |omega: f64| solver.orbit(omega).unwrap().places[0].amplitude();
     for _ in 0..60 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
         if at(a) < at(b) { low = a } else { high = b }

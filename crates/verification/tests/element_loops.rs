@@ -25,7 +25,7 @@ fn element(kt: f64, a: f64, omega: f64) -> Orbit {
 /// Returns a smooth orbit, with a relative error per step of 1e-11.
 fn smooth(system: &stickslip::model::System, omega: f64) -> Orbit {
     let method = Shooting { tolerance: 1e-11, width: None, ..Shooting::default() };
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 fn smooth_element(kt: f64, a: f64, alpha: f64, omega: f64) -> Orbit {

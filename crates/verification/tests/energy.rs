@@ -86,7 +86,7 @@ fn theory_9_energies_of_the_smooth_law() {
         let orbit = Shooting { tolerance: 1e-10, width: None, ..Shooting::default() }
             .solver(&system)
             .unwrap()
-            .orbit(TAU * hertz, None)
+            .orbit(TAU * hertz)
             .unwrap();
         let what = format!("{name}, {ft} N, {hertz} Hz");
         let last = orbit.places.len() - 1;
@@ -104,7 +104,7 @@ fn theory_9_balance_of_random_models() {
     for seed in 0..150 {
         let (model, omega) = random_model(seed);
         let system: System = model.assemble().unwrap();
-        let Ok(orbit) = EventDriven.solver(&system).unwrap().orbit(omega, None) else { continue };
+        let Ok(orbit) = EventDriven.solver(&system).unwrap().orbit(omega) else { continue };
         let mut breaks = orbit.transition_times();
         breaks.push(0.5 * orbit.period());
         let powers = |t: f64| {

@@ -12,7 +12,7 @@ use stickslip::law::{Law, LawInfo, Parameter, Range, RateLaw, RateView, Relative
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::shooting::Shooting;
 use stickslip::method::transient::Transient;
-use stickslip::method::{IntegrationError, Method, MethodError, OrbitError, Solver};
+use stickslip::method::{Budget, IntegrationError, Method, MethodError, OrbitError, Request, Solver};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
 use stickslip_numerics::dual::Real;
@@ -164,7 +164,7 @@ fn laws_from_outside_work_in_every_method_that_takes_their_view() {
         let methods: [&dyn Method; 3] =
             [&HarmonicBalance::default(), &Shooting::default(), &Transient { tolerance: 1e-6, ..Transient::default() }];
         for method in methods {
-            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
             let allowed = 2e-4 + 2.0 * orbit.evidence.error_estimate.unwrap_or(0.0);
             for (found, expected) in amplitudes(&orbit).iter().zip(&expected) {
                 assert!(
@@ -202,7 +202,7 @@ fn laws_from_outside_without_a_limit_are_linear() {
         let methods: [&dyn Method; 3] =
             [&HarmonicBalance::default(), &Shooting::default(), &Transient { tolerance: 1e-6, ..Transient::default() }];
         for method in methods {
-            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
             for (found, expected) in amplitudes(&orbit).iter().zip(expected) {
                 let off = (found - expected).abs() / (12.0 / a.norm());
                 assert!(off < 2e-5, "{} {}: {found} {expected}", law.name(), method.name());
@@ -293,7 +293,7 @@ fn laws_that_give_no_numbers_are_named() {
         // without the joint, the amplitude is some millimetres
         let system = model(Arc::new(Wrong { size: 1e-3, reach: 1e-4, by_rate })).assemble().unwrap();
         for method in [&Shooting::default() as &dyn Method, &Transient::default()] {
-            let error = method.solver(&system).unwrap().orbit(TAU * 24.0, None).unwrap_err();
+            let error = method.solver(&system).unwrap().orbit(TAU * 24.0).unwrap_err();
             let OrbitError::Breakdown { cause: IntegrationError::NotFinite { joint, law, .. }, .. } = &error else {
                 panic!("{by_rate} {}: {error}", method.name())
             };
@@ -412,7 +412,8 @@ impl Method for Linear {
 }
 
 impl Solver for LinearSolver<'_> {
-    fn orbit(&mut self, omega: f64, _start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let omega = request.omega;
         let structure = self.0.structure();
         let x = self.0.excitation(omega).into_iter().map(|(h, force)| {
             let s = Complex64::new(0.0, f64::from(h) * omega);
@@ -447,7 +448,7 @@ fn a_method_from_outside_makes_orbits_with_evidence() {
     linear.forces.push(Force { on: "b".into(), amplitude: 3.0, phase: 0.4, harmonic: 2 });
     let system = linear.assemble().unwrap();
     let omega = TAU * 20.0;
-    let orbit = Linear.solver(&system).unwrap().orbit(omega, None).unwrap();
+    let orbit = Linear.solver(&system).unwrap().orbit(omega).unwrap();
     let exact = stickslip_verification::exact(&system, omega);
     for (one, other) in amplitudes(&orbit).iter().zip(amplitudes(&exact)) {
         assert!((one / other - 1.0).abs() < 1e-6, "{one} {other}");

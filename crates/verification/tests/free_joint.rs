@@ -63,7 +63,7 @@ fn methods(law: SharedLaw) -> Vec<(&'static str, Box<dyn Method>)> {
 
 fn orbit(method: &dyn Method, model: &Model, omega: f64) -> Orbit {
     let system = model.assemble().unwrap();
-    method.solver(&system).unwrap().orbit(omega, None).unwrap()
+    method.solver(&system).unwrap().orbit(omega).unwrap()
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn a_limit_that_nothing_reaches_makes_a_spring() {
         let expected = 3.0 / (20.0 * omega);
         // a smoothed slider creeps
         for (name, method) in methods(law).into_iter().filter(|(name, _)| *name != "shooting") {
-            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
             let ratio = orbit.places[0].amplitude() / expected - 1.0;
             assert!(ratio.abs() < NEAR, "{name} with {limit:e} N: {ratio:e}");
         }

@@ -9,7 +9,7 @@ use stickslip::curve::performance::Performance;
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
 use stickslip::method::{Method, OrbitError, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
-use stickslip::orbit::{Accuracy, Orbit};
+use stickslip::orbit::{Accuracy, Orbit, Seed};
 use stickslip_study::templates;
 
 fn balance(harmonics: usize, samples: usize) -> HarmonicBalance {
@@ -17,7 +17,7 @@ fn balance(harmonics: usize, samples: usize) -> HarmonicBalance {
 }
 
 fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// Returns a law under the imposed motion `a cos t`.
@@ -170,11 +170,11 @@ fn massless_couple_against_event_driven() {
         let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
         let mut exact = EventDriven.solver(&system).unwrap();
         let mut solver = balance(15, 1024).solver(&system).unwrap();
-        let (mut start, mut exact_start): (Option<Vec<f64>>, Option<Vec<f64>>) = (None, None);
+        let (mut start, mut exact_start): (Option<Seed>, Option<Seed>) = (None, None);
         for i in 0..121 {
             let omega = TAU * (119.5 + 0.025 * f64::from(i));
-            let found = solver.orbit(omega, start.as_deref()).unwrap();
-            let judge = exact.orbit(omega, exact_start.as_deref()).unwrap();
+            let found = solver.orbit_near(omega, start.as_ref()).unwrap();
+            let judge = exact.orbit_near(omega, exact_start.as_ref()).unwrap();
             let largest = judge.places.iter().map(|p| p.amplitude()).fold(0.0, f64::max);
             for (a, b) in found.places.iter().zip(&judge.places) {
                 assert!((a.amplitude() - b.amplitude()).abs() < 3e-5 * largest, "{limit} N, {omega}: {a:?} {b:?}");
@@ -182,7 +182,7 @@ fn massless_couple_against_event_driven() {
             let mean = 0.5 * (found.places[0].first_harmonic + found.places[1].first_harmonic);
             let linear = 5.0 / Complex64::new(105_103.0 - 0.182 * omega * omega, 0.2 * omega);
             assert!((mean - linear).norm() < 1e-12 * linear.norm(), "{mean} {linear}");
-            (start, exact_start) = (Some(found.initial_state), Some(judge.initial_state));
+            (start, exact_start) = (Some(found.seed()), Some(judge.seed()));
         }
     }
 }
@@ -201,12 +201,12 @@ fn whole_curves_of_figures_6_7_and_10() {
             for harmonics in [3, 9] {
                 let method = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
                 let mut solver = method.solver(&system).unwrap();
-                let mut start: Option<Vec<f64>> = None;
+                let mut start: Option<Seed> = None;
                 for i in 0..241 {
                     let omega = TAU * (119.5 + 0.0125 * f64::from(i));
-                    let orbit = solver.orbit(omega, start.as_deref());
+                    let orbit = solver.orbit_near(omega, start.as_ref());
                     let orbit = orbit.unwrap_or_else(|e| panic!("{template} {all:?} H = {harmonics}: {e}"));
-                    start = Some(orbit.initial_state);
+                    start = Some(orbit.seed());
                 }
             }
         }
@@ -241,11 +241,11 @@ fn theory_6_6_performance_of_the_couple() {
         // the optimum
         let system = couple.model_with(&[("Ft", limit)]).unwrap().assemble().unwrap();
         let mut solver = EventDriven.solver(&system).unwrap();
-        let mut start: Option<Vec<f64>> = None;
+        let mut start: Option<Seed> = None;
         let highest = (0..500).fold(0.0, |highest: f64, i| {
-            let orbit = solver.orbit(TAU * (120.5 + 0.002 * f64::from(i)), start.as_deref()).unwrap();
+            let orbit = solver.orbit_near(TAU * (120.5 + 0.002 * f64::from(i)), start.as_ref()).unwrap();
             let amplitude = orbit.places[0].amplitude();
-            start = Some(orbit.initial_state);
+            start = Some(orbit.seed());
             highest.max(amplitude)
         });
         let peak = performance.peak(limit).unwrap().peak.unwrap().value;
@@ -330,8 +330,8 @@ fn check_estimates(method: HarmonicBalance, laws: usize, seed: u64) {
     for case in 0..200 {
         let (model, omega) = dice.model([0.0, 0.5, 1.0][case % 3], laws);
         let system = model.assemble().unwrap();
-        let Ok(exact) = EventDriven.solver(&system).unwrap().orbit(omega, None) else { continue };
-        let found = match method.solver(&system).unwrap().orbit(omega, None) {
+        let Ok(exact) = EventDriven.solver(&system).unwrap().orbit(omega) else { continue };
+        let found = match method.solver(&system).unwrap().orbit(omega) {
             Ok(found) => found,
             // the solver refuses a tolerance that needs more harmonics than allowed, and claims
             // nothing
@@ -463,7 +463,7 @@ fn messages_where_no_orbit_is_found() {
     // rigid friction with stick: the series converges slowly
     let system = templates::find("blade-couple").unwrap().model_with(&[("Ft", 6.0)]).unwrap().assemble().unwrap();
     let method = HarmonicBalance { tolerance: Some(1e-7), ..HarmonicBalance::default() };
-    let error = method.solver(&system).unwrap().orbit(TAU * 121.0, None).unwrap_err();
+    let error = method.solver(&system).unwrap().orbit(TAU * 121.0).unwrap_err();
     assert_eq!(error.status(), "tolerance-not-reached");
     // too few harmonics by option: the orbit reports that it is truncated, and estimates its
     // error
@@ -478,10 +478,11 @@ fn messages_where_no_orbit_is_found() {
     // a remote state has no effect: a series starts from its own initial guess
     let far = vec![1e3; exact.initial_state.len()];
     let method = balance(9, 1024);
-    let found = method.solver(&system).unwrap().orbit(TAU * 121.0, Some(&far)).unwrap();
+    let found =
+        method.solver(&system).unwrap().orbit_near(TAU * 121.0, Some(&Seed::from_state(TAU * 121.0, far))).unwrap();
     assert_eq!(found.places[0].amplitude(), orbit(&method, &system, TAU * 121.0).places[0].amplitude());
     // (10.1): without damping and with a limit below `pi F0/4` the resonance is unbounded
     let system = griffin(0.5, 0.0).assemble().unwrap();
-    let error = HarmonicBalance::default().solver(&system).unwrap().orbit(1.0, None).unwrap_err();
+    let error = HarmonicBalance::default().solver(&system).unwrap().orbit(1.0).unwrap_err();
     assert_eq!(error.status(), "not-converged");
 }

@@ -86,7 +86,7 @@ fn figures_6_7_and_10_by_continuation() {
                 assert!(branch.points.windows(2).all(|pair| pair[1].value - pair[0].value < TAU * 0.1));
                 let mut solver = method.solver(&system).unwrap();
                 for point in branch.points.iter().step_by(20) {
-                    let alone = solver.orbit(point.value, None).unwrap();
+                    let alone = solver.orbit(point.value).unwrap();
                     let (a, b) = (alone.places[0].amplitude(), point.orbit.places[0].amplitude());
                     assert!((a / b - 1.0).abs() < 1e-9, "{template} {all:?} H = {harmonics}, {}: {a} {b}", point.value);
                 }
@@ -190,8 +190,7 @@ fn rigid_friction_around_two_turning_points() {
             continue;
         }
         judged += 1;
-        let Ok(exact) =
-            EventDriven.solver(&system(point.value)).unwrap().orbit(omega, Some(&point.orbit.initial_state))
+        let Ok(exact) = EventDriven.solver(&system(point.value)).unwrap().orbit_near(omega, Some(&point.orbit.seed()))
         else {
             failed += 1;
             continue;

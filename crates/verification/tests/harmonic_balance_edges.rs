@@ -30,7 +30,7 @@ fn force(on: &str, amplitude: f64, harmonic: u32) -> Force {
 }
 
 fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// Asserts that the amplitudes of both methods agree within three times the reported error, and
@@ -73,7 +73,7 @@ fn permanently_stuck_contacts_are_springs() {
             let system = model.assemble().unwrap();
             for harmonics in [None, Some(1), Some(15)] {
                 let method = HarmonicBalance { harmonics, ..HarmonicBalance::default() };
-                let orbit = method.solver(&system).unwrap().orbit(omega, None);
+                let orbit = method.solver(&system).unwrap().orbit(omega);
                 let found =
                     orbit.unwrap_or_else(|error| panic!("{named}, {harmonics:?}: {error}")).places[0].amplitude();
                 assert!((found / expected - 1.0).abs() < 1e-6, "{named}, {harmonics:?}: {found} instead of {expected}");
@@ -171,7 +171,7 @@ fn a_free_body_drifts_or_sticks() {
         ..Model::default()
     };
     let drifting = model(3.0).assemble().unwrap();
-    let error = HarmonicBalance::default().solver(&drifting).unwrap().orbit(1.0, None).unwrap_err();
+    let error = HarmonicBalance::default().solver(&drifting).unwrap().orbit(1.0).unwrap_err();
     assert_eq!(error.status(), "drifts");
     let held = orbit(&HarmonicBalance::default(), &model(30.0).assemble().unwrap(), 1.0);
     assert!(held.places[0].amplitude() < 1e-9 && held.evidence.stuck == ["joint"], "{held:?}");
@@ -191,7 +191,7 @@ fn a_constant_force_beyond_the_limit_is_not_held() {
     for method in [&HarmonicBalance::default() as &dyn Method, &EventDriven] {
         for push in [36.0, -6.01] {
             let system = model(push).assemble().unwrap();
-            let error = method.solver(&system).unwrap().orbit(TAU * 5.0, None).unwrap_err();
+            let error = method.solver(&system).unwrap().orbit(TAU * 5.0).unwrap_err();
             assert!(["drifts", "not-settled"].contains(&error.status()), "{error}");
         }
         let held = orbit(method, &model(5.9).assemble().unwrap(), TAU * 5.0);
@@ -338,7 +338,7 @@ fn friction_that_is_shared_is_that_of_one_contact() {
         }
         let system = builder.build().unwrap();
         let method = HarmonicBalance { harmonics: Some(63), ..HarmonicBalance::default() };
-        let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
         assert!(orbit.evidence.residual <= 1e-6, "{}", orbit.evidence.residual);
         (orbit.places[0].amplitude(), orbit.evidence.error_estimate.unwrap())
     };

@@ -27,10 +27,10 @@ const SAMPLES: usize = 16_384;
 
 fn judge(system: &System, omega: f64) -> Option<Orbit> {
     if let Ok(mut solver) = Shooting::default().solver(system) {
-        return solver.orbit(omega, None).ok();
+        return solver.orbit(omega).ok();
     }
     let method = HarmonicBalance { tolerance: Some(3e-5), samples: Some(SAMPLES), ..HarmonicBalance::default() };
-    method.solver(system).ok()?.orbit(omega, None).ok()
+    method.solver(system).ok()?.orbit(omega).ok()
 }
 
 /// Returns the largest root mean square difference of a place without its mean, relative to the
@@ -61,7 +61,7 @@ fn the_estimate_holds_for_every_law() {
         for seed in 0..models {
             let (system, omega) = random_system_of(seed, &[info]);
             let Ok(mut solver) = HarmonicBalance::default().solver(&system) else { continue };
-            let Ok(found) = solver.orbit(omega, None) else {
+            let Ok(found) = solver.orbit(omega) else {
                 println!("{} {seed}: nothing found", info.name);
                 continue;
             };
@@ -110,12 +110,11 @@ fn the_estimate_holds_for_stiff_laws_with_states() {
                 ..Model::default()
             };
             let (system, omega) = (model.assemble().unwrap(), 1.5 * std::f64::consts::TAU);
-            let truth =
-                Shooting { tolerance: 1e-10, ..Shooting::default() }.solver(&system).unwrap().orbit(omega, None);
+            let truth = Shooting { tolerance: 1e-10, ..Shooting::default() }.solver(&system).unwrap().orbit(omega);
             let truth = truth.unwrap();
             for tolerance in [1e-3, 2e-4] {
                 let method = HarmonicBalance { tolerance: Some(tolerance), ..HarmonicBalance::default() };
-                let found = method.solver(&system).unwrap().orbit(omega, None);
+                let found = method.solver(&system).unwrap().orbit(omega);
                 let Ok(found) = found else { continue };
                 let (error, estimate) = (distance(&found, &truth), found.evidence.error_estimate.unwrap());
                 println!("{} {stiffness:.0e} {tolerance:.0e}: error {error:.1e}, estimate {estimate:.1e}", law.name());

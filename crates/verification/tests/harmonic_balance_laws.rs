@@ -83,7 +83,7 @@ fn every_law_balances_the_structure() {
             Err(error) => panic!("{}: {error}", info.name),
         };
         taken += 1;
-        let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {constant}: {error}", info.name));
+        let orbit = solver.orbit(OMEGA).unwrap_or_else(|error| panic!("{} {constant}: {error}", info.name));
         let views = law_driver::views(&*law);
         // the resolvent of a rigid law leaves the force at rest free, and a series never quite
         // rests: prefer any other view
@@ -127,7 +127,7 @@ fn every_law_has_small_and_large_orbits() {
         else {
             continue;
         };
-        let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{} {share}: {error}", info.name));
+        let orbit = solver.orbit(OMEGA).unwrap_or_else(|error| panic!("{} {share}: {error}", info.name));
         // if rigid friction holds everything, the remainder is rounding
         let unit = FORCE * FORCE * share * share / STIFFNESS;
         let energy = orbit.energy;

@@ -50,7 +50,7 @@ fn every_law_in_every_method_moves_as_the_reference() {
     for info in TABLE {
         let law = info.sample();
         let system = mass_on_law(&law, DAMPING, 0.0);
-        let begins = Auto.solver(&system).unwrap().orbit(OMEGA, None).unwrap();
+        let begins = Auto.solver(&system).unwrap().orbit(OMEGA).unwrap();
         let [(fine, missing), (coarse, _)] = [STEPS, COARSE].map(|steps| followed(&system, steps, &begins));
         let size = fine.iter().fold(0.0f64, |size, x| size.max(*x));
         let apart = fine.iter().zip(&coarse).fold(0.0f64, |most, (a, b)| most.max((a - b).abs())) / size;
@@ -70,7 +70,7 @@ fn every_law_in_every_method_moves_as_the_reference() {
                 Err(error) => panic!("{} in {}: {error}", info.name, row.name),
             };
             taken += 1;
-            let orbit = solver.orbit(OMEGA, None).unwrap_or_else(|error| panic!("{}: {error}", info.name));
+            let orbit = solver.orbit(OMEGA).unwrap_or_else(|error| panic!("{}: {error}", info.name));
             let allowed = SAMPLED + apart + SHARE * orbit.evidence.error_estimate.unwrap_or(0.0);
             let off = orbit.places.iter().zip(&fine).map(|(place, x)| (place.amplitude() - x).abs() / size);
             let off = off.fold(0.0, f64::max);
@@ -96,7 +96,7 @@ fn step_errors_are_not_reported_as_subharmonics() {
         let system = builder.force(0, 1, Complex64::new(force, 0.0)).build().unwrap();
         let [waited, found] = ["transient", "shooting"].map(|name| {
             let method = (method::TABLE.iter().find(|row| row.name == name).unwrap().build)(&Options::new()).unwrap();
-            let orbit = method.solver(&system).unwrap().orbit(TAU * hertz, None);
+            let orbit = method.solver(&system).unwrap().orbit(TAU * hertz);
             orbit.unwrap_or_else(|error| panic!("{name} at {hertz} Hz: {error}"))
         });
         assert_eq!((waited.periods, waited.is_stable()), (1, Some(true)));

@@ -13,6 +13,7 @@ use std::time::Instant;
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
 use stickslip::method::harmonic_balance::HarmonicBalance;
+use stickslip::orbit::Seed;
 use stickslip_verification::loose_dampers::{LooseDamper, Settings, loose_damper, roof_damper};
 
 /// Default number of random dampers.
@@ -92,7 +93,7 @@ fn judge(damper: &LooseDamper, name: &str, counts: &mut Counts) {
     let mut solver = Auto.solver(&system).unwrap();
     for &omega in &damper.frequencies {
         let clock = Instant::now();
-        let found = solver.orbit(omega, None);
+        let found = solver.orbit(omega);
         let seconds = clock.elapsed().as_secs_f64();
         counts.seconds.push(seconds);
         let hertz = omega / TAU;
@@ -159,7 +160,7 @@ fn a_roof_damper_has_its_orbits_at_all_speeds() {
     let system = damper.system();
     let mut solver = HarmonicBalance::default().solver(&system).unwrap();
     for (hertz, micrometres) in [(120.0, 53.652), (150.0, 11.520), (165.0, 6.7442), (175.5, 5.1345)] {
-        let orbit = solver.orbit(TAU * hertz, None).unwrap();
+        let orbit = solver.orbit(TAU * hertz).unwrap();
         let amplitude = 1e6 * orbit.places[0].amplitude();
         assert!((amplitude / micrometres - 1.0).abs() < 1e-4, "{hertz} Hz: {amplitude} {micrometres}");
     }
@@ -168,10 +169,10 @@ fn a_roof_damper_has_its_orbits_at_all_speeds() {
         let damper = roof_damper(speed);
         let system = damper.system();
         let mut solver = HarmonicBalance::default().solver(&system).unwrap();
-        let mut start: Option<Vec<f64>> = None;
+        let mut start: Option<Seed> = None;
         for &omega in damper.frequencies.iter().step_by(5) {
-            match solver.orbit(omega, start.as_deref()) {
-                Ok(orbit) => start = Some(orbit.initial_state),
+            match solver.orbit_near(omega, start.as_ref()) {
+                Ok(orbit) => start = Some(orbit.seed()),
                 Err(error) => missed.push(format!("{speed} rpm, {} Hz: {error}", omega / TAU)),
             }
         }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use stickslip::law::{CoulombArctan, SharedLaw};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::System;
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Seed};
 use stickslip_verification::{Random, close, exact, maximum, near, number, table, template, template_with, zero};
 
 const M: f64 = 0.182;
@@ -55,7 +55,7 @@ fn check_cm(orbit: &Orbit, expected: &[f64]) {
 /// Returns the largest amplitude of a place in cm and its frequency in Hz, between 119.5 and
 /// 122.5 Hz.
 fn peak(solver: &mut dyn Solver, place: usize) -> (f64, f64) {
-    let amplitude = |hertz: f64| 100.0 * solver.orbit(TAU * hertz, None).unwrap().places[place].amplitude();
+    let amplitude = |hertz: f64| 100.0 * solver.orbit(TAU * hertz).unwrap().places[place].amplitude();
     let (at, value) = maximum(amplitude, [119.5, 122.5], 150, 1e-7);
     (value, at)
 }
@@ -164,10 +164,10 @@ fn theory_6_5_sensitivity_to_alpha() {
         let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
         let system = template_with("blade-couple", &[("Ft", 2.0)], law);
         let mut solver = Shooting { tolerance: 1e-8, width: None, ..Shooting::default() }.solver(&system).unwrap();
-        let mut start: Option<Vec<f64>> = None;
+        let mut start: Option<Seed> = None;
         let amplitude = |hertz: f64| {
-            let orbit = solver.orbit(TAU * hertz, start.as_deref()).unwrap();
-            start = Some(orbit.initial_state.clone());
+            let orbit = solver.orbit_near(TAU * hertz, start.as_ref()).unwrap();
+            start = Some(orbit.seed());
             100.0 * orbit.places[2].amplitude()
         };
         let (at, value) = maximum(amplitude, [120.3, 121.0], 35, 1e-5);
@@ -229,7 +229,7 @@ fn theory_6_6_performance_curve() {
     // the two peaks are equally high at the optimum
     let system = template("blade-couple", &[("Ft", ft)]);
     let mut solver = EventDriven.solver(&system).unwrap();
-    let mut a1 = |hertz: f64| 100.0 * solver.orbit(TAU * hertz, None).unwrap().places[0].amplitude();
+    let mut a1 = |hertz: f64| 100.0 * solver.orbit(TAU * hertz).unwrap().places[0].amplitude();
     let (left, right) = (maximum(&mut a1, [120.5, 120.95], 100, 1e-7).1, maximum(&mut a1, [121.0, 121.5], 100, 1e-7).1);
     close("equal peaks", left, right, 1e-4);
     close("optimum", left, -value, 1e-4);
@@ -281,7 +281,7 @@ fn slips(system: &System, hertz: f64) -> bool {
 /// contact force exceeds its limit by less than rounding, and the method may report chatter.
 /// This counts as slip; at a larger distance an error is a failure.
 fn slips_near(system: &System, hertz: f64, border: f64) -> bool {
-    match EventDriven.solver(system).unwrap().orbit(TAU * hertz, None) {
+    match EventDriven.solver(system).unwrap().orbit(TAU * hertz) {
         Ok(orbit) => orbit.joints[0].slip_fraction > 0.0,
         Err(error) => {
             assert!((hertz / border - 1.0).abs() < 1e-11, "{error}");
@@ -319,7 +319,7 @@ fn theory_6_8_stick_slip_borders() {
             let expected = stuck(m1, hertz)[2].norm();
             let slips = |ft: f64| {
                 let system = template("blade-couple", &[("Ft", ft), ("m1", m1)]);
-                match EventDriven.solver(&system).unwrap().orbit(TAU * hertz, None) {
+                match EventDriven.solver(&system).unwrap().orbit(TAU * hertz) {
                     Ok(orbit) if orbit.joints[0].slip_fraction == 0.0 => -1.0,
                     Ok(_) => 1.0,
                     Err(error) => {
@@ -399,7 +399,7 @@ fn theory_6_8_stuck_curves_are_exactly_linear() {
             for i in 0..=240 {
                 let hertz = 119.5 + f64::from(i) / 80.0;
                 let [x1, x3, force] = stuck(m1, hertz);
-                let orbit = solver.orbit(TAU * hertz, None).unwrap();
+                let orbit = solver.orbit(TAU * hertz).unwrap();
                 assert!(orbit.evidence.residual < 1e-10 && orbit.evidence.energy_gap < 1e-9, "{orbit:?}");
                 assert_eq!(orbit.joints[0].slip_fraction == 0.0, force.norm() <= ft, "{ft} N, {hertz} Hz");
                 if force.norm() > ft {
@@ -472,7 +472,7 @@ fn theory_13_orbits_are_unique() {
         for _ in 0..10 {
             let start: Vec<f64> =
                 (0..6).map(|i| random.between(-1.0, 1.0) * if i < 3 { 0.1 } else { 0.1 * TAU * hertz }).collect();
-            let orbit = solver.orbit(TAU * hertz, Some(&start)).unwrap();
+            let orbit = solver.orbit_near(TAU * hertz, Some(&Seed::from_state(TAU * hertz, start))).unwrap();
             for (a, b) in reference.places.iter().zip(&orbit.places) {
                 close("amplitude", b.amplitude(), a.amplitude(), 1e-9);
             }

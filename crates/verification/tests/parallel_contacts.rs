@@ -29,7 +29,7 @@ fn balance(harmonics: usize) -> HarmonicBalance {
 }
 
 fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// Returns three coordinates with full matrices under a force, with natural frequencies of

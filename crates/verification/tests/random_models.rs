@@ -18,7 +18,7 @@ fn random_models_converge_with_evidence() {
         let (model, omega) = random_model(seed);
         let system = model.assemble().unwrap();
         let start = Instant::now();
-        match EventDriven.solver(&system).unwrap().orbit(omega, None) {
+        match EventDriven.solver(&system).unwrap().orbit(omega) {
             Ok(orbit) => {
                 converged += 1;
                 gap = gap.max(orbit.evidence.energy_gap);

@@ -30,11 +30,7 @@ fn changes(m: f64, k: f64, force: f64, ft: f64) -> (Vec<(&'static str, f64)>, f6
 }
 
 fn smooth(system: &System, omega: f64) -> Orbit {
-    Shooting { tolerance: 1e-10, width: None, ..Shooting::default() }
-        .solver(system)
-        .unwrap()
-        .orbit(omega, None)
-        .unwrap()
+    Shooting { tolerance: 1e-10, width: None, ..Shooting::default() }.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::time::Instant;
 use stickslip::law::CoulombArctan;
 use stickslip::method::{Method, event_driven::EventDriven, shooting::Shooting, transient::Transient};
 use stickslip::model::System;
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Seed};
 use stickslip_verification::{close, exact, near, number, table, template, template_with};
 
 fn couple(ft: f64, alpha: f64) -> System {
@@ -17,7 +17,7 @@ fn couple(ft: f64, alpha: f64) -> System {
 }
 
 fn shoot(system: &System, omega: f64, tolerance: f64) -> Orbit {
-    Shooting { tolerance, width: None, ..Shooting::default() }.solver(system).unwrap().orbit(omega, None).unwrap()
+    Shooting { tolerance, width: None, ..Shooting::default() }.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// Amplitudes, phases, energies and the state at t = 0 of three orbits, one of them in
@@ -74,8 +74,8 @@ fn couple_agrees_with_scipy() {
 fn the_end_of_stick_is_not_jumped_over() {
     let system = couple(8.0, 25e3);
     let mut solver = Shooting { tolerance: 1e-8, ..Shooting::default() }.solver(&system).unwrap();
-    let neighbour = solver.orbit(TAU * 120.9875, None).unwrap();
-    let orbit = solver.orbit(TAU * 121.0, Some(&neighbour.initial_state)).unwrap();
+    let neighbour = solver.orbit(TAU * 120.9875).unwrap();
+    let orbit = solver.orbit_near(TAU * 121.0, Some(&neighbour.seed())).unwrap();
     let reference = shoot(&system, TAU * 121.0, 1e-12);
     let pairs = orbit.places.iter().zip(&reference.places);
     let worst = pairs.map(|(a, b)| (a.amplitude() / b.amplitude() - 1.0).abs()).fold(0.0, f64::max);
@@ -110,16 +110,16 @@ fn figure_6_converges_on_every_point() {
     for ft in [2.0, 4.0, 6.0, 8.0] {
         let system = couple(ft, 25e3);
         let mut solver = Shooting::default().solver(&system).unwrap();
-        let mut start: Option<Vec<f64>> = None;
+        let mut start: Option<Seed> = None;
         for i in 0..241 {
             let hertz = 119.5 + f64::from(i) / 80.0;
             let orbit =
-                solver.orbit(TAU * hertz, start.as_deref()).unwrap_or_else(|e| panic!("{ft} N, {hertz} Hz: {e}"));
+                solver.orbit_near(TAU * hertz, start.as_ref()).unwrap_or_else(|e| panic!("{ft} N, {hertz} Hz: {e}"));
             residual = residual.max(orbit.evidence.residual);
             gap = gap.max(orbit.evidence.energy_gap);
             iterations += orbit.evidence.iterations;
             points += 1;
-            start = Some(orbit.initial_state);
+            start = Some(orbit.seed());
         }
     }
     let seconds = begin.elapsed().as_secs_f64();
@@ -134,14 +134,14 @@ fn figure_6_does_not_depend_on_the_start() {
     for ft in [2.0, 4.0, 6.0, 8.0] {
         let system = couple(ft, 25e3);
         let mut solver = Shooting::default().solver(&system).unwrap();
-        let mut start: Option<Vec<f64>> = None;
+        let mut start: Option<Seed> = None;
         for i in (0..241).step_by(10) {
             let omega = TAU * (119.5 + f64::from(i) / 80.0);
-            let (warm, cold) = (solver.orbit(omega, start.as_deref()).unwrap(), solver.orbit(omega, None).unwrap());
+            let (warm, cold) = (solver.orbit_near(omega, start.as_ref()).unwrap(), solver.orbit(omega).unwrap());
             for (a, b) in warm.places.iter().zip(&cold.places) {
                 worst = worst.max((a.amplitude() / b.amplitude() - 1.0).abs());
             }
-            start = Some(warm.initial_state);
+            start = Some(warm.seed());
         }
     }
     println!("warm and cold starts differ by {worst:.1e}");
@@ -188,7 +188,7 @@ fn smooth_orbit_tends_to_the_exact_one() {
 fn width_is_one_over_alpha() {
     let system = template("blade-couple", &[("Ft", 4.0)]);
     let method = Shooting { tolerance: 1e-9, width: Some(1.0 / 25e3), ..Shooting::default() };
-    let smoothed = method.solver(&system).unwrap().orbit(TAU * 120.75, None).unwrap();
+    let smoothed = method.solver(&system).unwrap().orbit(TAU * 120.75).unwrap();
     let smooth = shoot(&couple(4.0, 25e3), TAU * 120.75, 1e-9);
     for (a, b) in smoothed.places.iter().zip(&smooth.places) {
         close("amplitude", a.amplitude(), b.amplitude(), 1e-12);
@@ -202,11 +202,11 @@ fn settling_agrees_with_newton_within_its_own_estimate() {
     for (smooth, omega) in [(false, TAU * 120.75), (true, TAU * 121.25)] {
         let system = if smooth { couple(4.0, 25e3) } else { template("blade-couple", &[("Ft", 4.0)]) };
         let waiting = Transient { tolerance: 1e-4, ..Transient::default() };
-        let waited = waiting.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let waited = waiting.solver(&system).unwrap().orbit(omega).unwrap();
         let found = if smooth {
-            Shooting::default().solver(&system).unwrap().orbit(omega, None).unwrap()
+            Shooting::default().solver(&system).unwrap().orbit(omega).unwrap()
         } else {
-            EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap()
+            EventDriven.solver(&system).unwrap().orbit(omega).unwrap()
         };
         let missing = waited.evidence.error_estimate.unwrap();
         assert!(missing <= 1e-4, "{missing}");

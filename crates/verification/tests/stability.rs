@@ -34,7 +34,7 @@ fn force(on: &str, amplitude: f64, phase: f64) -> Force {
 }
 
 fn find(method: &dyn Method, system: &System, omega: f64) -> Result<Orbit, OrbitError> {
-    method.solver(system).unwrap().orbit(omega, None)
+    method.solver(system).unwrap().orbit(omega)
 }
 
 fn series(harmonics: usize) -> HarmonicBalance {
@@ -265,7 +265,7 @@ fn extreme_numbers_end_without_hanging() {
                 };
                 let system = model.assemble().unwrap();
                 let clock = Instant::now();
-                let found = method.solver(&system).map(|mut solver| solver.orbit(TAU * 14.0, None));
+                let found = method.solver(&system).map(|mut solver| solver.orbit(TAU * 14.0));
                 match found {
                     Ok(Ok(orbit)) => {
                         assert!(orbit.places[0].amplitude().is_finite());
@@ -323,9 +323,9 @@ fn stick_at_the_limit_has_the_multipliers_of_stick() {
         [(preloaded, 27.15, 0.12 / 0.41 + 0.36 / 0.13), (beside_a_gap, 28.92, 0.312 / 0.311 + 0.198 / 0.133)]
     {
         let system = model.assemble().unwrap();
-        let orbit = HarmonicBalance::default().solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();
+        let orbit = HarmonicBalance::default().solver(&system).unwrap().orbit(TAU * hertz).unwrap();
         assert_eq!(orbit.joints[0].slip_fraction, 0.0);
-        let exact = EventDriven.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();
+        let exact = EventDriven.solver(&system).unwrap().orbit(TAU * hertz).unwrap();
         assert!((orbit.places[0].amplitude() / exact.places[0].amplitude() - 1.0).abs() < 2e-3);
         assert_eq!(orbit.is_stable(), exact.is_stable(), "{hertz} Hz: {:?}", orbit.multipliers());
         let product: f64 = orbit.multipliers().unwrap().iter().map(|m| m.norm()).product();

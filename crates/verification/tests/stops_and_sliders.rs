@@ -15,7 +15,7 @@ use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::time_history::{Excitation, TimeHistory};
 use stickslip::method::{Method, auto::Auto, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring};
-use stickslip::orbit::{Orbit, Sample};
+use stickslip::orbit::{Orbit, Sample, Seed};
 use stickslip_verification::{close, exact, near, number, table};
 
 /// Returns a mass of 1 kg on a spring (N/m) and a damper (kg/s), with these joints to the
@@ -113,9 +113,9 @@ fn stops_agree_with_integration() {
         let system = model.assemble().unwrap();
         assert_eq!(Auto.choice(&system).method, "event-driven");
         for omega in [0.4, 0.8, 1.3, 1.9, 2.6, 3.1] {
-            let orbit = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let orbit = EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
             let shooting = Shooting { tolerance: 1e-10, ..Shooting::default() };
-            let other = shooting.solver(&system).unwrap().orbit(omega, Some(&orbit.initial_state)).unwrap();
+            let other = shooting.solver(&system).unwrap().orbit_near(omega, Some(&orbit.seed())).unwrap();
             let (a, b) = (&orbit.places[0], &other.places[0]);
             let scale = a.amplitude();
             for (a, b) in [(a.maximum, b.maximum), (a.minimum, b.minimum), (a.mean, b.mean)] {
@@ -152,13 +152,16 @@ fn subharmonic_motion_beside_an_unstable_one() {
     model.forces = vec![force("m", 1.0, 1)];
     let system = model.assemble().unwrap();
     let omega = 2.6;
-    let single = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+    let single = EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
     assert_eq!(single.is_stable(), Some(false));
     multiplied(&single, [-1.878_280_613_595_553, -0.418_107_055_970_699].map(Complex64::from));
-    let double =
-        SubharmonicEventDriven { period: 2 }.solver(&system).unwrap().orbit(omega, Some(&[-1.0, 0.3])).unwrap();
+    let double = SubharmonicEventDriven { period: 2 }
+        .solver(&system)
+        .unwrap()
+        .orbit_near(omega, Some(&Seed::from_state(omega, vec![-1.0, 0.3])))
+        .unwrap();
     let other = Shooting { period: 2, tolerance: 1e-10, ..Shooting::default() };
-    let other = other.solver(&system).unwrap().orbit(omega, Some(&double.initial_state)).unwrap();
+    let other = other.solver(&system).unwrap().orbit_near(omega, Some(&double.seed())).unwrap();
     close("maximum", double.places[0].maximum, other.places[0].maximum, 1e-7);
     assert_eq!(double.is_stable(), Some(true));
     let later = double.sample(TAU / omega).displacement[0];
@@ -180,11 +183,11 @@ fn a_multiplier_of_1_18_is_unstable() {
     const SERIES: f64 = 1e-6;
     let balance = HarmonicBalance { harmonics: Some(127), ..HarmonicBalance::default() };
     for (method, digits) in [(&EventDriven as &dyn Method, PRINTED), (&balance, SERIES)] {
-        let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
         assert_eq!(orbit.is_stable(), Some(false), "{}", orbit.method);
         within(&orbit, [-1.18, -shrinks / 1.18].map(Complex64::from), digits);
     }
-    let orbit = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+    let orbit = EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
     for (found, expected) in orbit.initial_state.iter().zip(start) {
         near("start", *found, expected, PRINTED);
     }
@@ -229,7 +232,8 @@ fn motions_of_one_three_and_five_periods_side_by_side() {
         let shrinks = (-damping * f64::from(period) * TAU / omega).exp();
         assert!((multiplier.norm_sqr() - shrinks).abs() < PRINTED, "{period}");
         let method = SubharmonicEventDriven { period: period as usize };
-        let orbit = method.solver(&system).unwrap().orbit(omega, Some(&start)).unwrap();
+        let orbit =
+            method.solver(&system).unwrap().orbit_near(omega, Some(&Seed::from_state(omega, start.to_vec()))).unwrap();
         for (found, expected) in orbit.initial_state.iter().zip(start) {
             near("start", *found, expected, PRINTED);
         }
@@ -283,7 +287,7 @@ fn a_moved_wall_counts_with_its_mean() {
     let (a, b) = (exact(&moved, 1.2), exact(&still, 1.2));
     close("maximum", a.places[0].maximum, b.places[0].maximum, 1e-11);
     let shooting = Shooting { tolerance: 1e-10, ..Shooting::default() };
-    let other = shooting.solver(&moved).unwrap().orbit(1.2, None).unwrap();
+    let other = shooting.solver(&moved).unwrap().orbit(1.2).unwrap();
     close("maximum", a.places[0].maximum, other.places[0].maximum, 1e-7);
     close("work", a.energy.work_in, other.energy.work_in, 1e-6);
 }
@@ -579,7 +583,7 @@ fn creeping_orbits_are_found() {
         let system = model.assemble().unwrap();
         let orbit = exact(&system, omega);
         let smooth = Shooting { width: Some(1e-9), ..Shooting::default() };
-        let smooth = smooth.solver(&system).unwrap().orbit(omega, Some(&orbit.initial_state)).unwrap();
+        let smooth = smooth.solver(&system).unwrap().orbit_near(omega, Some(&orbit.seed())).unwrap();
         close("amplitude", orbit.places[0].amplitude(), smooth.places[0].amplitude(), 1e-3);
         close("loss", orbit.energy.friction, smooth.energy.friction, 1e-2);
     }
@@ -595,15 +599,12 @@ fn free_bodies_under_a_mean_force_drift() {
                 let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));
                 model.forces = vec![force("m", constant, 0), force("m", amplitude, 1)];
                 let system = model.assemble().unwrap();
-                let error = EventDriven.solver(&system).unwrap().orbit(1.0, None).unwrap_err();
+                let error = EventDriven.solver(&system).unwrap().orbit(1.0).unwrap_err();
                 assert_eq!(error.status(), "drifts", "{law:?} {damping} {constant} {amplitude}: {error}");
             }
             let mut model = oscillator(0.0, damping, std::slice::from_ref(&law));
             model.forces = vec![force("m", 0.03, 0), force("m", 0.02, 1)];
-            assert!(
-                EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(0.1, None).is_ok(),
-                "{law:?} {damping}"
-            );
+            assert!(EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(0.1).is_ok(), "{law:?} {damping}");
         }
     }
 }

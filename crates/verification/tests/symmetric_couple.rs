@@ -85,7 +85,7 @@ fn theory_4_1_sum_of_the_blades_is_linear_for_the_smooth_law() {
             let law = |limit| -> SharedLaw { Arc::new(CoulombArctan { limit, alpha }) };
             let system = template_with("symmetric-couple", &[("Ft", ft), ("mu", MU[0])], law);
             let method = Shooting { tolerance: 1e-10, width: None, ..Shooting::default() };
-            let orbit = method.solver(&system).unwrap().orbit(TAU * hertz, None).unwrap();
+            let orbit = method.solver(&system).unwrap().orbit(TAU * hertz).unwrap();
             check_sum(&orbit, MU[0], hertz, 1e-7);
         }
     }
@@ -110,7 +110,7 @@ fn theory_4_2_contact_force_and_onset_of_slip() {
         let force = |time: f64| orbit.sample(time).joints[0].force[0];
         close("contact force", force(0.0).hypot(force(0.25 * orbit.period())), stuck_force(mu, hertz), 1e-8);
         // slip begins where the limit falls below the contact force
-        let slips = |ft: f64| match EventDriven.solver(&couple(mu, ft)).unwrap().orbit(TAU * hertz, None) {
+        let slips = |ft: f64| match EventDriven.solver(&couple(mu, ft)).unwrap().orbit(TAU * hertz) {
             Ok(orbit) if orbit.joints[0].slip_fraction == 0.0 => -1.0,
             Ok(_) => 1.0,
             Err(error) => {
@@ -129,7 +129,7 @@ fn theory_4_2_contact_force_and_onset_of_slip() {
         let border = zero(|f| stuck_force(mu, f) - ft, [100.0, 126.0]);
         near("printed border", border, printed, digit);
         let system = couple(mu, ft);
-        let side = |f: f64| match EventDriven.solver(&system).unwrap().orbit(TAU * f, None) {
+        let side = |f: f64| match EventDriven.solver(&system).unwrap().orbit(TAU * f) {
             Ok(orbit) => {
                 if orbit.joints[0].slip_fraction > 0.0 {
                     1.0
@@ -156,7 +156,7 @@ fn theory_4_2_stuck_curves_are_exactly_linear() {
             let mut solver = EventDriven.solver(&system).unwrap();
             for i in 0..=240 {
                 let hertz = 119.5 + f64::from(i) / 80.0;
-                let orbit = solver.orbit(TAU * hertz, None).unwrap();
+                let orbit = solver.orbit(TAU * hertz).unwrap();
                 assert!(orbit.evidence.residual < 1e-10 && orbit.evidence.energy_gap < 1e-9, "{orbit:?}");
                 points += 1;
                 assert_eq!(orbit.joints[0].slip_fraction == 0.0, stuck_force(mu, hertz) <= ft, "{ft} N, {hertz} Hz");

@@ -70,7 +70,7 @@ pub fn along_parameters(
         let system = model.assemble().map_err(|cause| PointError::Model(at(describe(&cause, &model))))?;
         let solver = solver_with_alternatives(&*request.method, &system);
         let mut solver = solver.map_err(|cause| PointError::Method(at(cause.to_string())))?;
-        let outcome = solver.orbit(omegas[index], None);
+        let outcome = solver.orbit(omegas[index]);
         (context.finished)();
         Ok(Some(Row::new(&system, omegas[index], outcome.as_ref())))
     };

@@ -35,7 +35,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Method, Options, Solver, solver_with_alternatives};
+use stickslip::method::{self, Method, Options, Seed, Solver, solver_with_alternatives};
 use stickslip::model::{
     Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure, SubstructureDamping,
     System,
@@ -166,7 +166,8 @@ impl PyModel {
                 format!("`start` must contain {n} numbers (displacements and velocities), found {}", start.len()),
             ));
         }
-        let outcome = run_here(py, || found.solver.orbit(omega, start.as_deref()));
+        let seed = start.clone().map(|state| Seed::from_state(omega, state));
+        let outcome = run_here(py, || found.solver.orbit_near(omega, seed.as_ref()));
         let outcome = match outcome {
             Ok(outcome) => outcome,
             Err(ended) => {

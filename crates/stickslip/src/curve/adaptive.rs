@@ -5,11 +5,12 @@
 //! its ends. Bisection proceeds level by level, so the points are identical for any number of
 //! threads.
 
+use super::PointBudget;
 use super::branch_following;
 use super::peak::CurvePoint;
-use crate::method::{Method, MethodError, OrbitError};
+use crate::method::{Method, MethodError, OrbitError, Request};
 use crate::model::System;
-use crate::orbit::Orbit;
+use crate::orbit::{Orbit, Seed};
 use rayon::prelude::*;
 
 /// Specification of an adaptive curve.
@@ -65,7 +66,7 @@ impl AdaptiveCurve {
         // find another orbit than the branch of the previous points. All points are then solved
         // in sequence.
         let chunk = if system.has_passive_joints() { CHUNK } else { MAX_POINTS };
-        let solve = |omegas: &[(f64, Option<&[f64]>)]| -> Result<Vec<KeptPoint<R>>, MethodError> {
+        let solve = |omegas: &[(f64, Option<&Seed>)]| -> Result<Vec<KeptPoint<R>>, MethodError> {
             // One solver per chunk, because its stored data save work. The chunks are identical
             // for any number of threads.
             let chunks: Vec<Result<Vec<KeptPoint<R>>, MethodError>> = omegas
@@ -73,18 +74,20 @@ impl AdaptiveCurve {
                 .map(|chunk| {
                     let mut solver = branch_following::solver(method, system)?;
                     let mut kept = Vec::with_capacity(chunk.len());
-                    let mut last: Option<Vec<f64>> = None;
-                    for (omega, start) in chunk {
+                    let mut last: Option<Seed> = None;
+                    let mut budget = PointBudget::default();
+                    for (omega, seed) in chunk {
                         if stop() {
                             break;
                         }
-                        let outcome = solver.orbit(*omega, start.or(last.as_deref()));
+                        let request = Request::at(*omega).near(seed.or(last.as_ref()));
+                        let outcome = budget.solve(&mut *solver, &request);
                         let row = keep(outcome.as_ref());
                         let point = match &outcome {
                             Ok(orbit) => CurvePoint::new(orbit, quantities),
                             Err(_) => CurvePoint::failed(*omega),
                         };
-                        last = point.start.clone();
+                        last = point.seed.clone();
                         kept.push((point, row));
                     }
                     Ok(kept)
@@ -97,7 +100,7 @@ impl AdaptiveCurve {
             Ok(all)
         };
         let (from, to) = self.range;
-        let grid: Vec<(f64, Option<&[f64]>)> =
+        let grid: Vec<(f64, Option<&Seed>)> =
             (0..=INITIAL_INTERVALS)
                 .map(|i| {
                     if i == INITIAL_INTERVALS { to } else { from + (to - from) * (i as f64 / INITIAL_INTERVALS as f64) }
@@ -110,9 +113,9 @@ impl AdaptiveCurve {
             if stop() || points.len() + open.iter().filter(|open| **open).count() > MAX_POINTS {
                 break;
             }
-            let middles: Vec<(f64, Option<&[f64]>)> = (0..open.len())
+            let middles: Vec<(f64, Option<&Seed>)> = (0..open.len())
                 .filter(|&i| open[i])
-                .map(|i| (0.5 * (points[i].0.omega + points[i + 1].0.omega), points[i].0.start.as_deref()))
+                .map(|i| (0.5 * (points[i].0.omega + points[i + 1].0.omega), points[i].0.seed.as_ref()))
                 .collect();
             if middles.is_empty() {
                 break;
@@ -202,7 +205,7 @@ mod tests {
             for share in [0.25, 0.6] {
                 let omega = pair[0].0.omega + share * (pair[1].0.omega - pair[0].0.omega);
                 let line = pair[0].0.values[0] + share * (pair[1].0.values[0] - pair[0].0.values[0]);
-                let orbit = solver.orbit(omega, pair[0].0.start.as_deref()).unwrap();
+                let orbit = solver.orbit_near(omega, pair[0].0.seed.as_ref()).unwrap();
                 worst = worst.max((orbit.places[0].amplitude() - line).abs());
             }
         }

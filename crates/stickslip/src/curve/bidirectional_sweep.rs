@@ -37,11 +37,12 @@ const ROUNDING: f64 = 1e-10;
 /// .assemble()
 /// .unwrap();
 /// let method = HarmonicBalance::default();
-/// let (mut sweep, mut solver, mut start) = (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap(), None);
+/// let (mut sweep, mut solver) = (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap());
+/// let mut seed = None;
 /// for i in 0..41 {
-///     let orbit = solver.orbit(88.0 + 0.4 * f64::from(i), start.as_deref()).unwrap();
+///     let orbit = solver.orbit_near(88.0 + 0.4 * f64::from(i), seed.as_ref()).unwrap();
 ///     sweep.add(orbit.omega, Ok(&orbit));
-///     start = Some(orbit.initial_state);
+///     seed = Some(orbit.seed());
 /// }
 /// let others = sweep.reverse_sweep(&method, &system, &AtomicBool::new(false)).unwrap();
 /// assert!(others.len() > 10 && others.iter().all(|other| other.ratio > 1.5));
@@ -92,16 +93,16 @@ impl BidirectionalSweep {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
         let mut solver = solver_with_alternatives(method, system)?;
         // A search without initial guess can find another orbit than the forward sweep.
-        let start = solver.orbit(last.omega, None).ok().map(|orbit| orbit.initial_state);
+        let seed = solver.orbit(last.omega).ok().map(|orbit| orbit.seed());
         let mut omegas = self.points.iter().rev().map(|point| point.omega);
         let mut others = Vec::new();
-        reverse_sweep(method, system, start, &mut omegas, stop, &mut |orbit| {
+        reverse_sweep(method, system, seed, &mut omegas, stop, &mut |orbit| {
             let Some(point) = self.points.iter().find(|point| point.omega == orbit.omega) else { return };
             let held = held_amplitude(system, orbit.omega);
             // The reverse sweep estimates no errors, so an orbit that is reported is solved
             // again with an error estimate.
             let shown = amplitude_ratio(point, orbit, held)
-                .and_then(|_| solver.orbit(orbit.omega, Some(&orbit.initial_state)).ok());
+                .and_then(|_| solver.orbit_near(orbit.omega, Some(&orbit.seed())).ok());
             // unstable orbits are not reported, because no motion stays on them
             let shown = shown.filter(|orbit| orbit.is_stable() != Some(false));
             others.extend(

@@ -5,10 +5,11 @@
 //! from its initial guess, the solver repeats the interval in smaller steps. Either these steps
 //! reach the frequency, or the branch ends between both frequencies.
 
-use crate::method::{Method, MethodError, OrbitError, Solver, solver_with_alternatives};
+use crate::method::{
+    Budget, ErrorEstimate, Method, MethodError, OrbitError, Request, Solver, solver_with_alternatives,
+};
 use crate::model::System;
-use crate::orbit::Orbit;
-use num_complex::Complex64;
+use crate::orbit::{Orbit, Seed};
 
 /// Largest difference between two consecutive orbits of a branch, relative to the largest
 /// amplitude. It applies to amplitudes and to first harmonics, which include the phase.
@@ -40,7 +41,7 @@ pub fn is_followed(system: &System) -> bool {
 pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = solver_with_alternatives(method, system)?;
     Ok(if is_followed(system) {
-        Box::new(BranchFollower { solver, last: None, announced: None, end: None, work_limit_reached: false })
+        Box::new(BranchFollower { solver, end: None, work_limit_reached: false })
     } else {
         solver
     })
@@ -48,9 +49,6 @@ pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<
 
 struct BranchFollower<'a> {
     solver: Box<dyn Solver + Send + 'a>,
-    last: Option<BranchPoint>,
-    /// The orbit that [`Solver::begin_branch`] announced.
-    announced: Option<BranchPoint>,
     /// The end of a branch at which smaller steps failed.
     end: Option<BranchEnd>,
     /// True after the steps in an interval exceeded the work limit. No interval is repeated
@@ -61,83 +59,44 @@ struct BranchFollower<'a> {
 /// The end of a branch: the last orbit on it, and a nearby frequency (rad/s) at which the branch
 /// has no orbit.
 struct BranchEnd {
-    last: BranchPoint,
+    last: Seed,
     beyond: f64,
 }
 
 impl BranchEnd {
     /// Tells whether the interval from an orbit to a frequency contains this end.
-    fn lies_between(&self, from: &BranchPoint, omega: f64) -> bool {
+    fn lies_between(&self, from: &Seed, omega: f64) -> bool {
         let ahead = (self.beyond - self.last.omega).signum();
-        (self.beyond - from.omega) * ahead > 0.0 && (omega - self.beyond) * ahead >= 0.0 && from.is_near(&self.last)
+        (self.beyond - from.omega) * ahead > 0.0 && (omega - self.beyond) * ahead >= 0.0 && is_near(from, &self.last)
     }
 }
 
-/// The last orbit of a curve.
-#[derive(Clone)]
-struct BranchPoint {
-    omega: f64,
-    start: Vec<f64>,
-    /// Amplitude (m) and first harmonic of every place.
-    places: Vec<(f64, Complex64)>,
-}
-
-impl BranchPoint {
-    fn new(orbit: &Orbit) -> Self {
-        let places = orbit.places.iter().map(|place| (place.amplitude(), place.first_harmonic)).collect();
-        BranchPoint { omega: orbit.omega, start: orbit.initial_state.clone(), places }
-    }
-
-    /// Tells whether an orbit can be the next one of the branch.
-    fn may_precede(&self, orbit: &Orbit) -> bool {
-        self.is_near(&BranchPoint::new(orbit))
-    }
-
-    /// Tells whether amplitudes and phases differ little.
-    fn is_near(&self, other: &BranchPoint) -> bool {
-        let pairs = || self.places.iter().zip(&other.places);
-        let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
-        pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= MAX_CHANGE * largest)
-    }
+/// Tells whether amplitudes and phases of two orbits differ little.
+fn is_near(one: &Seed, other: &Seed) -> bool {
+    let pairs = || one.places.iter().zip(&other.places);
+    let largest = pairs().fold(0.0f64, |largest, (a, b)| largest.max(a.0).max(b.0));
+    pairs().all(|(a, b)| (a.0 - b.0).abs().max((a.1 - b.1).norm()) <= MAX_CHANGE * largest)
 }
 
 impl BranchFollower<'_> {
-    fn solve(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
-        if between { self.solver.orbit_without_estimate(omega, start) } else { self.solver.orbit(omega, start) }
-    }
-
-    fn next(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
-        let mut found = self.solve(omega, start, between);
-        let known = [&self.last, &self.announced].into_iter().flatten().find(|last| start == Some(&last.start[..]));
-        if let (Some(last), Ok(orbit)) = (known, &found)
-            && !self.work_limit_reached
-            && !last.may_precede(orbit)
-            && self.end.as_ref().is_none_or(|end| !end.lies_between(last, omega))
-            && let Some(orbit) = self.followed(last.clone(), omega, between)
-        {
-            found = Ok(orbit);
-        }
-        self.last = found.as_ref().ok().map(BranchPoint::new);
-        found
-    }
-
-    /// Returns the orbit at `omega` if smaller steps reach it.
-    fn followed(&mut self, mut last: BranchPoint, omega: f64, between: bool) -> Option<Orbit> {
-        let from = last.omega;
-        let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
+    /// Returns the orbit of a request if smaller steps from the orbit `last` reach it.
+    fn followed(&mut self, request: &Request<'_>, last: &Seed, budget: &mut Budget) -> Option<Orbit> {
+        let (from, omega, mut last) = (last.omega, request.omega, last.clone());
+        let (mut at, mut step) = (0.0, 0.5);
         let mut beyond;
         for _ in 0..MAX_STEPS {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
-            let found = self.solve(target, Some(&last.start), between || !arrives);
-            effort += self.solver.work_fraction();
+            let estimate = if arrives { request.estimate } else { ErrorEstimate::Skipped };
+            let found = self.solver.solve(&Request { omega: target, seed: Some(&last), estimate }, budget);
             self.work_limit_reached =
-                effort > WORK_LIMIT || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
-            match found.ok().filter(|orbit| last.may_precede(orbit)) {
-                Some(orbit) if arrives => return Some(orbit),
+                budget.is_used_up() || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
+            let next = found.ok().map(|orbit| (orbit.seed(), orbit));
+            match next.filter(|(seed, _)| is_near(&last, seed)) {
+                Some((_, orbit)) if arrives => return Some(orbit),
                 _ if self.work_limit_reached => return None,
-                Some(orbit) => (last, at, step, beyond) = (BranchPoint::new(&orbit), share, 2.0 * step, omega),
+                Some((seed, _)) => (last, at, step, beyond) = (seed, share, 2.0 * step, omega),
                 None => (step, beyond) = (0.5 * step, target),
             }
             step = step.min(1.0 - at);
@@ -151,24 +110,20 @@ impl BranchFollower<'_> {
 }
 
 impl Solver for BranchFollower<'_> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.next(omega, start, false)
-    }
-
-    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.next(omega, start, true)
-    }
-
-    fn work_fraction(&self) -> f64 {
-        self.solver.work_fraction()
-    }
-
-    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
-        if [&self.last, &self.announced].into_iter().flatten().all(|last| last.start != start) {
-            let orbit = self.solver.orbit_without_estimate(omega, Some(start));
-            self.announced = orbit.ok().map(|orbit| BranchPoint { start: start.to_vec(), ..BranchPoint::new(&orbit) });
+    fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let found = self.solver.solve(request, budget);
+        let known = request.seed.filter(|seed| !seed.places.is_empty());
+        if let (Some(last), Ok(orbit)) = (known, &found)
+            && !self.work_limit_reached
+            && !is_near(last, &orbit.seed())
+            && self.end.as_ref().is_none_or(|end| !end.lies_between(last, request.omega))
+        {
+            let mut steps = budget.part(WORK_LIMIT);
+            let followed = self.followed(request, last, &mut steps);
+            budget.charge(steps.used());
+            return followed.map_or(found, Ok);
         }
-        self.solver.begin_branch(omega, start);
+        found
     }
 }
 
@@ -187,26 +142,23 @@ mod tests {
     }
 
     impl Solver for Slow<'_> {
-        fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-            self.solver.orbit(omega, start)
-        }
-        fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-            self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            if self.effort < 1.0 {
-                return self.solver.orbit_without_estimate(omega, start);
+        fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+            if request.estimate == ErrorEstimate::Required {
+                return self.solver.solve(request, budget);
             }
-            let (iterations, residual, advice) = (9, 1e-2, String::new());
+            self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            budget.charge(self.effort);
+            if self.effort < 1.0 {
+                return self.solver.solve(request, budget);
+            }
             Err(OrbitError::NotConverged {
                 method: "slow",
-                omega,
-                iterations,
-                residual,
+                omega: request.omega,
+                iterations: 9,
+                residual: 1e-2,
                 work_limit_reached: true,
-                advice,
+                advice: String::new(),
             })
-        }
-        fn work_fraction(&self) -> f64 {
-            self.effort
         }
     }
 
@@ -216,19 +168,14 @@ mod tests {
         let asked = std::sync::Arc::default();
         let solver = EventDriven.solver(&system).unwrap();
         let solver = Slow { solver, effort, asked: std::sync::Arc::clone(&asked) };
-        let mut onward = BranchFollower {
-            solver: Box::new(solver),
-            last: None,
-            announced: None,
-            end: None,
-            work_limit_reached: false,
-        };
-        let mut start: Option<Vec<f64>> = None;
+        let mut follower = BranchFollower { solver: Box::new(solver), end: None, work_limit_reached: false };
+        let mut seed: Option<Seed> = None;
         let mut amplitudes = Vec::new();
         for hertz in [119.5, 120.5, 121.5] {
-            let orbit = onward.orbit(TAU * hertz, start.as_deref()).unwrap();
+            let request = Request::at(TAU * hertz).near(seed.as_ref());
+            let orbit = follower.solve(&request, &mut Budget::default()).unwrap();
             amplitudes.push(orbit.places[0].amplitude());
-            start = Some(orbit.initial_state);
+            seed = Some(orbit.seed());
         }
         assert!(amplitudes.windows(2).all(|pair| (pair[0] / pair[1] - 1.0).abs() > MAX_CHANGE), "{amplitudes:?}");
         asked.load(std::sync::atomic::Ordering::Relaxed)
@@ -242,10 +189,10 @@ mod tests {
     }
 
     impl Solver for Ends<'_> {
-        fn orbit(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+        fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
             self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            let other = if omega < self.end { 0.0 } else { 50.0 };
-            self.solver.orbit(omega + other, None).map(|orbit| Orbit { omega, ..orbit })
+            let other = if request.omega < self.end { 0.0 } else { 50.0 };
+            self.solver.orbit(request.omega + other).map(|orbit| Orbit { omega: request.omega, ..orbit })
         }
     }
 
@@ -256,19 +203,13 @@ mod tests {
         let from = TAU * 119.5;
         let solver = EventDriven.solver(&system).unwrap();
         let solver = Ends { solver, end: from + 0.2, asked: std::sync::Arc::clone(&asked) };
-        let mut onward = BranchFollower {
-            solver: Box::new(solver),
-            last: None,
-            announced: None,
-            end: None,
-            work_limit_reached: false,
-        };
-        let start = onward.orbit(from, None).unwrap().initial_state;
+        let mut follower = BranchFollower { solver: Box::new(solver), end: None, work_limit_reached: false };
+        let seed = follower.orbit(from).unwrap().seed();
         let count = || asked.load(std::sync::atomic::Ordering::Relaxed);
         let mut searches = |beyond: f64| {
-            onward.begin_branch(from, &start);
             let before = count();
-            onward.orbit_without_estimate(from + beyond, Some(&start)).unwrap();
+            let request = Request::at(from + beyond).near(Some(&seed)).without_estimate();
+            follower.solve(&request, &mut Budget::default()).unwrap();
             count() - before
         };
         // The first interval locates the end. The next two contain the known end and take one

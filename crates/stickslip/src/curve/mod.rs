@@ -8,4 +8,7 @@ pub mod continuation;
 pub mod modes;
 pub mod peak;
 pub mod performance;
+mod point_budget;
 pub mod sweep;
+
+pub use point_budget::PointBudget;

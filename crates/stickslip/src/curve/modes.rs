@@ -493,7 +493,7 @@ mod tests {
                     }
                 }
                 let forced = model.assemble().unwrap();
-                let orbit = EventDriven.solver(&forced).unwrap().orbit(state.omega, None).unwrap();
+                let orbit = EventDriven.solver(&forced).unwrap().orbit(state.omega).unwrap();
                 let lost = 2.0 * PI * state.damping * state.omega * state.omega * inertia;
                 let found = orbit.energy.friction + orbit.energy.viscous;
                 assert!((found / lost - 1.0).abs() < SERIES, "{index} {amplitude}: {found} J, {lost} J");

@@ -1,21 +1,21 @@
-//! Orbits at given frequencies, each with its neighbour as initial guess.
+//! Orbits at given frequencies, each with its neighbour as seed.
 //!
-//! The frequencies are divided into blocks of fixed length. A block begins without initial guess
-//! and runs in order; blocks run in parallel. The initial guess of every point is therefore the
+//! The frequencies are divided into blocks of fixed length. A block begins without a seed
+//! and runs in order; blocks run in parallel. The seed of every point is therefore the
 //! same for any number of threads, and the results are identical in all bits.
 //!
 //! At a fold of the curve, the points beyond it have no orbit near the previous one. They are
 //! then solved in reverse, from the first orbit found after them. A point that is found from
-//! neither side is solved without initial guess.
+//! neither side is solved without a seed.
 
-use super::branch_following;
-use crate::method::{Method, MethodError, OrbitError, Solver};
+use super::{PointBudget, branch_following};
+use crate::method::{Method, MethodError, OrbitError, Request, Solver};
 use crate::model::System;
-use crate::orbit::Orbit;
+use crate::orbit::{Orbit, Seed};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Points per block. A start without initial guess costs about as much as five points with one.
+/// Points per block. A point without a seed costs about as much as five points with one.
 pub const BLOCK: usize = 61;
 
 /// Progress and cancellation of a sweep.
@@ -84,8 +84,7 @@ pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Sol
     branch_following::solver(method, system)
 }
 
-/// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as initial
-/// guess. Points without an orbit from there are solved in reverse from the next orbit. `see`
+/// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as seed. Points without an orbit from there are solved in reverse from the next orbit. `see`
 /// receives the outcomes in order.
 pub fn solve_sequence(
     solver: &mut dyn Solver,
@@ -93,7 +92,7 @@ pub fn solve_sequence(
     watch: Watch<'_>,
     see: &mut Observer<'_>,
 ) {
-    let mut start: Option<Vec<f64>> = None;
+    let (mut seed, mut budget): (Option<Seed>, _) = (None, PointBudget::default());
     // points without an orbit, until the next orbit is found
     let mut missing: Vec<PendingPoint> = Vec::new();
     let mut omegas = omegas.peekable();
@@ -103,22 +102,21 @@ pub fn solve_sequence(
             see(omega, None);
             continue;
         }
-        let (outcome, had_guess) = (solver.orbit(omega, start.as_deref()), start.is_some());
+        let outcome = budget.solve(solver, &Request::at(omega).near(seed.as_ref()));
+        let had_seed = seed.is_some();
         (watch.finished)();
-        // After a failure, the next point has no initial guess, because the last orbit may be
-        // far away.
-        start = outcome.as_ref().ok().map(|orbit| orbit.initial_state.clone());
-        let found = outcome.as_ref().ok().map(|orbit| orbit.initial_state.clone());
-        missing.push(PendingPoint { omega, outcome, had_guess });
-        if found.is_none() && omegas.peek().is_some() {
+        // After a failure, the next point has no seed, because the last orbit may be far away.
+        seed = outcome.as_ref().ok().map(Orbit::seed);
+        missing.push(PendingPoint { omega, outcome, had_seed });
+        if seed.is_none() && omegas.peek().is_some() {
             continue;
         }
-        if let Some(behind) = found {
+        if let Some(behind) = &seed {
             let before = missing.len() - 1;
-            solve_missing_in_reverse(solver, &behind, &mut missing[..before], watch);
+            solve_missing_in_reverse(solver, &mut budget, behind, &mut missing[..before], watch);
         }
         for point in &mut missing {
-            point.solve_without_guess(solver, watch);
+            point.solve_without_seed(solver, &mut budget, watch);
             see(point.omega, Some(point.outcome.as_ref()));
         }
         missing.clear();
@@ -126,30 +124,31 @@ pub fn solve_sequence(
 }
 
 /// Performs a reverse sweep: solves at some frequencies (rad/s) in sequence. The first search
-/// begins from the orbit `start`, each other one from the previous orbit. If several orbits
+/// begins from the orbit `seed`, each other one from the previous orbit. If several orbits
 /// exist, the reverse sweep jumps between branches at other frequencies than the forward sweep.
 /// `see` receives the orbits that are found; their errors are not estimated. A failed point is
-/// skipped, and the next one is solved without initial guess.
+/// skipped, and the next one is solved without a seed.
 ///
 /// # Errors
 /// The method does not support the system.
 pub fn reverse_sweep(
     method: &dyn Method,
     system: &System,
-    start: Option<Vec<f64>>,
+    seed: Option<Seed>,
     omegas: &mut dyn Iterator<Item = f64>,
     stop: &AtomicBool,
     see: &mut dyn FnMut(&Orbit),
 ) -> Result<(), MethodError> {
-    let mut solver = solver(method, system)?;
-    let mut start = start;
+    let (mut solver, mut budget) = (solver(method, system)?, PointBudget::default());
+    let mut seed = seed;
     for omega in omegas {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let found = solver.orbit_without_estimate(omega, start.as_deref()).ok();
+        let request = Request::at(omega).near(seed.as_ref()).without_estimate();
+        let found = budget.solve(&mut *solver, &request).ok();
         found.iter().for_each(&mut *see);
-        start = found.map(|orbit| orbit.initial_state);
+        seed = found.as_ref().map(Orbit::seed);
     }
     Ok(())
 }
@@ -159,40 +158,46 @@ struct PendingPoint {
     omega: f64,
     outcome: Result<Orbit, OrbitError>,
     /// True if the search began from the previous orbit.
-    had_guess: bool,
+    had_seed: bool,
 }
 
 impl PendingPoint {
     /// Tells whether another initial guess may help. It does not for a series that is too short.
-    fn may_succeed_from_another_guess(&self) -> bool {
+    fn may_succeed_from_another_seed(&self) -> bool {
         self.outcome.as_ref().is_err_and(|error| !matches!(error, OrbitError::Truncation { .. }))
     }
 
     /// Solves the point without initial guess, if the searches from its neighbours failed.
-    fn solve_without_guess(&mut self, solver: &mut dyn Solver, watch: Watch<'_>) {
-        if self.had_guess && self.may_succeed_from_another_guess() && !watch.stop.load(Ordering::Relaxed) {
-            self.outcome = solver.orbit(self.omega, None).or(self.outcome.clone());
+    fn solve_without_seed(&mut self, solver: &mut dyn Solver, budget: &mut PointBudget, watch: Watch<'_>) {
+        if self.had_seed && self.may_succeed_from_another_seed() && !watch.stop.load(Ordering::Relaxed) {
+            self.outcome = budget.solve(solver, &Request::at(self.omega)).or(self.outcome.clone());
         }
     }
 }
 
 /// Solves the missing points in reverse from the next orbit, until one of them fails.
-fn solve_missing_in_reverse(solver: &mut dyn Solver, behind: &[f64], missing: &mut [PendingPoint], watch: Watch<'_>) {
-    let mut start = behind.to_vec();
-    for PendingPoint { omega, outcome, had_guess } in
-        missing.iter_mut().rev().take_while(|point| point.may_succeed_from_another_guess())
+fn solve_missing_in_reverse(
+    solver: &mut dyn Solver,
+    budget: &mut PointBudget,
+    behind: &Seed,
+    missing: &mut [PendingPoint],
+    watch: Watch<'_>,
+) {
+    let mut seed = behind.clone();
+    for PendingPoint { omega, outcome, had_seed } in
+        missing.iter_mut().rev().take_while(|point| point.may_succeed_from_another_seed())
     {
         if watch.stop.load(Ordering::Relaxed) {
             return;
         }
-        match solver.orbit(*omega, Some(&start)) {
+        match budget.solve(solver, &Request::at(*omega).near(Some(&seed))) {
             Ok(orbit) => {
-                start.clone_from(&orbit.initial_state);
+                seed = orbit.seed();
                 *outcome = Ok(orbit);
             }
             Err(error) => {
                 // a search that exhausted the work limit is not repeated
-                *had_guess &= !matches!(error, OrbitError::NotConverged { work_limit_reached: true, .. });
+                *had_seed &= !matches!(error, OrbitError::NotConverged { work_limit_reached: true, .. });
                 return;
             }
         }
@@ -202,6 +207,7 @@ fn solve_missing_in_reverse(solver: &mut dyn Solver, behind: &[f64], missing: &m
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::method::Budget;
     use crate::method::event_driven::EventDriven;
 
     /// Finds no orbit between the frequencies of `fold` unless the search begins from above.
@@ -213,7 +219,6 @@ mod tests {
     struct FoldedSolver<'a> {
         solver: Box<dyn Solver + Send + 'a>,
         fold: (f64, f64),
-        last: Option<f64>,
     }
 
     impl Method for Folded {
@@ -221,18 +226,18 @@ mod tests {
             "folded"
         }
         fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-            Ok(Box::new(FoldedSolver { solver: EventDriven.solver(system)?, fold: self.fold, last: None }))
+            Ok(Box::new(FoldedSolver { solver: EventDriven.solver(system)?, fold: self.fold }))
         }
     }
 
     impl Solver for FoldedSolver<'_> {
-        fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-            let from_above = start.is_some() && self.last.is_some_and(|last| last > omega);
+        fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+            let omega = request.omega;
+            let from_above = request.seed.is_some_and(|seed| seed.omega > omega);
             if omega > self.fold.0 && omega < self.fold.1 && !from_above {
                 return Err(OrbitError::not_converged("folded", omega, 1, 1.0));
             }
-            self.last = Some(omega);
-            self.solver.orbit(omega, start)
+            self.solver.solve(request, budget)
         }
     }
 

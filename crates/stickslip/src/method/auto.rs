@@ -9,7 +9,8 @@ use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
 use super::shooting::Shooting;
 use super::{
-    Choice, Method, MethodError, MethodInfo, Options, Solver, alternatives, event_driven, harmonic_balance, transient,
+    Budget, Choice, Method, MethodError, MethodInfo, Options, Request, Seed, Solver, alternatives, event_driven,
+    harmonic_balance, transient,
 };
 use crate::law::Law;
 use crate::model::System;
@@ -135,7 +136,7 @@ impl Method for Auto {
     fn solver<'a>(&self, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
         let (method, _) = Auto::pick(system);
         let first = method.solver(system)?;
-        Ok(Box::new(WithFallback { first, chosen: method.name(), system, second: None, last: None, effort: 0.0 }))
+        Ok(Box::new(WithFallback { first, chosen: method.name(), system, second: None }))
     }
 }
 
@@ -148,10 +149,6 @@ struct WithFallback<'a> {
     /// The second method and its name, made at the first use; the inner value is `None` if none
     /// exists.
     second: Option<Option<(&'static str, Box<dyn Solver + Send + 'a>)>>,
-    /// State of the last orbit that the second method found; the first method cannot use it.
-    last: Option<Vec<f64>>,
-    /// Work of the methods that searched for the last orbit.
-    effort: f64,
 }
 
 impl<'a> WithFallback<'a> {
@@ -169,31 +166,12 @@ impl<'a> WithFallback<'a> {
         Some((name, build_named(name)?.solver(system).ok()?))
     }
 
-    /// Searches with the first method, and with the second if the first reports an error that
-    /// the second may avoid.
-    fn search(&mut self, omega: f64, start: Option<&[f64]>, between: bool) -> Result<Orbit, OrbitError> {
-        let by = |solver: &mut (dyn Solver + Send + 'a), start| match between {
-            true => solver.orbit_without_estimate(omega, start),
-            false => solver.orbit(omega, start),
-        };
-        let own = start.filter(|start| self.last.as_deref() != Some(*start));
-        let found = by(&mut *self.first, own);
-        self.effort = self.first.work_fraction();
-        let error = match found {
-            Err(error) if may_succeed_elsewhere(&error) => error,
-            outcome => return outcome,
-        };
+    /// Returns the second method with its name, made at the first use.
+    fn second(&mut self) -> Option<&mut (&'static str, Box<dyn Solver + Send + 'a>)> {
         if self.second.is_none() {
             self.second = Some(self.fallback());
         }
-        let Some((name, second)) = self.second.as_mut().and_then(Option::as_mut) else { return Err(error) };
-        let near = start.filter(|start| self.last.as_deref() == Some(*start)).or(error.candidate());
-        let found = by(&mut **second, near);
-        self.effort += second.work_fraction();
-        let mut orbit = found.map_err(|_| error.with_failed_alternative(name))?;
-        orbit.evidence.fallback_from = Some(self.chosen);
-        self.last = Some(orbit.initial_state.clone());
-        Ok(orbit)
+        self.second.as_mut()?.as_mut()
     }
 }
 
@@ -215,20 +193,23 @@ fn may_succeed_elsewhere(error: &OrbitError) -> bool {
 }
 
 impl Solver for WithFallback<'_> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.search(omega, start, false)
-    }
-    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.search(omega, start, true)
-    }
-    fn work_fraction(&self) -> f64 {
-        self.effort
-    }
-    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
-        match self.second.as_mut().and_then(Option::as_mut).filter(|_| self.last.as_deref() == Some(start)) {
-            Some((_, second)) => second.begin_branch(omega, start),
-            None => self.first.begin_branch(omega, start),
-        }
+    /// Searches with the first method, and with the second if the first reports an error that
+    /// the second may avoid.
+    fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        // the first method cannot use an orbit of the second one
+        let by_second = request.seed.filter(|seed| seed.by_fallback);
+        let own = Request { seed: request.seed.filter(|seed| !seed.by_fallback), ..*request };
+        let error = match self.first.solve(&own, budget) {
+            Err(error) if may_succeed_elsewhere(&error) => error,
+            outcome => return outcome,
+        };
+        let chosen = self.chosen;
+        let Some((name, second)) = self.second() else { return Err(error) };
+        let candidate = error.candidate().map(|state| Seed::from_state(request.omega, state.to_vec()));
+        let near = Request { seed: by_second.or(candidate.as_ref()), ..*request };
+        let mut orbit = second.solve(&near, budget).map_err(|_| error.with_failed_alternative(name))?;
+        orbit.evidence.fallback_from = Some(chosen);
+        Ok(orbit)
     }
 }
 
@@ -304,9 +285,9 @@ mod tests {
     struct FailingSolver;
 
     impl Solver for FailingSolver {
-        fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-            assert!(start.is_none());
-            Err(OrbitError::not_converged("nothing", omega, 1, 1.0))
+        fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+            assert!(request.seed.is_none());
+            Err(OrbitError::not_converged("nothing", request.omega, 1, 1.0))
         }
     }
 
@@ -315,9 +296,9 @@ mod tests {
         let system = example::blade_couple().assemble().unwrap();
         for (chosen, next) in [("event-driven", "harmonic-balance"), ("harmonic-balance", "event-driven")] {
             let first = Box::new(FailingSolver);
-            let mut solver = WithFallback { first, chosen, system: &system, second: None, last: None, effort: 0.0 };
-            let orbit = solver.orbit(TAU * 121.0, None).unwrap();
-            let neighbour = solver.orbit(TAU * 121.1, Some(&orbit.initial_state)).unwrap();
+            let mut solver = WithFallback { first, chosen, system: &system, second: None };
+            let orbit = solver.orbit(TAU * 121.0).unwrap();
+            let neighbour = solver.orbit_near(TAU * 121.1, Some(&orbit.seed())).unwrap();
             assert_eq!((orbit.method, neighbour.method), (next, next));
             assert_eq!(orbit.evidence.fallback_from, Some(chosen));
         }
@@ -329,9 +310,8 @@ mod tests {
         let system = example::blade_couple().assemble().unwrap();
         let second = Some(Some(("harmonic-balance", Box::new(FailingSolver) as Box<dyn Solver + Send>)));
         let first = Box::new(FailingSolver);
-        let mut solver =
-            WithFallback { first, chosen: "event-driven", system: &system, second, last: None, effort: 0.0 };
-        let said = solver.orbit(TAU * 121.0, None).unwrap_err().to_string();
+        let mut solver = WithFallback { first, chosen: "event-driven", system: &system, second };
+        let said = solver.orbit(TAU * 121.0).unwrap_err().to_string();
         assert!(said.ends_with("; `harmonic-balance` found no orbit either"), "{said}");
     }
 
@@ -343,7 +323,7 @@ mod tests {
         model.forces.push(Force { on: "b0".to_owned(), amplitude: 5.0, phase: 0.0, harmonic: 1 });
         let system = model.assemble().unwrap();
         let method = HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() };
-        let error = method.solver(&system).unwrap().orbit(TAU * 112.0, None).unwrap_err();
+        let error = method.solver(&system).unwrap().orbit(TAU * 112.0).unwrap_err();
         let OrbitError::Truncation { harmonics, needed: Some(needed), .. } = error else { panic!("{error}") };
         assert!(harmonics < 100 && needed > 500, "{harmonics} {needed}");
         assert!(error.to_string().contains("jenkins"), "{error}");

@@ -19,11 +19,13 @@
 //! - `static_equilibrium`: the equilibrium under the constant loads
 //! - `alternatives`, `with_alternatives`: methods that take a system instead of one that does not
 //! - `traits`, `options`, `error`, `list`: the interface of a method
+//! - `budget`: bound on the work of a search
 //!
 //! `time_history` integrates a motion from given displacements, without an orbit.
 
 mod alternatives;
 pub mod auto;
+mod budget;
 mod error;
 pub mod event_driven;
 mod flow;
@@ -38,13 +40,14 @@ mod traits;
 pub mod transient;
 mod with_alternatives;
 
-pub use crate::orbit::{IntegrationError, OrbitError};
+pub use crate::orbit::{IntegrationError, OrbitError, Seed};
 pub use alternatives::Alternatives;
+pub use budget::Budget;
 pub use error::{MethodError, Refusal};
 use list::LIST;
 pub use options::{MethodOption, Options, WIDTH};
 pub use static_equilibrium::StaticEquilibrium;
-pub use traits::{Choice, Method, MethodInfo, Solver};
+pub use traits::{Choice, ErrorEstimate, Method, MethodInfo, Request, Solver};
 pub use with_alternatives::{alternatives, solver_with_alternatives};
 
 /// All methods: `auto` and the rows of `list.rs`.

@@ -23,7 +23,9 @@ use super::orbit_search::return_map::{
 };
 use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
-use super::{IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Solver, WIDTH};
+use super::{
+    Budget, IntegrationError, Method, MethodError, MethodInfo, MethodOption, OrbitError, Request, Solver, WIDTH,
+};
 use crate::dimension::Dimension;
 use crate::model::System;
 use crate::orbit::postprocess::{CONSERVATIVE_WORK, results};
@@ -117,7 +119,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// let mut model = stickslip::model::example::blade_couple();
 /// model.joints[0].law = Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 });
 /// let system = model.assemble().unwrap();
-/// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
+/// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25).unwrap();
 /// assert!(orbit.evidence.residual < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -621,12 +623,14 @@ impl<'a> ShootingSolver<'a> {
             return_map: if at_its_limit { DMatrix::zeros(0, 0) } else { closed.derivative },
             contracts: self.contracts,
             path: Arc::new(path),
+            series: None,
         }
     }
 }
 
 impl Solver for ShootingSolver<'_> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let (omega, start) = (request.omega, request.seed.map(|seed| &seed.state[..]));
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
@@ -714,7 +718,7 @@ mod tests {
             ..Model::default()
         };
         let system = model.assemble().unwrap();
-        let orbit = Shooting::default().solver(&system).unwrap().orbit(20.0, None).unwrap();
+        let orbit = Shooting::default().solver(&system).unwrap().orbit(20.0).unwrap();
         let (place, expected) = (&orbit.places[0], 3.8 / 1.8e3);
         assert!((place.mean / expected - 1.0).abs() < 1e-9 && place.amplitude() < 1e-9 * expected, "{place:?}");
         assert!(orbit.evidence.energy_gap < 1e-5, "{:?}", orbit.evidence);

@@ -1,8 +1,8 @@
 //! The traits of methods and solvers, and the row of the table of methods.
 
-use super::{MethodError, MethodOption, Options, OrbitError};
+use super::{Budget, MethodError, MethodOption, Options, OrbitError};
 use crate::model::System;
-use crate::orbit::Orbit;
+use crate::orbit::{Orbit, Seed};
 
 /// A method: makes solvers that find the orbits of a system.
 pub trait Method: Send + Sync + std::fmt::Debug {
@@ -47,38 +47,75 @@ impl std::fmt::Display for Choice {
     }
 }
 
+/// One orbit to find.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// Excitation frequency, rad/s, positive.
+    pub omega: f64,
+    /// A neighbouring orbit, from which the search begins. Without one, the method makes its own
+    /// initial guess.
+    pub seed: Option<&'a Seed>,
+    /// Whether an error estimate that costs extra is needed.
+    pub estimate: ErrorEstimate,
+}
+
+impl<'a> Request<'a> {
+    /// Requests the orbit at a frequency (rad/s), with an error estimate.
+    pub fn at(omega: f64) -> Self {
+        Request { omega, seed: None, estimate: ErrorEstimate::Required }
+    }
+
+    /// Begins the search from a neighbouring orbit, if there is one.
+    pub fn near(self, seed: Option<&'a Seed>) -> Self {
+        Request { seed, ..self }
+    }
+
+    /// Skips an error estimate that costs extra: for searches between orbits with known errors.
+    pub fn without_estimate(self) -> Self {
+        Request { estimate: ErrorEstimate::Skipped, ..self }
+    }
+}
+
+/// Whether an error estimate that costs extra is needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorEstimate {
+    /// Every orbit gets an error estimate, if the method has one.
+    Required,
+    /// The orbit may have no error estimate.
+    Skipped,
+}
+
 /// Finds orbits of one system.
 pub trait Solver {
-    /// Finds the orbit at the excitation frequency `omega` (rad/s, positive).
+    /// Finds one orbit and charges the work to the budget.
     ///
-    /// `start` is the warm start: the state of a neighbouring orbit.
-    ///
-    /// # Errors
-    /// Returns [`OrbitError`] if the solver finds no orbit. The error says how far the solver
-    /// got and what to try. A motion that did not converge is never returned as an orbit.
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError>;
-
-    /// Finds the same orbit, but skips an error estimate that costs extra.
-    ///
-    /// Use it for searches between orbits with known errors.
+    /// The evidence of the orbit names the algorithm that found it
+    /// ([`Evidence::found_by`](crate::orbit::Evidence::found_by)), and [`Orbit::seed`] begins the
+    /// next search.
     ///
     /// # Errors
-    /// Same as [`Solver::orbit`].
-    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.orbit(omega, start)
-    }
+    /// Returns [`OrbitError`] if the solver finds no orbit within the budget. The error says how
+    /// far the solver got and what to try. A motion that did not converge is never returned as an
+    /// orbit.
+    fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError>;
 
-    /// Returns the work of the last search as a fraction of the work limit of one point.
+    /// Finds the orbit at the excitation frequency `omega` (rad/s, positive), without a seed and
+    /// within the budget of one orbit.
     ///
-    /// Methods that do not count work return zero. A search through many orbits stops by this
-    /// number, not by the clock, so its result does not depend on the machine.
-    fn work_fraction(&self) -> f64 {
-        0.0
+    /// # Errors
+    /// Same as [`Solver::solve`].
+    fn orbit(&mut self, omega: f64) -> Result<Orbit, OrbitError> {
+        self.solve(&Request::at(omega), &mut Budget::default())
     }
 
-    /// Announces that the next searches continue along the branch of the orbit with the state
-    /// `start` at the frequency `omega` (rad/s).
-    fn begin_branch(&mut self, _omega: f64, _start: &[f64]) {}
+    /// Finds the orbit at the excitation frequency `omega` (rad/s, positive) near another orbit,
+    /// if there is one, within the budget of one orbit.
+    ///
+    /// # Errors
+    /// Same as [`Solver::solve`].
+    fn orbit_near(&mut self, omega: f64, seed: Option<&Seed>) -> Result<Orbit, OrbitError> {
+        self.solve(&Request { seed, ..Request::at(omega) }, &mut Budget::default())
+    }
 }
 
 /// A row of the table of methods.

@@ -69,8 +69,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// use stickslip::method::{Method, event_driven::EventDriven, transient::Transient};
 /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
 /// let omega = std::f64::consts::TAU * 121.25;
-/// let waited = Transient::default().solver(&system).unwrap().orbit(omega, None).unwrap();
-/// let found = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+/// let waited = Transient::default().solver(&system).unwrap().orbit(omega).unwrap();
+/// let found = EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
 /// assert!((waited.places[0].amplitude() / found.places[0].amplitude() - 1.0).abs() < 1e-6);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,8 @@
 
 use super::list::LIST;
 use super::{
-    Alternatives, Method, MethodError, MethodInfo, Options, OrbitError, Solver, WIDTH, event_driven, transient,
+    Alternatives, Budget, Method, MethodError, MethodInfo, Options, OrbitError, Request, Solver, WIDTH, event_driven,
+    transient,
 };
 use crate::model::System;
 use crate::orbit::Orbit;
@@ -78,17 +79,8 @@ struct WithAlternatives<'a> {
 }
 
 impl Solver for WithAlternatives<'_> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.solver.orbit(omega, start).map_err(|error| with_alternatives(error, self.system))
-    }
-    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.solver.orbit_without_estimate(omega, start).map_err(|error| with_alternatives(error, self.system))
-    }
-    fn work_fraction(&self) -> f64 {
-        self.solver.work_fraction()
-    }
-    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
-        self.solver.begin_branch(omega, start);
+    fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        self.solver.solve(request, budget).map_err(|error| with_alternatives(error, self.system))
     }
 }
 
@@ -147,10 +139,8 @@ mod tests {
             model.joints[0].law = law;
             let system = model.assemble().unwrap();
             let method = HarmonicBalance { tolerance: Some(1e-11), ..HarmonicBalance::default() };
-            let error = solver_with_alternatives(&method, &system)
-                .unwrap()
-                .orbit(std::f64::consts::TAU * 121.0, None)
-                .unwrap_err();
+            let error =
+                solver_with_alternatives(&method, &system).unwrap().orbit(std::f64::consts::TAU * 121.0).unwrap_err();
             let said = error.to_string();
             assert!(matches!(error, OrbitError::Truncation { .. }), "{said}");
             assert!(said.contains(named) && !said.contains(unnamed), "{said}");

@@ -10,6 +10,7 @@ mod motion;
 mod path;
 pub(crate) mod postprocess;
 mod sampled_path;
+mod seed;
 mod stability;
 
 pub use crate::law::Contact;
@@ -20,6 +21,8 @@ pub use evidence::{Accuracy, Evidence};
 pub use motion::{Energy, JointMotion, PlaceMotion, Symmetry};
 use nalgebra::DMatrix;
 pub use path::{JointSample, Path, Sample};
+pub(crate) use seed::JointSeries;
+pub use seed::Seed;
 pub use stability::Stability;
 use std::fmt;
 use std::sync::Arc;
@@ -53,6 +56,8 @@ pub struct Orbit {
     /// No two motions of the system diverge: [`crate::model::System::is_incrementally_stable`].
     pub(crate) contracts: bool,
     pub(crate) path: Arc<dyn Path>,
+    /// Series of the joints, if harmonic balance found the orbit.
+    pub(crate) series: Option<Arc<JointSeries>>,
 }
 
 /// Returns the laws of a system's joints.
@@ -245,6 +250,7 @@ impl Orbit {
             return_map: DMatrix::zeros(0, 0),
             contracts: system.is_incrementally_stable(),
             path,
+            series: None,
         })
     }
 

@@ -47,9 +47,9 @@ fn contacts_of_a_block_move_as_in_time() {
     for (nodes, omega) in [(1, 0.6 * FIRST), (2, 0.8 * FIRST)] {
         let system = cube(nodes);
         let balance = HarmonicBalance { harmonics: Some(9), ..HarmonicBalance::default() };
-        let series = balance.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let series = balance.solver(&system).unwrap().orbit(omega).unwrap();
         let shooting = Shooting { tolerance: STEP, ..Shooting::default() };
-        let in_time = shooting.solver(&system).unwrap().orbit(omega, Some(&series.initial_state)).unwrap();
+        let in_time = shooting.solver(&system).unwrap().orbit_near(omega, Some(&series.seed())).unwrap();
         let slip = series.joints.iter().map(|joint| joint.slip_fraction).fold(0.0, f64::max);
         assert!(slip > 0.1 && slip < 0.99, "{nodes}: {slip}");
         let truncation = series.evidence.error_estimate.unwrap();

@@ -211,7 +211,7 @@ fn larger_basis_system(model: &Model, system: &System) -> Option<System> {
 
 /// Returns the difference of a point from the orbit in the larger basis, if that converges.
 fn compare_point(farther: &System, method: &dyn Method, point: &CurvePoint) -> Option<BasisDifference> {
-    let orbit = method.solver(farther).ok()?.orbit(point.omega, None).ok()?;
+    let orbit = method.solver(farther).ok()?.orbit(point.omega).ok()?;
     let reduced = farther.reduced()?;
     let differences =
         orbit.places.iter().zip(&point.amplitudes).map(|(there, here)| (there.length_amplitude() - here).abs());

@@ -2,7 +2,7 @@
 
 use super::bracket_reduction::{BracketReduction, negative_inverse_square, parabola};
 use super::{CurvePoint, Peak, QuantityPeak, UnresolvedPeak};
-use crate::method::Solver;
+use crate::method::{Budget, Request, Solver};
 use crate::orbit::Orbit;
 use std::collections::BTreeMap;
 
@@ -37,8 +37,6 @@ pub(super) const MIN_DISTANCE: f64 = 1e-7;
 /// Maximum number of orbits for the peak of one quantity, in addition to the orbits of other
 /// quantities. Smooth peaks take 3 to 6, kinks up to 15.
 pub(super) const MAX_ORBITS: usize = 40;
-/// Work limit of the search for one peak, relative to the work limit of a point.
-const WORK_LIMIT: f64 = 1.0;
 
 /// Three points of a curve, with a maximum of some quantities in the middle, and the orbits that
 /// the searches added between them.
@@ -62,30 +60,28 @@ impl Bracket {
         vertex_value(&self.points[top - 1..=top + 1], quantity)
     }
 
-    /// Computes orbits until the peak of a quantity is found.
+    /// Computes orbits until the peak of a quantity is found, within the budget of one point.
     pub(super) fn refine(&mut self, solver: &mut dyn Solver, quantity: usize, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
         let points = &mut self.points;
         let mut shrink = BracketReduction::default();
-        let (mut failures, mut effort) = (0, 0.0);
+        let (mut failures, mut budget) = (0, Budget::default());
         for _ in 0..MAX_ORBITS {
             let best = highest_inner(points, quantity);
             let Some(omega) = shrink.next(points, best, quantity, MIN_DISTANCE * self.width) else { break };
-            if failures == MAX_FAILURES || effort > WORK_LIMIT {
+            if failures == MAX_FAILURES || budget.is_used_up() {
                 break;
             }
             // The highest point is a sufficient initial guess on either side.
-            let start = points[best].start.as_deref();
             let error = points[best].error;
-            start.into_iter().for_each(|start| solver.begin_branch(points[best].omega, start));
-            let found = match solver.orbit_without_estimate(omega, start) {
+            let request = Request::at(omega).near(points[best].seed.as_ref());
+            let found = match solver.solve(&request.without_estimate(), &mut budget) {
                 // Far from the neighbour, all fallbacks are tried; close to it they gain
                 // nothing.
                 Err(_) if (omega - points[best].omega).abs() > FALLBACK_DISTANCE * self.width => {
-                    solver.orbit(omega, start)
+                    solver.solve(&request, &mut budget)
                 }
                 found => found,
             };
-            effort += solver.work_fraction();
             let point = match found {
                 Ok(orbit) => CurvePoint { omega, error, ..CurvePoint::new(&orbit, quantities) },
                 Err(_) => {
@@ -241,8 +237,8 @@ mod tests {
     struct Nothing;
 
     impl Solver for Nothing {
-        fn orbit(&mut self, omega: f64, _: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-            Err(OrbitError::Frequency { omega })
+        fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+            Err(OrbitError::Frequency { omega: request.omega })
         }
     }
 
@@ -250,7 +246,7 @@ mod tests {
     fn orbits_that_fail_leave_the_point_of_the_grid() {
         let curve = |w: f64| 2.0 - (w - 1.0).powi(2);
         let near =
-            [0.9, 1.01, 1.1].map(|omega| CurvePoint { omega, values: vec![curve(omega)], start: None, error: 0.0 });
+            [0.9, 1.01, 1.1].map(|omega| CurvePoint { omega, values: vec![curve(omega)], seed: None, error: 0.0 });
         let peak = refine(&mut Nothing, &near, &[0], &|_| Vec::new())[0].peak;
         assert_eq!(
             (peak.omega, peak.value, peak.unresolved),

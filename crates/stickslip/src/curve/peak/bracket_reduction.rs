@@ -136,7 +136,7 @@ mod tests {
     /// Refines the middle one of three points of a given curve. Returns frequency, value and
     /// number of evaluations.
     fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
-        let point = |omega: f64| CurvePoint { omega, values: vec![curve(omega)], start: None, error: 0.0 };
+        let point = |omega: f64| CurvePoint { omega, values: vec![curve(omega)], seed: None, error: 0.0 };
         let mut points = vec![point(a), point(x), point(b)];
         let mut shrink = BracketReduction::default();
         let mut count = 0;

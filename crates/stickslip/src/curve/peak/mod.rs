@@ -44,7 +44,7 @@ const REFINED_CANDIDATE_RATIO: f64 = 0.95;
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
 /// let omegas = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i)));
-/// let points: Vec<CurvePoint> = omegas.map(|w| CurvePoint::new(&solver.orbit(w, None).unwrap(), &amplitude)).collect();
+/// let points: Vec<CurvePoint> = omegas.map(|w| CurvePoint::new(&solver.orbit(w).unwrap(), &amplitude)).collect();
 /// let peak = highest_peak(&mut *solver, &points, 1, &amplitude).unwrap();
 /// assert!((peak.value - 0.032_338).abs() < 1e-6);
 /// ```
@@ -121,7 +121,7 @@ pub fn held_amplitude(system: &System, omega: f64) -> f64 {
 /// let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect();
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let points: Vec<CurvePoint> = (0..9)
-///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i)), None).unwrap())
+///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i))).unwrap())
 ///     .map(|orbit| CurvePoint::new(&orbit, &amplitudes))
 ///     .collect();
 /// let peaks = local_peaks(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
@@ -166,11 +166,12 @@ mod tests {
     use super::bracket_reduction::MIN_RISE;
     use super::*;
     use crate::method::event_driven::EventDriven;
+    use crate::method::{Budget, Request};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
 
     #[test]
     fn level_curves_and_failed_neighbours_have_no_peak() {
-        let point = |values: &[f64]| CurvePoint { omega: 1.0, values: values.to_vec(), start: None, error: 0.0 };
+        let point = |values: &[f64]| CurvePoint { omega: 1.0, values: values.to_vec(), seed: None, error: 0.0 };
         assert!(!is_maximum(&[point(&[1.0]), point(&[1.0 + 1e-13]), point(&[1.0])], 0));
         assert!(!is_maximum(&[point(&[]), point(&[2.0]), point(&[1.0])], 0));
         assert!(is_maximum(&[point(&[1.0]), point(&[2.0]), point(&[1.0])], 0));
@@ -190,7 +191,7 @@ mod tests {
         let system = model.assemble().unwrap();
         let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
         let mut solver = EventDriven.solver(&system).unwrap();
-        let mut point = |i: i32| CurvePoint::new(&solver.orbit(82.5 + 5.0 * f64::from(i), None).unwrap(), &amplitudes);
+        let mut point = |i: i32| CurvePoint::new(&solver.orbit(82.5 + 5.0 * f64::from(i)).unwrap(), &amplitudes);
         let points: Vec<CurvePoint> = (0..13).map(&mut point).collect();
         let peak = highest_peak(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
         // F / (c √(k/m - c²/4m²))
@@ -215,9 +216,7 @@ mod tests {
             let points: Vec<CurvePoint> = (0..9)
                 .map(|i| 95.3 + 1.1 * f64::from(i))
                 .map(|omega| {
-                    solver
-                        .orbit(omega, None)
-                        .map_or(CurvePoint::failed(omega), |orbit| CurvePoint::new(&orbit, &amplitude))
+                    solver.orbit(omega).map_or(CurvePoint::failed(omega), |orbit| CurvePoint::new(&orbit, &amplitude))
                 })
                 .collect();
             highest_peak(&mut *solver, &points, 1, &amplitude).unwrap()
@@ -243,9 +242,9 @@ mod tests {
             let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
             let (mut solver, mut found) = (EventDriven.solver(&system).unwrap(), Vec::<CurvePoint>::new());
             for i in 0..=points {
-                let start = found.last().and_then(|point| point.start.as_deref());
                 let omega = 100.0 + 30.0 * i as f64 / points as f64;
-                let orbit = solver.orbit(omega, start);
+                let seed = found.last().and_then(|point| point.seed.as_ref());
+                let orbit = solver.solve(&Request::at(omega).near(seed), &mut Budget::default());
                 found.push(orbit.map_or(CurvePoint::failed(omega), |orbit| CurvePoint::new(&orbit, &amplitude)));
             }
             highest_peak(&mut *solver, &found, 1, &amplitude).unwrap()

@@ -1,6 +1,6 @@
 //! Points of a curve, and its peaks.
 
-use crate::orbit::Orbit;
+use crate::orbit::{Orbit, Seed};
 
 /// A refined peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,8 +61,8 @@ pub struct CurvePoint {
     pub omega: f64,
     /// The quantities; empty if there is no orbit.
     pub values: Vec<f64>,
-    /// State of the orbit, an initial guess for its neighbours.
-    pub start: Option<Vec<f64>>,
+    /// The orbit, from which the search for its neighbours begins.
+    pub seed: Option<Seed>,
     /// Estimated relative error of the quantities; zero for exact orbits.
     pub error: f64,
 }
@@ -71,12 +71,12 @@ impl CurvePoint {
     /// Extracts the data of an orbit that a curve needs.
     pub fn new(orbit: &Orbit, quantities: &dyn Fn(&Orbit) -> Vec<f64>) -> Self {
         let error = orbit.evidence.error_estimate.unwrap_or(0.0);
-        CurvePoint { omega: orbit.omega, values: quantities(orbit), start: Some(orbit.initial_state.clone()), error }
+        CurvePoint { omega: orbit.omega, values: quantities(orbit), seed: Some(orbit.seed()), error }
     }
 
     /// Creates a point without an orbit.
     pub fn failed(omega: f64) -> Self {
-        CurvePoint { omega, values: Vec::new(), start: None, error: 0.0 }
+        CurvePoint { omega, values: Vec::new(), seed: None, error: 0.0 }
     }
 
     /// Returns a quantity; negative infinity if there is no orbit.

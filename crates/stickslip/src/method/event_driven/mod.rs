@@ -39,7 +39,7 @@ use super::orbit_search::residual_traction::{ElasticSlider, OrbitMap, select_equ
 use super::orbit_search::return_map::{ClosedState, ClosingMethod, ClosingTargets, ReturnMap, iterate_map};
 use super::orbit_search::vibration_share;
 use super::static_equilibrium::{StaticEquilibrium, states_at};
-use super::{IntegrationError, Method, MethodError, MethodInfo, OrbitError, Solver};
+use super::{Budget, IntegrationError, Method, MethodError, MethodInfo, OrbitError, Request, Solver};
 use crate::model::System;
 use crate::orbit::{Orbit, Symmetry};
 use nalgebra::DMatrix;
@@ -73,7 +73,7 @@ const SUPPORT_TOLERANCE: f64 = 1e-12;
 /// ```
 /// use stickslip::method::{Method, event_driven::EventDriven};
 /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
-/// let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25, None).unwrap();
+/// let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25).unwrap();
 /// assert!((orbit.place("blade1").unwrap().amplitude() - 0.0489246).abs() < 1e-6);
 /// assert!(orbit.evidence.energy_gap < 1e-9);
 /// ```
@@ -240,7 +240,8 @@ impl<'a> ExactSolver<'a> {
 }
 
 impl Solver for ExactSolver<'_> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
+    fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let (omega, start) = (request.omega, request.seed.map(|seed| &seed.state[..]));
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
         }
@@ -300,6 +301,7 @@ impl Solver for ExactSolver<'_> {
 mod tests {
     use super::*;
     use crate::law::Coulomb;
+    use crate::method::Seed;
     use crate::method::transient::Transient;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
 
@@ -312,11 +314,12 @@ mod tests {
         model.joints[0].law = Arc::new(Coulomb { limit: 8.0 });
         let system = model.assemble().unwrap();
         let mut solver = EventDriven.solver(&system).unwrap();
-        let mut orbit = |hertz: f64, start: Option<&[f64]>| solver.orbit(std::f64::consts::TAU * hertz, start).unwrap();
+        let mut orbit =
+            |hertz: f64, seed: Option<&Seed>| solver.orbit_near(std::f64::consts::TAU * hertz, seed).unwrap();
         let cold = orbit(121.0, None);
         for neighbour in [120.9875, 121.0125] {
-            let start = orbit(neighbour, None).initial_state;
-            let warm = orbit(121.0, Some(&start));
+            let seed = orbit(neighbour, None).seed();
+            let warm = orbit(121.0, Some(&seed));
             assert!(warm.evidence.iterations <= 5, "{} iterations from {neighbour} Hz", warm.evidence.iterations);
             for (one, other) in warm.places.iter().zip(&cold.places) {
                 let apart = (one.amplitude() / other.amplitude() - 1.0).abs();
@@ -348,13 +351,13 @@ mod tests {
         for omega in [1000f64.sqrt(), 31.622_77, 31.62] {
             let waits = Transient::default();
             for method in [&EventDriven as &dyn Method, &waits] {
-                let orbit = method.solver(&held).unwrap().orbit(omega, None);
+                let orbit = method.solver(&held).unwrap().orbit(omega);
                 let amplitude = orbit.unwrap_or_else(|error| panic!("{omega}: {error}")).places[0].amplitude();
                 assert!((amplitude / 1.618e-4 - 1.0).abs() < 1e-3, "{omega}: {amplitude}");
             }
         }
         for method in [&EventDriven as &dyn Method, &Transient { periods: 200, ..Transient::default() }] {
-            assert!(method.solver(&let_go).unwrap().orbit(1000f64.sqrt(), None).is_err(), "{}", method.name());
+            assert!(method.solver(&let_go).unwrap().orbit(1000f64.sqrt()).is_err(), "{}", method.name());
         }
     }
 
@@ -382,7 +385,7 @@ mod tests {
     fn uncoupled_light_body_changes_no_orbit() {
         let amplitude = |mass: f64| {
             let system = with_another(mass, [GROUND, GROUND], 1e4).assemble().unwrap();
-            let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0, None).unwrap();
+            let orbit = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0).unwrap();
             orbit.places[0].amplitude()
         };
         let alone = amplitude(1.0);
@@ -398,11 +401,11 @@ mod tests {
         let orbit = |mass: f64| -> Result<f64, String> {
             let system = with_another(mass, ["b", GROUND], 0.0).assemble().unwrap();
             let mut solver = EventDriven.solver(&system).map_err(|error| error.to_string())?;
-            let orbit = solver.orbit(std::f64::consts::TAU * 16.0, None).map_err(|error| error.to_string())?;
+            let orbit = solver.orbit(std::f64::consts::TAU * 16.0).map_err(|error| error.to_string())?;
             Ok(orbit.places[0].amplitude())
         };
         let system = with_another(1.0, [GROUND, GROUND], 1e4).assemble().unwrap();
-        let alone = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0, None).unwrap();
+        let alone = EventDriven.solver(&system).unwrap().orbit(std::f64::consts::TAU * 16.0).unwrap();
         for mass in [1e-3, 1e-6, 1.1e-8] {
             let found = orbit(mass).unwrap();
             assert!((found / alone.places[0].amplitude() - 1.0).abs() < 1e-9, "{mass}: {found}");
@@ -434,7 +437,7 @@ mod tests {
                     forces: vec![Force { phase: 0.0, ..force(constant, 0) }, force(peak - constant, 1)],
                     ..Model::default()
                 };
-                let orbit = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega, None);
+                let orbit = EventDriven.solver(&model.assemble().unwrap()).unwrap().orbit(omega);
                 let orbit = orbit.unwrap_or_else(|error| panic!("{damping} {excess} {omega} {constant}: {error}"));
                 let place = &orbit.places[0];
                 let stuck = excess / stiffness..(2.0 * constant - excess) / stiffness;
@@ -462,7 +465,7 @@ mod tests {
         for exponent in 1..=28 {
             for sign in [-1.0, 1.0] {
                 let omega = natural * (1.0 + sign * 10f64.powf(-0.25 * f64::from(exponent)));
-                let orbit = solver.orbit(omega, None).unwrap_or_else(|error| panic!("{omega}: {error}"));
+                let orbit = solver.orbit(omega).unwrap_or_else(|error| panic!("{omega}: {error}"));
                 let expected = amplitude / (stiffness - mass * omega * omega).abs();
                 let error = (orbit.places[0].amplitude() / expected - 1.0).abs();
                 // cancellation in the denominator loses as many digits as the relative distance

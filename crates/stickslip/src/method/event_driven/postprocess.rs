@@ -87,6 +87,7 @@ pub(super) fn orbit(
         return_map: closed.derivative,
         contracts,
         path: Arc::new(path),
+        series: None,
     };
     vibration_share::rescale_evidence(&mut orbit.evidence, share);
     Ok(orbit)

@@ -280,7 +280,7 @@ mod tests {
     }
 
     fn shoot(system: &System, omega: f64) -> Orbit {
-        Shooting::default().solver(system).unwrap().orbit(omega, None).unwrap()
+        Shooting::default().solver(system).unwrap().orbit(omega).unwrap()
     }
 
     /// A width affects only laws that it smooths. A stop is integrated exactly at any width.
@@ -349,7 +349,7 @@ mod tests {
         let nothing = DMatrix::zeros(0, 0);
         let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
         let system = System::builder(empty).joint("led", Arc::new(TestLaw::Sliding), circle.to_vec()).build().unwrap();
-        let orbit = Transient::default().solver(&system).unwrap().orbit(2.0, None).unwrap();
+        let orbit = Transient::default().solver(&system).unwrap().orbit(2.0).unwrap();
         let (stiffness, limit) = SLIDING;
         let r = limit / stiffness;
         near(orbit.joints[0].dissipation, TAU * limit * (a * a - r * r).sqrt(), 1e-5);
@@ -381,7 +381,7 @@ mod tests {
             let empty = Structure::new(Vec::new(), nothing.clone(), nothing.clone(), nothing).unwrap();
             let system = System::builder(empty).joint("led", law.clone(), axes).build().unwrap();
             for method in methods {
-                let orbit = method.solver(&system).unwrap().orbit(2.0, None).unwrap();
+                let orbit = method.solver(&system).unwrap().orbit(2.0).unwrap();
                 let told = orbit.joints[0].slip_fraction;
                 assert!((told - slips).abs() < 1e-2, "{law:?} at {part} of its limit by {}: {told}", orbit.method);
             }
@@ -394,7 +394,7 @@ mod tests {
         let along = |row: usize| vec![Axis::new(vec![(row, 1.0)])];
         let jenkins: SharedLaw = Arc::new(Jenkins { stiffness: 4.0, limit: 0.3 });
         let exact_system = system(&[(jenkins.clone(), along(0))]);
-        let exact = event_driven::EventDriven.solver(&exact_system).unwrap().orbit(1.3, None).unwrap();
+        let exact = event_driven::EventDriven.solver(&exact_system).unwrap().orbit(1.3).unwrap();
         // a law that carries no force and does not consist of sliders
         let idle: SharedLaw = Arc::new(Gap { gap: 1e3, stiffness: 1.0 });
         let orbit = shoot(&system(&[(jenkins, along(0)), (idle, along(1))]), 1.3);
@@ -550,7 +550,7 @@ mod tests {
             let shooting = Shooting { period: periods, ..Shooting::default() };
             let waiting = Transient { period: periods, ..Transient::default() };
             for method in [&shooting as &dyn Method, &waiting] {
-                let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+                let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
                 assert_eq!(orbit.periods, periods);
                 near(orbit.period(), periods as f64 * TAU / omega, 1e-14);
                 // the Runge-Kutta grid misses the turning point by up to (h v')²
@@ -561,7 +561,7 @@ mod tests {
                 near(orbit.sample(orbit.period() - 1e-9).displacement[0], start, 1e-6);
             }
             if periods == 2 {
-                let orbit = Shooting::default().solver(&system).unwrap().orbit(omega, None).unwrap();
+                let orbit = Shooting::default().solver(&system).unwrap().orbit(omega).unwrap();
                 assert_eq!((orbit.periods, orbit.is_stable()), (1, Some(false)));
             }
         }
@@ -578,9 +578,9 @@ mod tests {
         let mut amplitudes = Vec::new();
         for method in [&shooting as &dyn Method, &exact, &series] {
             let mut solver = method.solver(&system).unwrap();
-            let first = solver.orbit(3.9, None).unwrap();
+            let first = solver.orbit(3.9).unwrap();
             assert_eq!((first.minimal_periods(), first.is_stable()), (1, Some(true)), "{}", method.name());
-            let orbit = solver.orbit(3.5, Some(&first.initial_state)).unwrap();
+            let orbit = solver.orbit_near(3.5, Some(&first.seed())).unwrap();
             assert_eq!((orbit.minimal_periods(), orbit.is_stable()), (2, Some(true)), "{}", method.name());
             amplitudes.push(orbit.places[0].amplitude());
         }
@@ -593,7 +593,7 @@ mod tests {
     #[test]
     fn waiting_ends_where_nothing_settles() {
         let wait = |system: &System, omega: f64| {
-            let error = Transient::default().solver(system).unwrap().orbit(omega, None).unwrap_err();
+            let error = Transient::default().solver(system).unwrap().orbit(omega).unwrap_err();
             assert_eq!(error.status(), "not-settled", "{error}");
             let OrbitError::Unsettled { returns, repeats, .. } = error else { panic!("{error}") };
             (returns, repeats)

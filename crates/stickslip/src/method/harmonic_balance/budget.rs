@@ -11,14 +11,6 @@ pub(super) const SEARCH_LIMIT: WorkShare = WorkShare { multiplications: 1.0, tim
 /// but one at most 0.4.
 pub(super) const POINT_LIMIT: WorkShare = WorkShare { multiplications: 3.0, time_steps: 1.0 };
 
-/// Number of consecutive failed points, each with more than [`REDUCED_SHARE`] of the work limit,
-/// after which the next points of the same solver get a smaller limit. One success restores the
-/// full limit.
-const EXPENSIVE_FAILURES: usize = 2;
-/// Share of the work limit that points get after such failures. Nearly all converged points use
-/// less, and a curve without orbits ends soon.
-pub(super) const REDUCED_SHARE: f64 = 0.1;
-
 /// Multiplications of one search; about four seconds on one core.
 pub(super) const SEARCH_MULTIPLICATIONS: f64 = 2e10;
 /// Least number of eliminations in the work limit of a search. A converging search takes a few.
@@ -45,12 +37,6 @@ const IMPROVES: f64 = 8.0;
 /// Returns the work limit of a point that found its first orbit with this work.
 pub(super) fn to_improve(taken: WorkShare) -> WorkShare {
     taken.times(IMPROVES)
-}
-
-/// Returns the work limit of the next point after this number of consecutive failed points that
-/// used more than [`REDUCED_SHARE`].
-pub(super) fn work_limit_after(in_vain: usize) -> WorkShare {
-    if in_vain < EXPENSIVE_FAILURES { POINT_LIMIT } else { POINT_LIMIT.times(REDUCED_SHARE) }
 }
 
 /// Work relative to the limit of one search.

@@ -39,7 +39,7 @@ pub(super) const SAMPLING_SHARE: f64 = 0.05;
 /// use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// let method = HarmonicBalance { harmonics: Some(15), ..HarmonicBalance::default() };
-/// let orbit = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0, None).unwrap();
+/// let orbit = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0).unwrap();
 /// assert!(orbit.evidence.error_estimate.unwrap() < 1e-4);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

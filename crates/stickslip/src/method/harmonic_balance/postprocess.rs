@@ -222,6 +222,7 @@ pub(super) fn orbit(
         return_map: derivative.unwrap_or_else(|| DMatrix::zeros(0, 0)),
         contracts,
         path: Arc::new(path),
+        series: None,
     })
 }
 

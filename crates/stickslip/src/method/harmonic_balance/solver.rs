@@ -1,7 +1,7 @@
 //! The solver of harmonic balance: one orbit after another, with warm starts.
 
 use super::aft::Ports;
-use super::budget::{self, POINT_LIMIT, WorkShare, is_affordable};
+use super::budget::{POINT_LIMIT, WorkShare, is_affordable};
 use super::dynamics::banded::{self, BandedForm};
 use super::dynamics::linear_dynamics::LinearDynamics;
 use super::equations::harmonic_set::HarmonicSet;
@@ -12,16 +12,15 @@ use super::memory_estimate::{MEMORY, check_memory, level_memory};
 use super::newton::SolveError;
 use super::options::{FIRST_HARMONICS, HarmonicBalance, NAME, TOLERANCE};
 use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
-use super::warm_start::{RECENT, RecentOrbit};
-use super::{cost_model, postprocess};
+use super::{cost_model, postprocess, warm_start};
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
-use crate::method::{MethodError, OrbitError, Solver};
+use crate::method::{Budget, ErrorEstimate, MethodError, OrbitError, Request, Solver};
 use crate::model::System;
-use crate::orbit::{ObservedMotion, Orbit};
+use crate::orbit::{JointSeries, ObservedMotion, Orbit, Seed};
 use nalgebra::DVector;
 use num_complex::Complex64;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Newton iterations from a warm start; 2 to 5 are usual.
@@ -68,16 +67,10 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) static_state: Option<Vec<f64>>,
     /// Equations by their highest harmonic.
     pub(super) discretizations: BTreeMap<usize, Discretization>,
-    /// Number of consecutive failed points that used much of the work limit, see
-    /// [`budget::REDUCED_SHARE`].
-    pub(super) expensive_failures: usize,
+    /// Work limit of the present point, relative to the default.
+    pub(super) point_limit: f64,
     /// Lower work limit of the present point, if it has an orbit whose error it tries to reduce.
     pub(super) limit: Option<WorkShare>,
-    /// The last orbits, newest first.
-    pub(super) recent: VecDeque<RecentOrbit>,
-    /// Frequency (rad/s) and state from which the next searches continue, see
-    /// [`Solver::begin_branch`].
-    pub(super) branch_start: Option<(f64, Vec<f64>)>,
     /// Frequencies (rad/s) without an orbit at which the motion was integrated in time, and how
     /// that motion behaved and ended.
     pub(super) failed_frequencies: Vec<(f64, ObservedMotion, Vec<f64>)>,
@@ -133,10 +126,8 @@ impl HarmonicBalanceSolver {
             system,
             static_state: static_start,
             discretizations: BTreeMap::new(),
-            expensive_failures: 0,
+            point_limit: 1.0,
             limit: None,
-            recent: VecDeque::new(),
-            branch_start: None,
             failed_frequencies: Vec::new(),
             time_integrations: 0,
             comparisons: BTreeMap::new(),
@@ -165,9 +156,10 @@ impl HarmonicBalanceSolver {
         Ok(discretization)
     }
 
-    /// Resets the work counters for a new point.
-    pub(super) fn begin_point(&mut self, excitation: f64) {
+    /// Resets the work counters for a new point with a work limit relative to the default.
+    pub(super) fn begin_point(&mut self, excitation: f64, limit: f64) {
         self.excitation_frequency = excitation;
+        self.point_limit = limit;
         self.limit = None;
         self.discretizations.values_mut().for_each(Discretization::begin_point);
     }
@@ -183,7 +175,7 @@ impl HarmonicBalanceSolver {
 
     /// Returns the work limit of the point.
     fn work_limit(&self) -> WorkShare {
-        let allowed = budget::work_limit_after(self.expensive_failures);
+        let allowed = POINT_LIMIT.times(self.point_limit.min(1.0));
         self.limit.map_or(allowed, |limit| limit.and_at_most(allowed))
     }
 
@@ -192,17 +184,10 @@ impl HarmonicBalanceSolver {
         self.work_used(None).exceeds(self.work_limit())
     }
 
-    /// Ends a point. Counts consecutive expensive failures, which shrink the limit of the next
-    /// point.
-    fn end_point(&mut self, found: Result<Orbit, OrbitError>) -> Result<Orbit, OrbitError> {
-        match &found {
-            Ok(_) => self.expensive_failures = 0,
-            Err(_) if self.work_used(None).exceeds(POINT_LIMIT.times(budget::REDUCED_SHARE)) => {
-                self.expensive_failures += 1
-            }
-            Err(_) => {}
-        }
-        found
+    /// Returns the work of the point as a fraction of the default limit.
+    fn work_fraction(&self) -> f64 {
+        let WorkShare { multiplications, time_steps } = self.work_used(None);
+        (multiplications / POINT_LIMIT.multiplications).max(time_steps / POINT_LIMIT.time_steps)
     }
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in
@@ -323,14 +308,8 @@ impl HarmonicBalanceSolver {
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
         let orbit = self.orbit_of(top, omega, &motion, x, truncation)?;
-        self.recent.truncate(RECENT - 1);
-        self.recent.push_front(RecentOrbit {
-            start: orbit.initial_state.clone(),
-            omega,
-            highest_harmonic: top,
-            solution: motion,
-        });
-        Ok(orbit)
+        let series = motion.into_series(omega, top);
+        Ok(Orbit { series: Some(Arc::new(series)), ..orbit })
     }
 
     /// Makes the orbit of a solution and checks its energy balance.
@@ -416,101 +395,67 @@ impl HarmonicBalanceSolver {
         unique || self.discretizations.get(&top).is_some_and(Discretization::uses_krylov)
     }
 
-    /// Returns the initial guess.
-    ///
-    /// If `start` belongs to an orbit of this solver, the guess is a warm start. If it belongs
-    /// to an orbit of another solver and several orbits may exist, the guess comes from a time
-    /// integration that begins there.
-    pub(super) fn initial_guess(&mut self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
-        let foreign = start.filter(|start| self.recent.iter().all(|recent| recent.start != *start));
-        let led =
-            foreign.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.guess_from_state(start, omega));
-        led.or_else(|| self.warm_start(start, omega))
-    }
-
-    /// Returns the index of the recent orbit with this start.
-    fn recent_with_start(&self, start: &[f64]) -> Option<usize> {
-        self.recent.iter().position(|recent| recent.start == start)
-    }
-
-    /// Returns the index of the recent orbit that tells how many harmonics a search from
-    /// `start` needs.
-    ///
-    /// This is the orbit with that start. Otherwise, if `start` is the announced state of
-    /// [`Solver::begin_branch`], it is the orbit at the nearest frequency, provided that it is
-    /// nearer than that state.
-    fn recent_for_length(&self, start: &[f64], omega: f64) -> Option<usize> {
-        let distance = |at: &usize| (self.recent[*at].omega - omega).abs();
-        let nearer = || {
-            let (from, _) = self.branch_start.as_ref().filter(|(_, begun)| begun == start)?;
-            let nearest = (0..self.recent.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-            (distance(&nearest) <= (from - omega).abs()).then_some(nearest)
-        };
-        self.recent_with_start(start).or_else(nearer)
-    }
-
-    /// Returns the warm start from the recent orbit with this start, or otherwise from the last
-    /// orbit. Both are closer than an initial guess.
-    pub(super) fn warm_start(&self, start: Option<&[f64]>, omega: f64) -> Option<(usize, HarmonicSolution)> {
-        self.warm_start_from(self.recent_with_start(start?).unwrap_or(0), omega)
-    }
-
-    /// Returns the warm start from a recent orbit.
-    fn warm_start_from(&self, at: usize, omega: f64) -> Option<(usize, HarmonicSolution)> {
-        let near = self.recent.get(at)?;
-        let before = self.recent.iter().skip(at + 1).find(|recent| recent.highest_harmonic == near.highest_harmonic);
-        let motion = match before {
-            Some(before) if self.extrapolates(near.highest_harmonic) => near.extrapolate(before, omega),
-            _ => near.solution.clone(),
-        };
-        Some((near.highest_harmonic, HarmonicSolution { found_by: FoundBy::Newton, ..motion }))
-    }
-}
-
-impl Solver for HarmonicBalanceSolver {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        if !(omega.is_finite() && omega > 0.0) {
-            return Err(OrbitError::Frequency { omega });
+    /// Returns the warm start from a seed: the series of the joints, extrapolated along a secant,
+    /// or the harmonics of a time integration that begins at the state.
+    fn warm_start(&mut self, seed: &Seed, omega: f64) -> Option<(usize, HarmonicSolution)> {
+        match self.series_of(seed) {
+            Some(series) => Some((series.highest_harmonic, warm_start::extrapolate(series, omega))),
+            None => self.guess_from_state(&seed.state, omega),
         }
-        self.begin_point(omega);
-        let omega = omega / self.periods as f64;
-        let warm = self.initial_guess(start, omega);
-        let found = match self.converge(self.first, omega, warm) {
+    }
+
+    /// Returns the series of a seed if it fits this system.
+    fn series_of<'s>(&self, seed: &'s Seed) -> Option<&'s JointSeries> {
+        let fits = |series: &&Arc<JointSeries>| {
+            series.motions.len() == self.ports.count() * self.harmonic_set.up_to(series.highest_harmonic).len()
+        };
+        seed.series.as_ref().filter(fits).map(|series| &**series)
+    }
+
+    /// Finds the orbit of a request within the work limit that is set.
+    fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
+        let seed = request.seed;
+        let warm = seed.and_then(|seed| self.warm_start(seed, omega));
+        let has_series = seed.is_some_and(|seed| self.series_of(seed).is_some());
+        if let (ErrorEstimate::Skipped, true, Some((top, motion))) = (request.estimate, has_series, &warm) {
+            // the number of harmonics of the neighbouring orbit is sufficient
+            return self.solve_nearby(*top, omega, motion);
+        }
+        let mut found = match self.converge(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
                 self.solve_or_classify(omega).unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error))
             }
             found => found,
         };
-        let mut found = found;
         if let Ok(orbit) = &mut found {
             orbit.evidence.history_spread = self.history_spread(orbit, omega);
         }
-        self.end_point(found)
+        found
     }
 
-    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        let at = omega / self.periods as f64;
-        let known =
-            start.filter(|_| omega.is_finite() && omega > 0.0).and_then(|start| self.recent_for_length(start, at));
-        match known.and_then(|known| self.warm_start_from(known, at)) {
-            // the number of harmonics of the neighbouring orbit is sufficient
-            Some((top, motion)) => {
-                self.begin_point(omega);
-                let found = self.solve_nearby(top, at, &motion);
-                self.end_point(found)
-            }
-            // no suitable orbit is known, so the number of harmonics is chosen anew
-            _ => self.orbit(omega, start),
+    /// Adds the seed's series to the series of an orbit, for a secant predictor.
+    fn link_series(&self, orbit: &mut Orbit, seed: Option<&Seed>) {
+        let Some(series) = orbit.series.as_mut().and_then(Arc::get_mut) else { return };
+        let before = seed.and_then(|seed| self.series_of(seed));
+        let before = before.filter(|before| before.highest_harmonic == series.highest_harmonic);
+        if self.extrapolates(series.highest_harmonic) {
+            series.previous = before.map(|before| Arc::new(JointSeries { previous: None, ..before.clone() }));
         }
     }
+}
 
-    fn begin_branch(&mut self, omega: f64, start: &[f64]) {
-        self.branch_start = Some((omega / self.periods as f64, start.to_vec()));
-    }
-
-    fn work_fraction(&self) -> f64 {
-        let WorkShare { multiplications: eliminated, time_steps: marched } = self.work_used(None);
-        (eliminated / POINT_LIMIT.multiplications).max(marched / POINT_LIMIT.time_steps)
+impl Solver for HarmonicBalanceSolver {
+    fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let omega = request.omega;
+        if !(omega.is_finite() && omega > 0.0) {
+            return Err(OrbitError::Frequency { omega });
+        }
+        self.begin_point(omega, budget.remaining());
+        let found = self.solve_point(request, omega / self.periods as f64);
+        budget.charge(self.work_fraction());
+        let mut orbit = found?;
+        self.link_series(&mut orbit, request.seed);
+        Ok(orbit)
     }
 }
 
@@ -542,37 +487,32 @@ mod tests {
         let system = model.assemble().unwrap();
         let rate = |hertz: f64| std::f64::consts::TAU * hertz;
         let mut solver = HarmonicBalance::default().solver(&system).unwrap();
-        let mut starts: Vec<Vec<f64>> = Vec::new();
+        let mut seeds: Vec<Seed> = Vec::new();
         for i in 0..21 {
-            let start = starts.last().map(Vec::as_slice);
-            starts.push(solver.orbit(rate(12.0 + 0.35 * f64::from(i)), start).unwrap().initial_state);
+            let request = Request::at(rate(12.0 + 0.35 * f64::from(i))).near(seeds.last());
+            let orbit = solver.solve(&request, &mut Budget::default()).unwrap();
+            seeds.push(orbit.seed());
         }
-        solver.begin_branch(rate(15.85), &starts[11]);
-        let between = solver.orbit_without_estimate(rate(15.7276), Some(&starts[11])).unwrap();
-        let exact = EventDriven.solver(&system).unwrap().orbit(rate(15.7276), None).unwrap();
+        let request = Request::at(rate(15.7276)).near(Some(&seeds[11])).without_estimate();
+        let between = solver.solve(&request, &mut Budget::default()).unwrap();
+        let exact = EventDriven.solver(&system).unwrap().orbit(rate(15.7276)).unwrap();
         let error = (between.places[0].amplitude() / exact.places[0].amplitude() - 1.0).abs();
         assert!(error < 1e-3, "{error:.1e} with {:?} harmonics", between.evidence.harmonics);
     }
 
-    /// Expensive failed points shrink the work limit of the next point. A success restores it.
+    /// A search ends when its budget is used up, and charges its work.
     #[test]
-    fn expensive_failures_reduce_the_work_limit() {
+    fn a_search_keeps_within_its_budget() {
         let system = example::blade_couple_massless().assemble().unwrap();
-        let mut balance = HarmonicBalanceSolver::new(system, HarmonicBalance::default(), 1).unwrap();
-        let omega = std::f64::consts::TAU * 121.0;
-        let vain = |balance: &mut HarmonicBalanceSolver, marched: usize| {
-            balance.begin_point(omega);
-            balance.discretization(7, omega).unwrap().aft.law_steps = marched;
-            balance.end_point(Err(OrbitError::Frequency { omega })).unwrap_err();
-            balance.work_limit()
-        };
-        assert_eq!([0, usize::MAX / 2, 0].map(|marched| vain(&mut balance, marched)), [POINT_LIMIT; 3]);
-        let less = vain(&mut balance, usize::MAX / 2);
-        assert_eq!(less, POINT_LIMIT.times(budget::REDUCED_SHARE));
-        assert_eq!(balance.discretization(7, omega).unwrap().work_limit, less);
-        assert!(balance.work_fraction() > 1.0);
-        balance.orbit(omega, None).unwrap();
-        assert_eq!(balance.work_limit(), POINT_LIMIT);
-        assert!(balance.work_fraction() > 0.0 && balance.work_fraction() < 1e-3, "{}", balance.work_fraction());
+        let mut solver = HarmonicBalance::default().solver(&system).unwrap();
+        let request = Request::at(std::f64::consts::TAU * 121.0);
+        let mut budget = Budget::default();
+        solver.solve(&request, &mut budget).unwrap();
+        let work = budget.used();
+        assert!(work > 0.0 && work < 1e-3, "{work}");
+        let mut small = Budget::points(0.1 * work);
+        let error = solver.solve(&request, &mut small).unwrap_err();
+        assert!(matches!(error, OrbitError::NotConverged { work_limit_reached: true, .. }), "{error}");
+        assert!(small.is_used_up() && small.used() < work, "{} of {work}", small.used());
     }
 }

@@ -1,38 +1,25 @@
-//! The last orbits, for warm starts, with a secant predictor.
+//! Warm starts from the series of a neighbouring orbit, with a secant predictor.
 
 use super::equations::HarmonicSolution;
+use crate::orbit::JointSeries;
 use num_complex::Complex64;
 
-/// Number of orbits that are kept for warm starts. A peak is refined between that many.
-pub(super) const RECENT: usize = 8;
 /// Largest extrapolation of the secant predictor, relative to the last frequency step.
 const LONGEST_EXTRAPOLATION: f64 = 1.5;
 
-/// An orbit that was found.
-pub(super) struct RecentOrbit {
-    /// State at t = 0.
-    pub(super) start: Vec<f64>,
-    /// Frequency of the orbit, rad/s.
-    pub(super) omega: f64,
-    /// Highest harmonic.
-    pub(super) highest_harmonic: usize,
-    pub(super) solution: HarmonicSolution,
-}
-
-impl RecentOrbit {
-    /// Returns the motion at `omega` on the line through this orbit and the previous one
-    /// (secant predictor). Returns this motion if the extrapolation is longer than
-    /// [`LONGEST_EXTRAPOLATION`].
-    pub(super) fn extrapolate(&self, before: &RecentOrbit, omega: f64) -> HarmonicSolution {
-        let share = (omega - self.omega) / (self.omega - before.omega);
-        let mut motion = self.solution.clone();
-        if share.abs() <= LONGEST_EXTRAPOLATION {
-            let line = |now: &mut [Complex64], before: &[Complex64]| {
-                now.iter_mut().zip(before).for_each(|(now, before)| *now += (*now - before) * share);
-            };
-            line(&mut motion.c, &before.solution.c);
-            line(&mut motion.force, &before.solution.force);
-        }
-        motion
+/// Returns the motion at `omega` on the line through an orbit and the one before it (secant
+/// predictor). Returns the orbit's own motion if the extrapolation is longer than
+/// [`LONGEST_EXTRAPOLATION`], or if no orbit before it is known.
+pub(super) fn extrapolate(series: &JointSeries, omega: f64) -> HarmonicSolution {
+    let mut motion = HarmonicSolution::from_series(series);
+    let Some(before) = &series.previous else { return motion };
+    let share = (omega - series.omega) / (series.omega - before.omega);
+    if share.abs() <= LONGEST_EXTRAPOLATION {
+        let line = |now: &mut [Complex64], before: &[Complex64]| {
+            now.iter_mut().zip(before).for_each(|(now, before)| *now += (*now - before) * share);
+        };
+        line(&mut motion.c, &before.motions);
+        line(&mut motion.force, &before.forces);
     }
+    motion
 }

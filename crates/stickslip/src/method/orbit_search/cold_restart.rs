@@ -5,30 +5,24 @@
 //! stays on it even where it is unstable and the stable orbit repeats after several periods. A
 //! search without a warm start first integrates the motion for a while.
 
-use crate::method::{OrbitError, Solver};
+use crate::method::{Budget, ErrorEstimate, OrbitError, Request, Solver};
 use crate::orbit::Orbit;
 
 /// A solver that searches again without a warm start if the warm-started orbit is unstable.
 pub(crate) struct ColdRestart<S>(pub S);
 
 impl<S: Solver> Solver for ColdRestart<S> {
-    fn orbit(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        let near = self.0.orbit(omega, start)?;
-        if start.is_none() || near.is_stable() != Some(false) {
+    fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let near = self.0.solve(request, budget)?;
+        let restarts = request.seed.is_some() && request.estimate == ErrorEstimate::Required;
+        if !restarts || near.is_stable() != Some(false) {
             return Ok(near);
         }
         // prefer, of two unstable orbits, the one of more periods; the motion is known to leave
         // the other
         let better =
             |afresh: &Orbit| afresh.is_stable() == Some(true) || afresh.minimal_periods() > near.minimal_periods();
-        Ok(self.0.orbit(omega, None).ok().filter(better).unwrap_or(near))
-    }
-
-    fn orbit_without_estimate(&mut self, omega: f64, start: Option<&[f64]>) -> Result<Orbit, OrbitError> {
-        self.0.orbit_without_estimate(omega, start)
-    }
-
-    fn work_fraction(&self) -> f64 {
-        self.0.work_fraction()
+        let cold = Request { seed: None, ..*request };
+        Ok(self.0.solve(&cold, budget).ok().filter(better).unwrap_or(near))
     }
 }

@@ -356,7 +356,7 @@ mod tests {
             let system = couple(law);
             let defect = |harmonics: usize| {
                 let method = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
-                let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+                let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
                 orbit.evidence.return_defect.unwrap()
             };
             let (few, many) = (defect(1), defect(31));
@@ -386,13 +386,13 @@ mod tests {
         let defect = |harmonics: usize| {
             let method =
                 HarmonicBalance { harmonics: Some(harmonics), tolerance: Some(0.9), ..HarmonicBalance::default() };
-            let orbit = method.solver(&system).unwrap().orbit(omega, None).unwrap();
+            let orbit = method.solver(&system).unwrap().orbit(omega).unwrap();
             assert_eq!(orbit.evidence.return_defect, None);
             orbit.return_defect().unwrap()
         };
         let (few, many) = (defect(1), defect(15));
         assert!(few < 0.1 && many < 0.3 * few, "{few} {many}");
-        let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
         assert_eq!(orbit.return_defect(), Some(orbit.evidence.residual));
     }
 
@@ -420,7 +420,7 @@ mod tests {
         let wave = whole.clone().with_cyclic_symmetry(CyclicSymmetry { sectors: nodes, order: waves }).unwrap();
         let omega = TAU * 55.0;
         let method = HarmonicBalance { harmonics: Some(15), samples: Some(1024), tolerance: Some(0.9) };
-        let orbit = method.solver(&wave).unwrap().orbit(omega, None).unwrap();
+        let orbit = method.solver(&wave).unwrap().orbit(omega).unwrap();
         let judged = |system: &System| {
             let path = (orbit.path.as_ref(), Symmetry::FullPeriod);
             OrbitCheck::new(system).check(system, omega, path, &orbit.initial_state, &[])
@@ -447,7 +447,7 @@ mod tests {
     fn a_wrong_orbit_is_caught() {
         let system = couple(Arc::new(Jenkins { stiffness: 2e4, limit: 4.0 }));
         let omega = TAU * 120.75;
-        let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let orbit = crate::method::event_driven::EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
         let mut orbit_check = OrbitCheck::new(&system);
         assert!(orbit_check.proves());
         let mut defect =

@@ -128,7 +128,7 @@ mod tests {
         };
         for omega in [88.0, 107.0, 125.0] {
             let amplitude = |method: &dyn Method, system: &System| {
-                let orbit = method.solver(system).unwrap().orbit(omega, None).unwrap();
+                let orbit = method.solver(system).unwrap().orbit(omega).unwrap();
                 assert!(orbit.evidence.residual < 1e-6, "{:?}", orbit.evidence);
                 assert!(orbit.evidence.error_estimate.unwrap_or(0.0) < 2e-5, "{:?}", orbit.evidence);
                 assert!(orbit.evidence.return_defect.unwrap() < 1e-6, "{:?}", orbit.evidence);

@@ -15,9 +15,10 @@ use crate::results::histogram;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::UnitTask;
 use crate::syntax::key::{Key, ValueType, default};
+use stickslip::curve::PointBudget;
 use stickslip::curve::adaptive::AdaptiveCurve;
 use stickslip::curve::peak::{self, CurvePoint, Peak};
-use stickslip::method::solver_with_alternatives;
+use stickslip::method::{Request, solver_with_alternatives};
 use stickslip::model::Model;
 use stickslip::orbit::Orbit;
 
@@ -97,10 +98,10 @@ fn tuned_peak(work: &UnitTask<'_>) -> Result<Option<Peak>, String> {
         }
         _ => {
             let mut solver = solver_with_alternatives(method, &system).map_err(|error| error.to_string())?;
-            let mut points: Vec<CurvePoint> = Vec::new();
+            let (mut points, mut budget) = (Vec::<CurvePoint>::new(), PointBudget::default());
             for index in work.points.clone().take_while(|_| !work.context.stopped()) {
-                let start = points.last().and_then(|point| point.start.as_deref());
-                let found = solver.orbit(work.omega(index), start);
+                let request = Request::at(work.omega(index)).near(points.last().and_then(|point| point.seed.as_ref()));
+                let found = budget.solve(&mut *solver, &request);
                 points.push(found.map_or_else(
                     |_| CurvePoint::failed(work.omega(index)),
                     |orbit| CurvePoint::new(&orbit, &quantities),

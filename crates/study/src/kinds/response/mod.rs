@@ -44,7 +44,7 @@ use stickslip::curve::bidirectional_sweep::{self, BidirectionalSweep, OtherOrbit
 use stickslip::curve::peak::CurvePoint;
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, OrbitError, solver_with_alternatives};
-use stickslip::orbit::Orbit;
+use stickslip::orbit::{Orbit, Seed};
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -343,16 +343,16 @@ fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result
     // them again
     let count = prepared.case.frequencies.as_ref().map_or(0, |f| f.len());
     let mut solver = solver_with_alternatives(&*prepared.method, &prepared.system)?;
-    let mut near = |index: usize, start: Option<&[f64]>| match solver.orbit(work.omega(index), start) {
+    let mut near = |index: usize, seed: Option<&Seed>| match solver.orbit_near(work.omega(index), seed) {
         Ok(orbit) => point(&orbit),
         Err(_) => CurvePoint::failed(work.omega(index)),
     };
     if work.points.start > 0 {
-        let before = near(work.points.start - 1, points[0].start.as_deref());
+        let before = near(work.points.start - 1, points[0].seed.as_ref());
         points.insert(0, before);
     }
     if work.points.end < count {
-        let after = near(work.points.end, points[points.len() - 1].start.as_deref());
+        let after = near(work.points.end, points[points.len() - 1].seed.as_ref());
         points.push(after);
     }
     Ok((points, others))

@@ -73,7 +73,7 @@ pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, 
         let model = reference.model(&prepared.case.model).ok()?;
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
-            Ok(omegas.iter().map(|omega| solver.orbit(*omega, None).ok().map(amplitudes)).collect())
+            Ok(omegas.iter().map(|omega| solver.orbit(*omega).ok().map(amplitudes)).collect())
         });
         found.map_err(|why| absent.push(format!("{WARNING}{}", reference.no_reference(&why)))).ok()
     };

@@ -8,7 +8,7 @@ use stickslip::method::TABLE as METHODS;
 use stickslip::method::harmonic_balance::HarmonicBalance;
 use stickslip::method::{Method, Options, Solver};
 use stickslip::model::System;
-use stickslip::orbit::{Orbit, OrbitError};
+use stickslip::orbit::{Orbit, OrbitError, Seed};
 use stickslip_study::dataset::{CellValues, Column, Table};
 use stickslip_study::run::{Context, check, run};
 use stickslip_study::{Study, read_file, read_study};
@@ -141,12 +141,12 @@ fn by_harmonic_balance(system: &System, rates: &[f64]) -> Result<Vec<Table>, Str
 
 /// A table of orbits at these frequencies (rad/s), each with a warm start at the last one.
 fn points(name: &str, system: &System, solver: &mut dyn Solver, rates: &[f64]) -> Table {
-    let mut start: Option<Vec<f64>> = None;
+    let mut start: Option<Seed> = None;
     let found: Vec<Result<Orbit, OrbitError>> = rates
         .iter()
         .map(|omega| {
-            let found = solver.orbit(*omega, start.as_deref());
-            start = found.as_ref().ok().map(|orbit| orbit.initial_state.clone());
+            let found = solver.orbit_near(*omega, start.as_ref());
+            start = found.as_ref().ok().map(|orbit| orbit.seed());
             found
         })
         .collect();

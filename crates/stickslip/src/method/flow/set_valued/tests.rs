@@ -29,7 +29,7 @@ fn oscillator(laws: &[SharedLaw], (stiffness, damping): (f64, f64), force: f64) 
 }
 
 fn orbit(method: &dyn Method, system: &System, omega: f64) -> Orbit {
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// A law without force. It forces the use of time integration for the friction next to it.

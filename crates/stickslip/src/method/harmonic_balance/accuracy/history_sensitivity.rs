@@ -26,8 +26,8 @@ impl HarmonicBalanceSolver {
         if orbit.evidence.history_dependent.is_empty() || sticks {
             return None;
         }
-        let found = self.recent.front().filter(|recent| recent.start == orbit.initial_state)?;
-        let (top, motion) = (found.highest_harmonic, found.solution.clone());
+        let series = orbit.series.as_ref()?;
+        let (top, motion) = (series.highest_harmonic, HarmonicSolution::from_series(series));
         let own = self.places(top, omega, &motion).ok()?;
         let states = self.ports.static_states();
         let mut spread: Option<f64> = None;

@@ -290,7 +290,7 @@ mod tests {
             let system = system(law.clone());
             let orbit = |samples| {
                 let method = HarmonicBalance { harmonics: Some(63), samples, ..HarmonicBalance::default() };
-                method.solver(&system).unwrap().orbit(TAU * 17.0, None).unwrap()
+                method.solver(&system).unwrap().orbit(TAU * 17.0).unwrap()
             };
             let (found, truth) = (orbit(None), orbit(Some(16_384)));
             let (error, estimate) = (distance(&found, &truth), found.evidence.error_estimate.unwrap());
@@ -311,7 +311,7 @@ mod tests {
             let system = system(law.clone());
             let orbit = |samples| {
                 let method = HarmonicBalance { harmonics: Some(15), samples, tolerance: Some(tolerance) };
-                method.solver(&system).unwrap().orbit(TAU * 17.0, None).unwrap()
+                method.solver(&system).unwrap().orbit(TAU * 17.0).unwrap()
             };
             let error = distance(&orbit(None), &orbit(Some(16_384)));
             assert!(error > 1e-7 && error < SAMPLING_SHARE * tolerance, "{}: {error:.1e}", law.name());
@@ -323,7 +323,7 @@ mod tests {
     fn samples_follow_the_tolerance() {
         for law in laws() {
             let system = system(law.clone());
-            let orbit = |method: HarmonicBalance| method.solver(&system).unwrap().orbit(TAU * 17.0, None).unwrap();
+            let orbit = |method: HarmonicBalance| method.solver(&system).unwrap().orbit(TAU * 17.0).unwrap();
             let found = orbit(HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() });
             let finest = HarmonicBalance { harmonics: Some(255), samples: Some(32_768), tolerance: None };
             let error = distance(&found, &orbit(finest));

@@ -244,7 +244,7 @@ fn oscillator(law: SharedLaw, force: f64, constant: f64) -> System {
 
 fn balanced(system: &System, harmonics: usize, omega: f64) -> Orbit {
     let method = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
-    method.solver(system).unwrap().orbit(omega, None).unwrap()
+    method.solver(system).unwrap().orbit(omega).unwrap()
 }
 
 /// With one harmonic, Duffing's oscillator has the closed form
@@ -276,7 +276,7 @@ fn orbits_agree_with_integration() {
             let system = oscillator(law.clone(), 0.4, constant);
             let omega = 0.7;
             let series = balanced(&system, 41, omega);
-            let flow = Shooting::default().solver(&system).unwrap().orbit(omega, None).unwrap();
+            let flow = Shooting::default().solver(&system).unwrap().orbit(omega).unwrap();
             let period = 2.0 * PI / omega;
             let size = flow.places[0].amplitude();
             for i in 0..16 {

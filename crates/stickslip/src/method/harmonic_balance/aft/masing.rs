@@ -535,7 +535,7 @@ mod tests {
             let methods: [(&dyn Method, f64); 3] = [(&precise, 1e-6), (&Auto, 1e-4), (&Shooting::default(), 3e-5)];
             // shooting is slow, and runs for a quarter of the cases
             for (method, allowed) in methods.into_iter().take(if k % 4 == 0 { 3 } else { 2 }) {
-                let found = method.solver(&system).unwrap().orbit(TAU * frequency, None).unwrap();
+                let found = method.solver(&system).unwrap().orbit(TAU * frequency).unwrap();
                 let off = (found.places[0].amplitude() / amplitude - 1.0).abs();
                 let lost = (found.energy.friction / loss - 1.0).abs();
                 let said = format!("{} {chi} {beta} {frequency}: {off:.1e} {lost:.1e}", method.name());

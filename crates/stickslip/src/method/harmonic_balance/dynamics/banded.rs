@@ -467,7 +467,7 @@ mod tests {
     fn a_ring_at_rest_needs_few_harmonics() {
         let system = ring(24, 1e15);
         let method = HarmonicBalance { tolerance: Some(1e-6), ..HarmonicBalance::default() };
-        let orbit = method.solver(&system).unwrap().orbit(TAU * 110.1, None).unwrap();
+        let orbit = method.solver(&system).unwrap().orbit(TAU * 110.1).unwrap();
         assert!(orbit.places.iter().all(|place| place.amplitude() < 1e-15), "{:?}", orbit.places);
         assert!(orbit.evidence.error_estimate.unwrap() < 1e-6, "{:?}", orbit.evidence);
     }

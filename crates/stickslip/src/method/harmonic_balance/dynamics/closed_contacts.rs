@@ -162,7 +162,7 @@ mod tests {
 
     fn orbit(system: &System, harmonics: usize, omega: f64) -> Result<Orbit, OrbitError> {
         let method = HarmonicBalance { harmonics: Some(harmonics), ..HarmonicBalance::default() };
-        method.solver(system).unwrap().orbit(omega, None)
+        method.solver(system).unwrap().orbit(omega)
     }
 
     /// Returns a mass along (x, z) on one contact with the ground. The preload is 10 N.

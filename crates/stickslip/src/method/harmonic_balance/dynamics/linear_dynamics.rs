@@ -668,10 +668,10 @@ mod tests {
             model.joints.push(Joint { name: "j".into(), between: [name(3), GROUND.into()], law });
             let system = model.assemble().unwrap();
             let mut solver = HarmonicBalance::default().solver(&system).unwrap();
-            let error = solver.orbit(2.0, None).unwrap_err();
+            let error = solver.orbit(2.0).unwrap_err();
             assert_eq!(error.status(), "resonance", "{n} {coupling}: {error}");
             assert!(error.to_string().contains("2.0000 rad/s"), "{error}");
-            assert!(solver.orbit(2.1, None).is_ok());
+            assert!(solver.orbit(2.1).is_ok());
         }
     }
 
@@ -690,8 +690,8 @@ mod tests {
         let omega = 1.03;
         assert!(super::super::banded::BandedForm::new(&system, &Ports::new(&system).unwrap(), &[1]).is_none());
         let method = HarmonicBalance { harmonics: Some(21), ..HarmonicBalance::default() };
-        let series = method.solver(&system).unwrap().orbit(omega, None).unwrap();
-        let exact = EventDriven.solver(&system).unwrap().orbit(omega, None).unwrap();
+        let series = method.solver(&system).unwrap().orbit(omega).unwrap();
+        let exact = EventDriven.solver(&system).unwrap().orbit(omega).unwrap();
         assert!(exact.joints.iter().any(|joint| joint.slip_fraction > 0.1), "{:?}", exact.joints);
         let largest = exact.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
         for (a, b) in series.places.iter().zip(&exact.places) {

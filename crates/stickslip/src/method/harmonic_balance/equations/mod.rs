@@ -50,6 +50,7 @@ use super::globalization::subdomain::NonlinearElimination;
 use super::linear_solve::linearization::LinearizedEquations;
 use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, dot, uses_krylov};
 use crate::model::CyclicSymmetry;
+use crate::orbit::JointSeries;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
@@ -175,6 +176,16 @@ pub(super) struct HarmonicSolution {
 impl HarmonicSolution {
     pub fn zero(length: usize) -> Self {
         HarmonicSolution { c: vec![ZERO; length], force: vec![ZERO; length], ..HarmonicSolution::default() }
+    }
+
+    /// Returns the initial guess that an orbit's series is.
+    pub fn from_series(series: &JointSeries) -> Self {
+        HarmonicSolution { c: series.motions.clone(), force: series.forces.clone(), ..HarmonicSolution::default() }
+    }
+
+    /// Converts the solution to the series of an orbit at `omega` (rad/s).
+    pub fn into_series(self, omega: f64, highest_harmonic: usize) -> JointSeries {
+        JointSeries { omega, highest_harmonic, motions: self.c, forces: self.force, previous: None }
     }
 
     /// Copies `other` without new memory.
