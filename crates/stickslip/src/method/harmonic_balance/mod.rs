@@ -27,7 +27,7 @@
 //! - `aft/`: harmonics of joint forces from harmonics of joint motions, with exact derivatives;
 //! - `dynamics/`: receptances of the linear part;
 //! - `linear_solve/`: the linear system of a Newton step;
-//! - `newton`: Newton's method with line search, and the order in which the other searches
+//! - `newton`, `line_search`: Newton's method with line search, and the order in which the other searches
 //!   follow;
 //! - `globalization/`: these searches.
 //!
@@ -43,6 +43,7 @@ mod cost_model;
 mod dynamics;
 mod equations;
 mod globalization;
+mod line_search;
 mod linear_solve;
 mod memory_estimate;
 mod modes;

@@ -1,31 +1,19 @@
-//! Nonlinear solution: Newton's method with line search, and the searches that follow if it
-//! fails.
+//! Newton's method with a line search.
 //!
-//! Systems with many contacts iterate on coarse samples first. If Newton's method fails on
-//! rigid friction, the interior point method follows, then the proximal point method. The last
-//! search is a homotopy in the slip limits, from the solution in which all joints stick.
+//! Systems with many contacts iterate on coarse samples first. The searches that follow if it
+//! fails stand in `globalization`.
 
 use super::aft::{Port, Ports};
 use super::budget::{LEAST_ELIMINATIONS, SEARCH_LIMIT, SEARCH_MULTIPLICATIONS, WorkShare};
 use super::dynamics::banded::StepParameters;
 use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use super::globalization::found_by::FoundBy;
 use super::globalization::homotopy::{GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE};
 use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart, product_work};
 use num_complex::Complex64;
 use stickslip_numerics::{dense, interrupt};
 
 /// Newton iterations; 3 to 15 are usual.
-const ITERATIONS: usize = 60;
-/// Total Newton iterations while slip limits are raised. One is enough at limits at which all
-/// joints stick.
-const MOST_RAISING: usize = 200;
-/// Newton iterations at one raised limit if only contacts support the structure. One iteration
-/// from static equilibrium reaches the solution in which all joints stick, if the limits are
-/// high enough.
-const STUCK_ITERATIONS: usize = 6;
-/// Total Newton iterations while slip limits are lowered; a few hundred are usual.
-const MOST_ITERATIONS: usize = 3000;
+pub(super) const ITERATIONS: usize = 60;
 /// Residual at which a stagnating search counts as converged. Forces are differentiable
 /// functions of the harmonics, so the remainder is the rounding of structures whose stiffnesses
 /// differ widely.
@@ -126,6 +114,16 @@ impl SolveError {
     /// Failure at a resonance without damping, rad/s.
     pub fn resonance(resonance: f64) -> Self {
         SolveError { resonance: Some(resonance), ..SolveError::not_converged(0, f64::INFINITY) }
+    }
+
+    /// Returns the failure of two searches for the same solution, the other one later.
+    pub fn and(self, other: SolveError) -> Self {
+        SolveError {
+            iterations: other.iterations,
+            residual: self.residual.min(other.residual),
+            resonance: self.resonance.or(other.resonance),
+            left_contacts: self.left_contacts || other.left_contacts,
+        }
     }
 }
 
@@ -355,7 +353,7 @@ impl Discretization {
     }
 
     /// Returns true if the mean displacement left the contacts that alone support a body.
-    fn left_contacts(&self, motion: &HarmonicSolution) -> bool {
+    pub(super) fn left_contacts(&self, motion: &HarmonicSolution) -> bool {
         let nh = self.harmonics().len();
         let mean = motion.c.iter().step_by(nh).fold(0.0, |m: f64, c| m.max(c.norm()));
         self.is_held_by_contacts() && mean > LEFT_CONTACTS * self.extent(motion)
@@ -495,126 +493,5 @@ impl Discretization {
     ) -> Result<(), SolveError> {
         self.begin_search(ports);
         self.newton(ports, omega, motion, GIVEN_EQUATIONS, (most, StopCriterion::Solved))
-    }
-
-    /// Solves from the initial guess `start`.
-    pub fn solve(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        start: HarmonicSolution,
-    ) -> Result<HarmonicSolution, SolveError> {
-        self.solve_to(ports, omega, start, StopCriterion::Solved)
-    }
-
-    /// Solves from the initial guess `start`. Newton's method stops at `goal`; the searches that
-    /// follow it ignore `goal`.
-    pub fn solve_to(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        mut start: HarmonicSolution,
-        goal: StopCriterion,
-    ) -> Result<HarmonicSolution, SolveError> {
-        start.iterations = 0;
-        self.begin_search(ports);
-        let mut motion = start.clone();
-        if self.newton(ports, omega, &mut motion, GIVEN_EQUATIONS, (ITERATIONS, goal)).is_ok()
-            && !self.left_contacts(&motion)
-        {
-            return Ok(motion);
-        }
-        let mut nearest = f64::INFINITY;
-        if ports.has_forces() {
-            let iterations = motion.iterations;
-            motion = HarmonicSolution { iterations, ..start.clone() };
-            if self.interior_point_method(ports, omega, &mut motion).is_ok() {
-                return Ok(HarmonicSolution { found_by: FoundBy::InteriorPoints, ..motion });
-            }
-            motion = HarmonicSolution { iterations: motion.iterations, ..start };
-            match self.proximal_point_method(ports, omega, &mut motion) {
-                Ok(()) => return Ok(HarmonicSolution { found_by: FoundBy::ProximalPoints, ..motion }),
-                Err(error) => nearest = error.residual,
-            }
-        }
-        let away = self.left_contacts(&motion);
-        match self.slip_limit_homotopy(ports, omega, &mut motion) {
-            Ok(()) if !self.left_contacts(&motion) => {
-                Ok(HarmonicSolution { found_by: FoundBy::SlipLimitHomotopy, ..motion })
-            }
-            Ok(()) => {
-                Err(SolveError { left_contacts: true, ..SolveError::not_converged(motion.iterations, motion.residual) })
-            }
-            Err(error) => Err(SolveError {
-                left_contacts: away || error.left_contacts,
-                residual: error.residual.min(nearest),
-                ..error
-            }),
-        }
-    }
-
-    /// Homotopy in the slip limits, from limits at which all joints stick to the given ones.
-    fn slip_limit_homotopy(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        motion: &mut HarmonicSolution,
-    ) -> Result<(), SolveError> {
-        let mut good = HarmonicSolution { iterations: motion.iterations, ..self.frictionless_motion() };
-        let mut limits: f64 = 1.0;
-        // with all joints stuck, the equations are linear
-        let mut raised = Err(SolveError::not_converged(good.iterations, f64::INFINITY));
-        for attempt in 0..60 {
-            limits *= 4.0;
-            if attempt == 1 {
-                // steep friction, such as friction that falls with velocity, needs far higher
-                // limits
-                limits = limits.max(self.sticking_limit_factor(ports));
-            }
-            let iterations = good.iterations;
-            good = match self.is_held_by_contacts() {
-                true => HarmonicSolution { iterations, ..self.static_solution(limits) },
-                false => HarmonicSolution { iterations, ..self.frictionless_motion() },
-            };
-            let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { ITERATIONS };
-            raised = self.newton(
-                ports,
-                omega,
-                &mut good,
-                Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS },
-                (most, StopCriterion::Solved),
-            );
-            if raised.is_ok() || self.is_budget_used(ports) || good.iterations - motion.iterations > MOST_RAISING {
-                break;
-            }
-        }
-        raised?;
-        let mut factor: f64 = 0.5;
-        while limits > 1.0 {
-            motion.copy_from(&good);
-            let next = (limits * factor).max(1.0);
-            let done = self.newton(
-                ports,
-                omega,
-                motion,
-                Homotopy { limit_factor: next, ..GIVEN_EQUATIONS },
-                (ITERATIONS, StopCriterion::Solved),
-            );
-            good.iterations = motion.iterations;
-            match done {
-                Ok(()) => {
-                    good.copy_from(motion);
-                    limits = next;
-                }
-                Err(error) => {
-                    factor = factor.sqrt();
-                    if factor > 0.995 || self.is_budget_used(ports) || good.iterations > MOST_ITERATIONS {
-                        return Err(error);
-                    }
-                }
-            }
-        }
-        motion.copy_from(&good);
-        Ok(())
     }
 }

@@ -6,7 +6,7 @@ use super::dynamics::banded::{self, BandedForm};
 use super::dynamics::linear_dynamics::LinearDynamics;
 use super::equations::harmonic_set::HarmonicSet;
 use super::equations::{self, Discretization, HarmonicSolution};
-use super::globalization::found_by::FoundBy;
+use super::globalization::SearchSettings;
 use super::linear_solve::newton_krylov;
 use super::memory_estimate::{MEMORY, check_memory, level_memory};
 use super::newton::SolveError;
@@ -23,8 +23,6 @@ use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Newton iterations from a warm start; 2 to 5 are usual.
-const WARM_ITERATIONS: usize = 20;
 /// Highest harmonic of a cold start with force ports. Longer series start from the solution
 /// with half the harmonics, in which the slipping samples are nearly known.
 const COLD_START_HARMONICS: usize = 15;
@@ -353,20 +351,11 @@ impl HarmonicBalanceSolver {
         near: &HarmonicSolution,
     ) -> Result<Orbit, OrbitError> {
         self.discretization(top, omega).map(|_| ()).map_err(|l| self.solve_error(l))?;
-        let mut motion = HarmonicSolution { iterations: 0, ..near.clone() };
         let discretization = self.discretizations.get_mut(&top).expect("made above");
-        let mut found = discretization.newton_from(&self.ports, omega, &mut motion, WARM_ITERATIONS);
-        if found.is_err() && self.ports.has_forces() {
-            motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
-            found = discretization.interior_point_method(&self.ports, omega, &mut motion);
-            motion.found_by = FoundBy::InteriorPoints;
-            if found.is_err() {
-                motion = HarmonicSolution { iterations: motion.iterations, ..near.clone() };
-                found = discretization.proximal_point_method(&self.ports, omega, &mut motion);
-                motion.found_by = FoundBy::ProximalPoints;
-            }
-        }
-        found.map_err(|l| self.solve_error(l))?;
+        // from a warm start, 2 to 5 iterations are usual
+        let settings = SearchSettings { iterations: 20, between_orbits: true, ..SearchSettings::default() };
+        let found = discretization.solve_with(&self.ports, omega, near.clone(), settings);
+        let motion = found.map_err(|error| self.solve_error(error))?;
         let x = self.places(top, omega, &motion).map_err(|l| self.solve_error(l))?;
         self.make_orbit(top, omega, motion, x, None)
     }

@@ -6,6 +6,7 @@ use crate::method::OrbitError;
 use crate::method::harmonic_balance::aft::Port;
 use crate::method::harmonic_balance::budget::{self, WorkShare};
 use crate::method::harmonic_balance::equations::{self, Discretization, HarmonicSolution};
+use crate::method::harmonic_balance::globalization::SearchSettings;
 use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 use crate::method::harmonic_balance::options::{NAME, TOLERANCE};
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
@@ -78,7 +79,8 @@ impl HarmonicBalanceSolver {
         let better = match finer.solve_twice_the_samples(&self.ports, omega, &start, &coarse, states.as_deref()) {
             Some(better) => better,
             None => {
-                let solved = finer.solve_to(&self.ports, omega, start, goal)?;
+                let settings = SearchSettings { goal, ..SearchSettings::default() };
+                let solved = finer.solve_with(&self.ports, omega, start, settings)?;
                 finer
                     .correct_twice_the_samples(&self.ports, omega, &solved, &coarse)
                     .map_or(solved, |(motion, _)| motion)

@@ -1,8 +1,14 @@
-//! Searches that follow if Newton's method fails from its initial guess.
+//! How a point is solved: Newton's method, then the searches of one table.
+//!
+//! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
+//! [`FALLBACKS`] follow in their order, each from the same initial guess. If all of them fail,
+//! the solver begins once more from a time integration (`time_start`). To add a search, write its
+//! file and add one row.
 //!
 //! - `homotopy`: parameters of the homotopies, and the tolerance of a solution
 //! - `interior_point`: interior point method for rigid friction
 //! - `proximal_point`: proximal point method for forces that the equations leave undetermined
+//! - `slip_limit_homotopy`: homotopy in the slip limits
 //! - `nonlinear_elimination`: nonlinear elimination of contacts that dominate the residual
 //! - `subdomain`: subdomains of large structures for the nonlinear elimination
 //! - `time_start`: initial guesses from time integration
@@ -13,5 +19,113 @@ pub(super) mod homotopy;
 pub(super) mod interior_point;
 pub(super) mod nonlinear_elimination;
 pub(super) mod proximal_point;
+mod slip_limit_homotopy;
 pub(super) mod subdomain;
 pub(super) mod time_start;
+
+use super::aft::Ports;
+use super::equations::{Discretization, HarmonicSolution};
+use super::newton::{ITERATIONS, SolveError, StopCriterion};
+use found_by::FoundBy;
+use homotopy::GIVEN_EQUATIONS;
+
+/// A search that follows if Newton's method fails.
+struct Fallback {
+    found_by: FoundBy,
+    applies: fn(&Ports) -> bool,
+    /// True if the search also serves orbits between known ones. These can do without a failed
+    /// point, so only quick searches do.
+    between_orbits: bool,
+    /// Solves from the initial guess in the solution.
+    search: fn(&mut Discretization, &Ports, f64, &mut HarmonicSolution) -> Result<(), SolveError>,
+}
+
+/// The searches that follow Newton's method, in the order in which they are tried.
+const FALLBACKS: [Fallback; 3] = [
+    Fallback {
+        found_by: FoundBy::InteriorPoints,
+        applies: Ports::has_forces,
+        between_orbits: true,
+        search: Discretization::interior_point_method,
+    },
+    Fallback {
+        found_by: FoundBy::ProximalPoints,
+        applies: Ports::has_forces,
+        between_orbits: true,
+        search: Discretization::proximal_point_method,
+    },
+    Fallback {
+        found_by: FoundBy::SlipLimitHomotopy,
+        applies: |_| true,
+        between_orbits: false,
+        search: Discretization::slip_limit_homotopy,
+    },
+];
+
+/// Settings of a search for the solution near an initial guess.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SearchSettings {
+    /// Largest number of Newton iterations. Default 60; 3 to 15 are usual.
+    pub iterations: usize,
+    /// Residual at which Newton's method ends. The fallbacks ignore it.
+    pub goal: StopCriterion,
+    /// True for an orbit between known ones. Only quick fallbacks follow.
+    pub between_orbits: bool,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        SearchSettings { iterations: ITERATIONS, goal: StopCriterion::Solved, between_orbits: false }
+    }
+}
+
+impl Discretization {
+    /// Solves from the initial guess `start`, with the default settings.
+    pub fn solve(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        start: HarmonicSolution,
+    ) -> Result<HarmonicSolution, SolveError> {
+        self.solve_with(ports, omega, start, SearchSettings::default())
+    }
+
+    /// Solves from the initial guess `start`.
+    pub fn solve_with(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        start: HarmonicSolution,
+        settings: SearchSettings,
+    ) -> Result<HarmonicSolution, SolveError> {
+        let begin = HarmonicSolution { iterations: 0, ..start };
+        let mut motion = begin.clone();
+        self.begin_search(ports);
+        let newton = self.newton(ports, omega, &mut motion, GIVEN_EQUATIONS, (settings.iterations, settings.goal));
+        let mut failure = match self.supported(newton, &motion) {
+            Ok(()) => return Ok(motion),
+            Err(failure) => failure,
+        };
+        let follows =
+            |fallback: &&Fallback| (fallback.applies)(ports) && (fallback.between_orbits || !settings.between_orbits);
+        for fallback in FALLBACKS.iter().filter(follows) {
+            motion = HarmonicSolution { iterations: motion.iterations, ..begin.clone() };
+            let found = (fallback.search)(self, ports, omega, &mut motion);
+            match self.supported(found, &motion) {
+                Ok(()) => return Ok(HarmonicSolution { found_by: fallback.found_by, ..motion }),
+                Err(other) => failure = failure.and(other),
+            }
+        }
+        Err(failure)
+    }
+
+    /// Converts a solution whose mean left the contacts that alone support a body to a failure.
+    fn supported(&self, found: Result<(), SolveError>, motion: &HarmonicSolution) -> Result<(), SolveError> {
+        match found {
+            Ok(()) if self.left_contacts(motion) => {
+                Err(SolveError { left_contacts: true, ..SolveError::not_converged(motion.iterations, motion.residual) })
+            }
+            found => found,
+        }
+    }
+}

@@ -8,7 +8,8 @@
 //! (2003), Ch. 6.
 
 use super::nonlinear_mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
-use crate::method::harmonic_balance::newton::{DIVERGENCE, HALVINGS, SUFFICIENT_DECREASE};
+use crate::method::harmonic_balance::line_search::LineSearch;
+use crate::method::harmonic_balance::newton::DIVERGENCE;
 use num_complex::Complex64;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::{dense, interrupt};
@@ -247,31 +248,24 @@ impl ModeEquations<'_> {
                 return Some((point, iteration));
             }
             iteration += 1;
-            let mut fraction = 1.0;
-            for halving in 0..=HALVINGS + 1 {
-                if halving > HALVINGS {
-                    if now <= ROUNDED {
-                        // rounding prevents a smaller residual
-                        enough = ROUNDED;
-                        now = evaluate(self, &point, &mut residual, &mut jacobian);
-                        break;
-                    }
-                    fraction = 1.0;
-                }
-                let mut trial = point.clone();
+            let mut trial = point.clone();
+            let mut step = |this: &mut Self, fraction: f64| {
+                trial.clone_from(&point);
                 trial.shift(&right, -fraction);
                 let sensible = trial.state.omega > 0.0 && trial.amplitude.is_finite() && trial.amplitude > 0.0;
-                let after = if sensible { evaluate(self, &trial, &mut residual, &mut jacobian) } else { f64::INFINITY };
-                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * now
-                    || (bold && halving > HALVINGS && after < DIVERGENCE * now)
-                {
+                if sensible { evaluate(this, &trial, &mut residual, &mut jacobian) } else { f64::INFINITY }
+            };
+            match LineSearch::default().run(now, |fraction| step(self, fraction)) {
+                Some(after) => (point, now) = (trial, after),
+                None if now <= ROUNDED => {
+                    // rounding prevents a smaller residual
+                    enough = ROUNDED;
+                    now = evaluate(self, &point, &mut residual, &mut jacobian);
+                }
+                None => {
+                    let after = Some(step(self, 1.0)).filter(|after| bold && *after < DIVERGENCE * now)?;
                     (point, now) = (trial, after);
-                    break;
                 }
-                if halving > HALVINGS {
-                    return None;
-                }
-                fraction *= 0.5;
             }
         }
         None

@@ -26,7 +26,7 @@ use crate::method::MethodError;
 use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
 use crate::method::harmonic_balance::equations::contact_parameter::contact_parameter;
 use crate::method::harmonic_balance::equations::regularization::{LEAST_EPSILON_RATIO, force_regularization};
-use crate::method::harmonic_balance::newton::{HALVINGS, SUFFICIENT_DECREASE};
+use crate::method::harmonic_balance::line_search::LineSearch;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -455,35 +455,26 @@ impl<'a> ModeEquations<'a> {
                     self.kinetic_inner_product(&one[..motions], &other[..motions])
                 });
             }
-            let mut fraction = 1.0;
-            for halving in 0..=HALVINGS + 1 {
-                if halving > HALVINGS {
-                    if now <= ROUNDED {
-                        return Some(state);
-                    }
-                    fraction = 1.0;
-                }
-                let mut trial = state.clone();
+            let mut trial = state.clone();
+            let mut evaluate = |fraction: f64| {
+                trial.clone_from(&state);
                 for (value, d) in trial.x.iter_mut().chain(&mut trial.force).zip(step.chunks_exact(2)) {
                     *value -= Complex64::new(d[0], d[1]) * fraction;
                 }
                 trial.omega -= step[size - 2] * fraction;
                 trial.damping -= step[size - 1] * fraction;
-                let mut after = f64::INFINITY;
-                if trial.omega > 0.0 {
-                    self.evaluate(&trial, (&start, a), &mut residual, Some(&mut jacobian));
-                    after = norm(&residual);
+                if trial.omega <= 0.0 {
+                    return f64::INFINITY;
                 }
-                let whole = halving > HALVINGS && after.is_finite();
-                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * now || whole {
-                    (state, now) = (trial, after);
-                    break;
-                }
-                if halving > HALVINGS {
-                    return None;
-                }
-                fraction *= 0.5;
-            }
+                self.evaluate(&trial, (&start, a), &mut residual, Some(&mut jacobian));
+                norm(&residual)
+            };
+            now = match LineSearch::default().run(now, &mut evaluate) {
+                Some(after) => after,
+                None if now <= ROUNDED => return Some(state),
+                None => Some(evaluate(1.0)).filter(|after| after.is_finite())?,
+            };
+            state = trial;
         }
         (now <= ROUNDED).then_some(state)
     }

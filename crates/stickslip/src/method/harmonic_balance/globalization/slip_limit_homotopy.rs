@@ -1,0 +1,88 @@
+//! Homotopy in the slip limits, from limits at which all joints stick.
+//!
+//! With all joints stuck the equations are linear. The limits then fall to the given ones, and
+//! each solution is the initial guess of the next.
+
+use super::homotopy::{GIVEN_EQUATIONS, Homotopy};
+use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
+use crate::method::harmonic_balance::newton::{ITERATIONS, SolveError, StopCriterion};
+
+/// Total Newton iterations while slip limits are raised. One is enough at limits at which all
+/// joints stick.
+const MOST_RAISING: usize = 200;
+/// Newton iterations at one raised limit if only contacts support the structure. One iteration
+/// from static equilibrium reaches the solution in which all joints stick, if the limits are
+/// high enough.
+const STUCK_ITERATIONS: usize = 6;
+/// Total Newton iterations while slip limits are lowered; a few hundred are usual.
+const MOST_ITERATIONS: usize = 3000;
+
+impl Discretization {
+    /// Lowers the slip limits from values at which all joints stick to the given ones.
+    ///
+    /// It begins without a solution, or from static equilibrium if only contacts support a body.
+    pub(crate) fn slip_limit_homotopy(
+        &mut self,
+        ports: &Ports,
+        omega: f64,
+        motion: &mut HarmonicSolution,
+    ) -> Result<(), SolveError> {
+        let mut good = HarmonicSolution { iterations: motion.iterations, ..self.frictionless_motion() };
+        let mut limits: f64 = 1.0;
+        // with all joints stuck, the equations are linear
+        let mut raised = Err(SolveError::not_converged(good.iterations, f64::INFINITY));
+        for attempt in 0..60 {
+            limits *= 4.0;
+            if attempt == 1 {
+                // steep friction, such as friction that falls with velocity, needs far higher
+                // limits
+                limits = limits.max(self.sticking_limit_factor(ports));
+            }
+            let iterations = good.iterations;
+            good = match self.is_held_by_contacts() {
+                true => HarmonicSolution { iterations, ..self.static_solution(limits) },
+                false => HarmonicSolution { iterations, ..self.frictionless_motion() },
+            };
+            let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { ITERATIONS };
+            raised = self.newton(
+                ports,
+                omega,
+                &mut good,
+                Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS },
+                (most, StopCriterion::Solved),
+            );
+            if raised.is_ok() || self.is_budget_used(ports) || good.iterations - motion.iterations > MOST_RAISING {
+                break;
+            }
+        }
+        raised?;
+        let mut factor: f64 = 0.5;
+        while limits > 1.0 {
+            motion.copy_from(&good);
+            let next = (limits * factor).max(1.0);
+            let done = self.newton(
+                ports,
+                omega,
+                motion,
+                Homotopy { limit_factor: next, ..GIVEN_EQUATIONS },
+                (ITERATIONS, StopCriterion::Solved),
+            );
+            good.iterations = motion.iterations;
+            match done {
+                Ok(()) => {
+                    good.copy_from(motion);
+                    limits = next;
+                }
+                Err(error) => {
+                    factor = factor.sqrt();
+                    if factor > 0.995 || self.is_budget_used(ports) || good.iterations > MOST_ITERATIONS {
+                        return Err(error);
+                    }
+                }
+            }
+        }
+        motion.copy_from(&good);
+        Ok(())
+    }
+}
