@@ -75,3 +75,50 @@ impl WorkShare {
         self.multiplications > limit.multiplications || self.time_steps > limit.time_steps
     }
 }
+
+/// Work of the searches on one discretization.
+#[derive(Debug, Clone)]
+pub(super) struct WorkCounter {
+    /// Number of evaluations of laws with derivatives in the present search.
+    pub evaluations: usize,
+    /// Number of eliminations of the Jacobian in the present search.
+    pub eliminations: usize,
+    /// Number of products with the Jacobian in the present search.
+    pub products: usize,
+    /// True if the search begins with the solution of a shorter series, which remains valid if the
+    /// search fails. With unknown forces, the work limit then holds without a guaranteed number of
+    /// steps.
+    pub extends_shorter: bool,
+    /// Work of earlier searches of the point on this discretization.
+    pub before: WorkShare,
+    /// Work of the point on other discretizations.
+    pub elsewhere: WorkShare,
+    /// Work limit of the point.
+    pub limit: WorkShare,
+}
+
+impl Default for WorkCounter {
+    fn default() -> Self {
+        WorkCounter {
+            evaluations: 0,
+            eliminations: 0,
+            products: 0,
+            extends_shorter: false,
+            before: WorkShare::default(),
+            elsewhere: WorkShare::default(),
+            limit: POINT_LIMIT,
+        }
+    }
+}
+
+impl WorkCounter {
+    /// Begins a point: no work is used, and the limit stays.
+    pub fn begin_point(&mut self) {
+        *self = WorkCounter { limit: self.limit, ..WorkCounter::default() };
+    }
+
+    /// Begins a search after searches of the same point that used `before`.
+    pub fn begin_search(&mut self, before: WorkShare) {
+        *self = WorkCounter { before, evaluations: 0, eliminations: 0, products: 0, ..self.clone() };
+    }
+}

@@ -130,12 +130,17 @@ mod tests {
             discretization.set_frequency(&system, &ports, &dynamics, 0.9).unwrap();
             let start = discretization.initial_guess(&system, &ports, None, 0.9);
             discretization.solve(&ports, 0.9, start).unwrap();
-            let Receptance::Formed(formed) = &discretization.receptance else { panic!("receptances are matrices") };
+            let Receptance::Formed(formed) = &discretization.linear.receptance else {
+                panic!("receptances are matrices")
+            };
             let coupled = discretization.newton_krylov.as_ref().expect("by products");
             assert!(coupled.bytes() > 0, "{joints}: none is kept");
-            let kept = formed.bytes() + dynamics.bytes() + coupled.bytes() + size_of_val(&discretization.tangents[..]);
+            let kept = formed.bytes()
+                + dynamics.bytes()
+                + coupled.bytes()
+                + size_of_val(&discretization.workspace.tangents[..]);
             // the estimate also counts a matrix that may be formed
-            let size = discretization.residual.len() as f64;
+            let size = discretization.workspace.residual.len() as f64;
             let formed = if size <= super::newton_krylov::FORMED_UNKNOWNS as f64 { 8.0 * size * size } else { 0.0 };
             let counted = unbanded_memory(&ports, &dynamics, harmonics.len(), false) - formed;
             assert!((1.0..1.5).contains(&(counted / kept as f64)), "{joints}: {counted:.1e} of {kept:.1e}");

@@ -140,17 +140,17 @@ impl Discretization {
         homotopy: Homotopy,
         (most, goal): (usize, StopCriterion),
     ) -> Result<(), SolveError> {
-        if !self.uses_coarse || self.coarse.is_none() {
+        if !self.search.uses_coarse || self.coarse.is_none() {
             return self.search(ports, omega, motion, homotopy, (most, goal));
         }
         let start = motion.clone();
-        let taken = (self.evaluations, self.eliminations, self.products);
+        let taken = (self.work.evaluations, self.work.eliminations, self.work.products);
         self.exchange_samples();
         let rough = self.search(ports, omega, motion, homotopy, (most, StopCriterion::Rough(self.coarse_tolerance())));
         if rough.is_ok() {
             // the periodic state is known on these samples
             self.complete_derivatives(ports, omega, motion, (homotopy, false));
-            self.keeps_tangents = true;
+            self.search.keeps_tangents = true;
         }
         self.exchange_samples();
         if rough.is_ok() && self.search(ports, omega, motion, homotopy, (most, goal)).is_ok() {
@@ -158,9 +158,9 @@ impl Discretization {
         }
         // this retry happens once per search and gets the full work limit again
         let before = self.work_used(ports).multiplications;
-        (self.evaluations, self.eliminations, self.products) = taken;
-        self.work_before.multiplications += before - self.work_used(ports).multiplications;
-        self.uses_coarse = false;
+        (self.work.evaluations, self.work.eliminations, self.work.products) = taken;
+        self.work.before.multiplications += before - self.work_used(ports).multiplications;
+        self.search.uses_coarse = false;
         *motion = HarmonicSolution { iterations: motion.iterations, ..start };
         self.search(ports, omega, motion, homotopy, (most, goal))
     }
@@ -185,15 +185,15 @@ impl Discretization {
     ) -> Result<(), SolveError> {
         let rough = matches!(goal, StopCriterion::Rough(_));
         let mut length = self.motion_scale(motion);
-        self.reuses_states = self.uses_coarse;
+        self.search.reuses_states = self.search.uses_coarse;
         let mut residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
         let solved = match goal {
             StopCriterion::Solved => RESIDUAL_TOLERANCE,
             StopCriterion::Rough(solved) => solved,
             StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * residual),
         };
-        let mut sketched = self.uses_coarse && !rough;
-        let mut kept = self.keeps_tangents && sketched;
+        let mut sketched = self.search.uses_coarse && !rough;
+        let mut kept = self.search.keeps_tangents && sketched;
         let mut rough_slopes = kept;
         let mut recent = [residual; NONMONOTONE_MEMORY];
         let mut least = f64::INFINITY;
@@ -211,7 +211,7 @@ impl Discretization {
                 rough_slopes = self.complete_derivatives(ports, omega, motion, (homotopy, sketched));
             }
             let near = StepStart { length, residual, coarse: rough_slopes || rough, same_derivatives: kept };
-            self.previous.copy_from(motion);
+            self.workspace.previous.copy_from(motion);
             if !self.regularized_step(ports, (omega, homotopy), motion, near) {
                 break;
             }
@@ -244,12 +244,12 @@ impl Discretization {
                 break;
             }
             sketched &= after < COARSE_JACOBIAN_REDUCTION * residual || residual > COARSE_JACOBIAN_FROM;
-            kept = rough_slopes && after < REUSE_REDUCTION * residual && self.linearised;
+            kept = rough_slopes && after < REUSE_REDUCTION * residual && self.search.linearised;
             residual = after;
             recent[motion.iterations % NONMONOTONE_MEMORY] = residual;
             if residual < least {
                 least = residual;
-                self.best.copy_from(motion);
+                self.workspace.best.copy_from(motion);
             }
             (to_halve, stagnating) = if least < 0.5 * to_halve { (least, 0) } else { (to_halve, stagnating + 1) };
             let now = self.motion_scale(motion);
@@ -263,13 +263,13 @@ impl Discretization {
         }
         if residual > solved && least < f64::INFINITY {
             let iterations = motion.iterations;
-            motion.c.clone_from(&self.best.c);
-            motion.force.clone_from(&self.best.force);
+            motion.c.clone_from(&self.workspace.best.c);
+            motion.force.clone_from(&self.workspace.best.force);
             motion.iterations = iterations;
             residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::None);
         }
-        self.reuses_states = false;
-        self.keeps_tangents = false;
+        self.search.reuses_states = false;
+        self.search.keeps_tangents = false;
         motion.residual = residual;
         if residual <= solved || (stagnating > STAGNATION_ITERATIONS && residual <= STAGNATION_TOLERANCE) {
             Ok(())
@@ -281,7 +281,7 @@ impl Discretization {
         }
     }
 
-    /// Solves for the Newton step from `self.before` into `self.step`. Returns false if there
+    /// Solves for the Newton step from `self.before` into `self.workspace.step`. Returns false if there
     /// is none.
     ///
     /// If only contacts support a body, a step that opens all of them, or slips in all, loses
@@ -302,13 +302,13 @@ impl Discretization {
         if !self.is_held_by_contacts() || self.mean_change(ports, at.length) <= LONG_MEAN_STEP * extent {
             return true;
         }
-        let mut best = (f64::INFINITY, self.step.clone());
+        let mut best = (f64::INFINITY, self.workspace.step.clone());
         let mut held = 0.0;
         for share in REGULARIZING_SHARES {
             if share > 0.0 {
                 // restore the residual at the start of the step; evaluations without
                 // derivatives keep the tangents
-                motion.copy_from(&self.previous);
+                motion.copy_from(&self.workspace.previous);
                 self.evaluate(ports, omega, motion, homotopy, at.length, DerivativeScope::None);
                 for (p, port) in ports.iter().enumerate() {
                     self.add_springs(p, port, share - held);
@@ -324,15 +324,15 @@ impl Discretization {
             let near =
                 self.mean_change(ports, at.length) <= LEFT_CONTACTS * extent || after <= NEAR_SOLUTION * at.residual;
             if near && after < best.0 {
-                best = (after, self.step.clone());
+                best = (after, self.workspace.step.clone());
             }
         }
         for (p, port) in ports.iter().enumerate() {
             self.add_springs(p, port, -held);
         }
-        self.linearised = false;
-        motion.copy_from(&self.previous);
-        self.step.clone_from(&best.1);
+        self.search.linearised = false;
+        motion.copy_from(&self.workspace.previous);
+        self.workspace.step.clone_from(&best.1);
         best.0.is_finite()
     }
 
@@ -340,7 +340,10 @@ impl Discretization {
     fn mean_change(&self, ports: &Ports, length: f64) -> f64 {
         let nh = self.harmonics().len();
         let motions = ports.iter().filter(|port| !port.is_force());
-        motions.flat_map(|port| port.range()).map(|q| self.step[2 * q * nh].abs() * length).fold(0.0, f64::max)
+        motions
+            .flat_map(|port| port.range())
+            .map(|q| self.workspace.step[2 * q * nh].abs() * length)
+            .fold(0.0, f64::max)
     }
 
     /// Returns the extent of a motion, m: the largest of the displacements in static
@@ -349,7 +352,7 @@ impl Discretization {
         let nh = self.harmonics().len();
         let swing = motion.c.iter().enumerate().filter(|(i, _)| i % nh > 0).map(|(_, c)| c.norm());
         let still = self.static_solution(1.0).c.into_iter().step_by(nh).map(|c| c.norm());
-        self.linear_motion.iter().map(|c| c.norm()).chain(swing).chain(still).fold(0.0, f64::max)
+        self.linear.motion.iter().map(|c| c.norm()).chain(swing).chain(still).fold(0.0, f64::max)
     }
 
     /// Returns true if the mean displacement left the contacts that alone support a body.
@@ -362,21 +365,23 @@ impl Discretization {
     /// Returns the work of the present search relative to [`SEARCH_MULTIPLICATIONS`] and
     /// [`MOST_TIME_STEPS`].
     pub(super) fn work_used(&self, ports: &Ports) -> WorkShare {
-        let size = self.residual.len() as f64;
+        let size = self.workspace.residual.len() as f64;
         let of_port = |port: &Port| {
             port.axes as f64 * if port.least_penalty > 0.0 { FALLING_EVALUATION_COST } else { EVALUATION_COST }
         };
-        let evaluated = (self.all_samples() * self.evaluations) as f64 * ports.iter().map(of_port).sum::<f64>();
+        let evaluated = (self.all_samples() * self.work.evaluations) as f64 * ports.iter().map(of_port).sum::<f64>();
         let (taken, one, fewest) = match self.banded {
-            Some(ref banded) => (self.eliminations, banded.work(self.harmonics().len()), LEAST_ELIMINATIONS),
+            Some(ref banded) => (self.work.eliminations, banded.work(self.harmonics().len()), LEAST_ELIMINATIONS),
             // GMRES counts its products; the line search takes none
-            None if self.newton_krylov.is_some() => {
-                (self.products, product_work(ports, self.harmonics().len()), LEAST_ELIMINATIONS * PRODUCTS_PER_STEP)
-            }
-            None => (self.eliminations, size * size * size / 3.0, LEAST_ELIMINATIONS),
+            None if self.newton_krylov.is_some() => (
+                self.work.products,
+                product_work(ports, self.harmonics().len()),
+                LEAST_ELIMINATIONS * PRODUCTS_PER_STEP,
+            ),
+            None => (self.work.eliminations, size * size * size / 3.0, LEAST_ELIMINATIONS),
         };
         let counted = taken as f64 * one + if self.newton_krylov.is_some() { 0.0 } else { evaluated };
-        let most = if self.extends_shorter && ports.has_forces() {
+        let most = if self.work.extends_shorter && ports.has_forces() {
             SEARCH_MULTIPLICATIONS
         } else {
             SEARCH_MULTIPLICATIONS.max(fewest * one)
@@ -390,21 +395,21 @@ impl Discretization {
 
     /// Returns the work of all searches of the point on these equations.
     pub(super) fn point_work_used(&self, ports: &Ports) -> WorkShare {
-        self.work_before.and(self.work_used(ports))
+        self.work.before.and(self.work_used(ports))
     }
 
     /// Returns true if the search has used its work limit or that of its point.
     pub(super) fn is_budget_used(&self, ports: &Ports) -> bool {
         self.work_used(ports).exceeds(SEARCH_LIMIT)
-            || self.work_elsewhere.and(self.point_work_used(ports)).exceeds(self.work_limit)
+            || self.work.elsewhere.and(self.point_work_used(ports)).exceeds(self.work.limit)
     }
 
-    /// Solves for the Newton step into `self.step`, in units of the unknowns.
+    /// Solves for the Newton step into `self.workspace.step`, in units of the unknowns.
     pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
-        self.eliminations += 1;
+        self.work.eliminations += 1;
         if let Some(banded) = &mut self.banded {
-            let along = StepParameters { penalty: &self.penalty, homotopy: homotopy };
-            if !banded.linearise(ports, &along, &self.tangents) {
+            let along = StepParameters { penalty: &self.linear.penalty, homotopy: homotopy };
+            if !banded.linearise(ports, &along, &self.workspace.tangents) {
                 return false;
             }
         }
@@ -421,31 +426,31 @@ impl Discretization {
         near: StepStart,
     ) -> bool {
         let pair = 2 * self.harmonics().len();
-        self.step.copy_from_slice(&self.residual);
+        self.workspace.step.copy_from_slice(&self.workspace.residual);
         match &mut self.banded {
             Some(banded) => {
-                if !banded.step(ports, &self.tangents, &mut self.step) {
+                if !banded.step(ports, &self.workspace.tangents, &mut self.workspace.step) {
                     return false;
                 }
                 for port in ports.iter() {
-                    let steps = &mut self.step[pair * port.first_axis..pair * (port.first_axis + port.axes)];
+                    let steps = &mut self.workspace.step[pair * port.first_axis..pair * (port.first_axis + port.axes)];
                     steps.iter_mut().for_each(|d| *d /= port.unit(near.length));
                 }
                 true
             }
             None => {
-                for (d, unit) in self.step.iter_mut().zip(&self.units) {
+                for (d, unit) in self.workspace.step.iter_mut().zip(&self.workspace.units) {
                     *d /= unit;
                 }
                 if self.newton_krylov.is_some() && self.krylov_step(ports, omega, homotopy, near) {
                     return true;
                 }
-                let size = self.step.len();
+                let size = self.workspace.step.len();
                 if self.newton_krylov.is_some() && size > FORMED_UNKNOWNS {
                     return false;
                 }
                 self.assemble(ports, omega, homotopy, near.length)
-                    && dense::solve(&mut self.jacobian, size, &mut self.step)
+                    && dense::solve(&mut self.workspace.jacobian, size, &mut self.workspace.step)
             }
         }
     }
@@ -456,12 +461,12 @@ impl Discretization {
         for port in ports.iter() {
             let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
             let (values, before) = if port.is_force() {
-                (&mut motion.force, &self.previous.force)
+                (&mut motion.force, &self.workspace.previous.force)
             } else {
-                (&mut motion.c, &self.previous.c)
+                (&mut motion.c, &self.workspace.previous.c)
             };
             for i in range {
-                let d = Complex64::new(self.step[2 * i], self.step[2 * i + 1]);
+                let d = Complex64::new(self.workspace.step[2 * i], self.workspace.step[2 * i + 1]);
                 values[i] = before[i] - d * (fraction * port.unit(length));
             }
         }

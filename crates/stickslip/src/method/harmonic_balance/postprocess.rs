@@ -38,15 +38,15 @@ pub(super) fn places(
             let along = |q: usize| acting[q * nh + k];
             let Some(banded) = &mut discretization.banded else {
                 let singular = |_| h as f64 * omega;
-                let mut x =
-                    &discretization.free_response[k] - dynamics.respond_along(h, omega, along).map_err(singular)?;
+                let mut x = &discretization.linear.free_response[k]
+                    - dynamics.respond_along(h, omega, along).map_err(singular)?;
                 if h == 0 {
                     dynamics.correct_mean(omega, &mut x, |q| discretization.mean(q, motion)).map_err(singular)?;
                 }
                 return Ok(x);
             };
             let forces = dynamics.force_on_places(h, along);
-            let mut x = discretization.free_response[k].clone();
+            let mut x = discretization.linear.free_response[k].clone();
             let mut moved = x.clone();
             banded.respond(k, |i| forces[i], moved.as_mut_slice());
             x -= moved;

@@ -150,7 +150,7 @@ impl HarmonicBalanceSolver {
         let elsewhere = self.work_used(Some(top));
         let allowed = self.work_limit();
         let discretization = self.discretizations.get_mut(&top).expect("made above");
-        (discretization.work_elsewhere, discretization.work_limit) = (elsewhere, allowed);
+        (discretization.work.elsewhere, discretization.work.limit) = (elsewhere, allowed);
         Ok(discretization)
     }
 

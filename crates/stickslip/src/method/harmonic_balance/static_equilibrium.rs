@@ -119,10 +119,10 @@ fn solve_static(
     let (mut share, mut softer) = (FIRST_STIFFNESS, 0.1f64);
     for _ in 0..POINTS {
         let anchor = solution.c.iter().map(|c| c.re).collect();
-        discretization.tether = Some(ProximalSprings { relative_stiffness: share, anchor });
+        discretization.search.tether = Some(ProximalSprings { relative_stiffness: share, anchor });
         let mut next = solution.clone();
         let tied = discretization.newton_from(ports, omega, &mut next, ITERATIONS).is_ok();
-        discretization.tether = None;
+        discretization.search.tether = None;
         if !tied {
             if share >= FIRST_STIFFNESS {
                 return None;

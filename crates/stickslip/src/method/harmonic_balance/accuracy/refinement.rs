@@ -67,10 +67,10 @@ impl HarmonicBalanceSolver {
         let start = self.refined_guess(top, motion);
         let (few, many) = (self.harmonic_set.up_to(top), self.harmonic_set.up_to(double));
         let coarse = equations::with_harmonics(motion, &few, &many);
-        let states = self.discretizations.get(&top).map(|discretization| discretization.states.clone());
+        let states = self.discretizations.get(&top).map(|discretization| discretization.search.states.clone());
         self.discretization(double, omega)?;
         let finer = self.discretizations.get_mut(&double).expect("made above");
-        finer.extends_shorter = true;
+        finer.work.extends_shorter = true;
         let goal = if self.ports.iter().any(Port::has_memory_steps) {
             StopCriterion::Solved
         } else {

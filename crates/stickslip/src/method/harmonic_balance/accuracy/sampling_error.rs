@@ -44,7 +44,7 @@ impl Discretization {
             && ports.iter().all(Port::uses_return_map)
         {
             // the coarse samples start from these states and find their periodic states
-            self.states.clone_from_slice(states);
+            self.search.states.clone_from_slice(states);
             self.complete_derivatives(ports, omega, &mut start.clone(), (GIVEN_EQUATIONS, true));
         }
         if let Some((motion, true)) = self.correct_twice_the_samples(ports, omega, start, coarse) {
@@ -76,7 +76,7 @@ impl Discretization {
         }
         let mut motion = near.clone();
         let length = self.motion_scale(&motion);
-        if !self.linearised {
+        if !self.search.linearised {
             self.compute_jacobians(ports, omega, &mut motion, length);
         }
         let near = |residual, kept| StepStart { length, residual, coarse: true, same_derivatives: kept };
@@ -84,9 +84,9 @@ impl Discretization {
         let share = if self.uses_krylov() { STEP_RATIO_MANY_CONTACTS } else { STEP_RATIO };
         loop {
             self.swap_double_samples();
-            self.reuses_states = true;
+            self.search.reuses_states = true;
             let residual = self.evaluate(ports, omega, &mut motion, GIVEN_EQUATIONS, length, DerivativeScope::None);
-            self.reuses_states = false;
+            self.search.reuses_states = false;
             self.swap_double_samples();
             if residual <= RESIDUAL_TOLERANCE {
                 return Some((motion, true));
@@ -94,9 +94,9 @@ impl Discretization {
             if !self.newton_step(ports, omega, GIVEN_EQUATIONS, near(residual, last.is_finite())) {
                 return None;
             }
-            self.previous.copy_from(&motion);
+            self.workspace.previous.copy_from(&motion);
             self.apply_step(ports, &mut motion, 1.0, length);
-            let step = self.distance(ports, &motion, &self.previous, length);
+            let step = self.distance(ports, &motion, &self.workspace.previous, length);
             found |= step <= share * self.distance(ports, &motion, coarse, length);
             left -= 1;
             if found || left == 0 || step > LARGEST_CONTRACTION * last {
@@ -253,10 +253,11 @@ mod tests {
             };
             let coarse = with_harmonics(&solve(&mut short), &few, &many);
             let whole = solve(&mut whole);
-            assert!(short.states.iter().any(|known| !known.state.is_empty()), "some slip");
+            assert!(short.search.states.iter().any(|known| !known.state.is_empty()), "some slip");
             let mut start = coarse.clone();
             start.c.iter_mut().zip(&added).for_each(|(c, added)| *c += added);
-            let found = long.solve_twice_the_samples(&ports, omega, &start, &coarse, Some(&short.states)).unwrap();
+            let found =
+                long.solve_twice_the_samples(&ports, omega, &start, &coarse, Some(&short.search.states)).unwrap();
             let apart = |a: &HarmonicSolution, b: &HarmonicSolution| long.distance(&ports, a, b, 1.0);
             let (distance, error) = (apart(&whole, &coarse), apart(&whole, &found));
             assert!(error < 0.1 * distance, "{omega}: {error:.1e} of {distance:.1e}");

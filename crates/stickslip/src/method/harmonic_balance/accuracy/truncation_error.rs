@@ -47,7 +47,7 @@ pub(crate) fn truncation_error(
     let above = missing_resonances(finer, dynamics, ports, harmonic_set, omega, better);
     let fine = ComparedSolution { harmonics: finer.harmonics(), places, along: &better.c };
     let unhindered = |place: &Axis| {
-        let moving = fine.harmonics.iter().zip(&finer.free_response).filter(|(h, _)| **h > 0);
+        let moving = fine.harmonics.iter().zip(&finer.linear.free_response).filter(|(h, _)| **h > 0);
         moving.map(|(_, free)| length(place, free).norm_sqr()).sum::<f64>()
     };
     let largest = seen.iter().map(unhindered).fold(0.0, f64::max);
@@ -102,7 +102,8 @@ fn missing_resonances(
         return Vec::new();
     }
     let forces = discretization.forces_at(ports, omega, motion, &wanted);
-    let infinite = || DVector::from_element(discretization.free_response[0].len(), Complex64::new(f64::INFINITY, 0.0));
+    let infinite =
+        || DVector::from_element(discretization.linear.free_response[0].len(), Complex64::new(f64::INFINITY, 0.0));
     let respond = |h: usize, forces: &[Complex64]| dynamics.respond_along(h, omega, |q| forces[q]);
     wanted.iter().zip(&forces).map(|(h, forces)| respond(*h, forces).unwrap_or_else(|_| infinite())).collect()
 }

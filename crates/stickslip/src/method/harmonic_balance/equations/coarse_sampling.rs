@@ -45,14 +45,14 @@ impl Discretization {
         let mut any = false;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| port.has_memory_steps()) {
             let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
-            let slot = &mut self.tangents[tangent_range(&self.blocks, p, port, nh)];
+            let slot = &mut self.workspace.tangents[tangent_range(&self.blocks, p, port, nh)];
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range.clone()]);
             let mut aft = &mut self.aft;
             let mut rough = false;
             if let Some(coarse) = self.coarse.as_mut().filter(|_| sketched && port.uses_return_map()) {
-                let image = &mut self.image[..range.len()];
+                let image = &mut self.workspace.image[..range.len()];
                 coarse.static_share = aft.static_share;
-                coarse.known_state.clone_from(&self.states[p]);
+                coarse.known_state.clone_from(&self.search.states[p]);
                 coarse.periodicity_tolerance = COARSE_PERIODICITY;
                 coarse.motion_port_force(port, (omega, homotopy.limit_factor), c, image, Some(&mut *slot));
                 coarse.periodicity_tolerance = PERIODICITY_TOLERANCE;
@@ -62,15 +62,15 @@ impl Discretization {
                 }
             }
             if !rough {
-                aft.known_state.clone_from(&self.states[p]);
+                aft.known_state.clone_from(&self.search.states[p]);
                 aft.motion_port_force(port, (omega, homotopy.limit_factor), c, force, Some(slot));
             }
             // a port that sticks throughout was not sampled
             any |= rough && !aft.state.is_empty();
-            self.states[p].forgetting_inverse.clone_from(&aft.forgetting_inverse);
+            self.search.states[p].forgetting_inverse.clone_from(&aft.forgetting_inverse);
             self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
         }
-        self.linearised = true;
+        self.search.linearised = true;
         any
     }
 

@@ -32,20 +32,20 @@ impl Discretization {
         let excitation = system.excitation(omega);
         let nh = self.harmonics().len();
         for port in ports.iter() {
-            self.series[port.range()].fill(port.series_compliance);
+            self.linear.series[port.range()].fill(port.series_compliance);
         }
         let closed = if self.aft.harmonics[0] == 0 { dynamics.closed(omega) } else { None };
-        self.closed_stiffness.clear();
-        self.closed_stiffness.extend(closed.iter().flat_map(|closed| &closed.springs));
-        self.free_response.clear();
+        self.linear.closed_stiffness.clear();
+        self.linear.closed_stiffness.extend(closed.iter().flat_map(|closed| &closed.springs));
+        self.linear.free_response.clear();
         if let Some(banded) = &mut self.banded {
             // at a singular frequency, take the next floating-point number
-            banded.set_closed_contacts(&self.closed_stiffness);
+            banded.set_closed_contacts(&self.linear.closed_stiffness);
             banded
                 .factor_dynamic_stiffness(omega)
                 .or_else(|_| banded.factor_dynamic_stiffness(omega * (1.0 + f64::EPSILON)))?;
         } else {
-            self.receptance = self.receptance(ports, dynamics, omega)?;
+            self.linear.receptance = self.receptance(ports, dynamics, omega)?;
         }
         for k in 0..nh {
             let h = self.aft.harmonics[k];
@@ -62,11 +62,11 @@ impl Discretization {
             }
             for q in 0..ports.count() {
                 let axis = ports.axis(system, q);
-                self.linear_motion[q * nh + k] = axis.complex_component(&free) + axis.imposed_at(h as u32);
+                self.linear.motion[q * nh + k] = axis.complex_component(&free) + axis.imposed_at(h as u32);
             }
-            self.free_response.push(free);
+            self.linear.free_response.push(free);
         }
-        for (q, imposed) in self.imposed.iter_mut().enumerate() {
+        for (q, imposed) in self.linear.imposed.iter_mut().enumerate() {
             *imposed = ports.axis(system, q).imposed_at(0).re;
         }
         if !ports.has_forces() {
@@ -82,7 +82,7 @@ impl Discretization {
             Some(banded) => banded.direct_receptances(rate),
             None => dynamics.direct_receptances(rate, omega).map_err(|_| rate)?,
         };
-        for (penalty, port) in self.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
+        for (penalty, port) in self.linear.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             // one penalty for all axes of a port, so that its plane has no preferred direction
             let mean = port.range().map(|q| smooth[q]).sum::<f64>() / port.axes as f64;
             let receptance = mean + port.series_compliance;
@@ -93,13 +93,13 @@ impl Discretization {
                 penalty_of(receptance, top, omega).max(LEAST_EPSILON_RATIO * port.least_penalty)
             };
         }
-        self.largest_holding_force = 0.0;
-        for (penalty, port) in self.penalty.iter().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
+        self.linear.largest_holding_force = 0.0;
+        for (penalty, port) in self.linear.penalty.iter().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             for q in port.range() {
-                let moving = self.linear_motion[q * nh..(q + 1) * nh].iter().zip(&self.aft.harmonics);
+                let moving = self.linear.motion[q * nh..(q + 1) * nh].iter().zip(&self.aft.harmonics);
                 let velocity = moving.map(|(c, h)| *h as f64 * omega * c.norm()).fold(0.0, f64::max);
                 if velocity > 0.0 {
-                    self.largest_holding_force = self.largest_holding_force.max(penalty * velocity);
+                    self.linear.largest_holding_force = self.linear.largest_holding_force.max(penalty * velocity);
                 }
             }
         }
@@ -112,12 +112,12 @@ impl Discretization {
         let harmonics = self.harmonics();
         if let Some(structure) = dynamics.modes_for(ports).filter(|_| !self.with_matrix) {
             let closed = if harmonics[0] == 0 { dynamics.closed(omega) } else { None };
-            let modal = ModalReceptance::new((structure, closed), (harmonics, omega), &self.series);
+            let modal = ModalReceptance::new((structure, closed), (harmonics, omega), &self.linear.series);
             return modal.map(Receptance::Modal).map_err(|_| omega);
         }
         let formed = harmonics.iter().map(|&h| {
             let mut receptance = dynamics.receptance(h, omega).map_err(|_| h as f64 * omega)?;
-            self.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
+            self.linear.series.iter().enumerate().for_each(|(q, series)| receptance[(q, q)] += series);
             Ok(receptance)
         });
         Ok(Receptance::Formed(ReceptanceMatrices::new(formed.collect::<Result<_, f64>>()?)))

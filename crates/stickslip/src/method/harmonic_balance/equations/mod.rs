@@ -40,7 +40,7 @@ mod scaled_unknowns;
 mod scaling;
 
 use super::aft::{FrequencyTime, InitialState, Port, Ports, tangent_range, tangent_ranges};
-use super::budget::{POINT_LIMIT, WorkShare};
+use super::budget::WorkCounter;
 use super::dynamics::banded::BandedForm;
 use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
 use super::equations::harmonic_set::velocity_weight;
@@ -59,97 +59,105 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Factor of the springs of closed contacts in a law's derivative, if the structure contains them.
 pub(super) const CLOSED_CONTACT_SIGN: f64 = -1.0;
 
-/// The discretization by one list of harmonics: equations, scratch memory, and work counters.
+/// The discretized equations by one list of harmonics.
+///
+/// The solver keeps one for every number of harmonics, and prepares it for each frequency.
 #[derive(Debug, Clone)]
 pub(super) struct Discretization {
-    /// Number of evaluations of laws with derivatives, and of eliminations of
-    /// the Jacobian, in the present search.
-    pub evaluations: usize,
-    pub eliminations: usize,
-    /// True if the search begins with the solution of a shorter series, which
-    /// remains valid if the search fails. With unknown forces, the work limit
-    /// then holds without a guaranteed number of steps.
-    pub extends_shorter: bool,
-    /// Work of earlier searches of the present point, here and at other discretizations,
-    /// see [`Discretization::work_used`].
-    pub work_before: WorkShare,
-    pub work_elsewhere: WorkShare,
-    /// Work limit of all these searches together.
-    pub work_limit: WorkShare,
     pub aft: FrequencyTime,
-    /// Receptance of the axes; empty in the banded form.
-    pub(super) receptance: Receptance,
-    /// Penalty ε per port, N s/m; infinite if the motion is imposed.
-    pub(super) penalty: Vec<f64>,
-    /// Force that would hold the contacts against the motion without friction,
-    /// N: the largest product of a penalty and a velocity.
-    largest_holding_force: f64,
-    /// Motion of the axes without friction, [axis][harmonic].
-    pub linear_motion: Vec<Complex64>,
-    /// Mean of the imposed motion along the axes, m.
-    imposed: Vec<f64>,
-    /// Displacements along the axes in static equilibrium, m; empty if unknown.
-    pub equilibrium: Vec<f64>,
-    /// Springs of the proximal-point method for static equilibrium.
-    pub tether: Option<ProximalSprings>,
-    /// Compliances in series with the axes, m/N.
-    series: Vec<f64>,
-    /// Stiffness of closed contacts along the axes (N/m) that the structure contains for the
-    /// mean; empty if it is held without them.
-    pub(super) closed_stiffness: Vec<f64>,
-    /// Forces on the structure: those of the ports minus those of these
-    /// springs, [axis][harmonic], N.
-    acting: Vec<Complex64>,
-    /// Motion of all places without friction, per harmonic.
-    pub free_response: Vec<DVector<Complex64>>,
+    /// The linear part of the equations at the present frequency.
+    pub(super) linear: LinearPart,
     /// Banded form of a large system, in place of receptance and Jacobian.
     pub banded: Option<BandedForm>,
-    /// Memory of the nonlinear elimination, if the system allows it.
-    pub(super) elimination: Option<NonlinearElimination>,
-    /// GMRES with its preconditioner, in place of the Jacobian, for many joints
-    /// that the structure couples.
+    /// GMRES with its preconditioner, in place of the Jacobian, for many joints that the structure
+    /// couples.
     pub(super) newton_krylov: Option<NewtonKrylov>,
     /// True if the Jacobian is needed as a matrix, and the receptances with it.
     with_matrix: bool,
-    /// Number of products with the Jacobian in the present search.
-    pub products: usize,
-    /// Derivatives K or T of all ports in sequence, see [`tangent_ranges`].
-    pub(super) tangents: Vec<f64>,
-    pub(super) blocks: Vec<usize>,
-    /// Per axis: true if its unknown is a force.
-    forces: Vec<bool>,
-    pub(super) jacobian: Vec<f64>,
-    pub(super) residual: Vec<f64>,
-    /// Units of the residual.
-    pub(super) units: Vec<f64>,
-    pub(super) previous: HarmonicSolution,
-    pub(super) best: HarmonicSolution,
-    /// Forces to which [`Homotopy::proximal_weight`] draws the force unknowns, [axis][harmonic],
-    /// N.
-    pub(super) anchor: Vec<Complex64>,
-    pub(super) step: Vec<f64>,
-    pub(super) image: Vec<Complex64>,
-    /// Per port with memory: the states at t = 0 in the motion evaluated last,
-    /// and how they are forgotten.
-    pub(super) states: Vec<InitialState>,
-    /// True if laws that forget their initial states begin the next motion with these. They
-    /// reach the same states as from static equilibrium, in fewer periods.
-    pub(super) reuses_states: bool,
+    /// Memory of the nonlinear elimination, if the system allows it.
+    pub(super) elimination: Option<NonlinearElimination>,
     /// Coarse sampling of the period, for derivatives of many contacts: see
     /// [`Discretization::complete_derivatives`].
     pub(super) coarse: Option<FrequencyTime>,
-    /// True if the present search uses the coarse sampling.
-    pub(super) uses_coarse: bool,
     /// Sampling with twice the samples, created on first use, see
     /// [`Discretization::correct_twice_the_samples`].
     pub(super) twice: Option<FrequencyTime>,
-    /// True if the tangents are those of the present search, without added springs.
-    pub(super) linearised: bool,
-    /// True if the tangents are those of the initial guess of the next search, by coarse sampling.
-    pub(super) keeps_tangents: bool,
+    /// Displacements along the axes in static equilibrium, m; empty if unknown.
+    pub equilibrium: Vec<f64>,
+    /// Per axis: true if its unknown is a force.
+    forces: Vec<bool>,
+    /// Numbers of derivatives per port in [`Workspace::tangents`], see [`tangent_ranges`].
+    pub(super) blocks: Vec<usize>,
+    pub(super) workspace: Workspace,
+    pub(super) search: SearchState,
+    pub(super) work: WorkCounter,
+}
+
+/// The linear part of the equations at one frequency.
+#[derive(Debug, Clone)]
+pub(super) struct LinearPart {
+    /// Receptance of the axes; empty in the banded form.
+    pub receptance: Receptance,
+    /// Penalty ε per port, N s/m; infinite if the motion is imposed.
+    pub penalty: Vec<f64>,
+    /// Force that would hold the contacts against the motion without friction, N: the largest
+    /// product of a penalty and a velocity.
+    pub largest_holding_force: f64,
+    /// Motion of the axes without friction, [axis][harmonic].
+    pub motion: Vec<Complex64>,
+    /// Motion of all places without friction, per harmonic.
+    pub free_response: Vec<DVector<Complex64>>,
+    /// Mean of the imposed motion along the axes, m.
+    pub imposed: Vec<f64>,
+    /// Compliances in series with the axes, m/N.
+    pub series: Vec<f64>,
+    /// Stiffness of closed contacts along the axes (N/m) that the structure contains for the mean;
+    /// empty if it is held without them.
+    pub closed_stiffness: Vec<f64>,
+}
+
+/// Scratch memory of the equations. Its contents are valid within one step of a search.
+#[derive(Debug, Clone)]
+pub(super) struct Workspace {
+    /// Derivatives K or T of all ports in sequence, see [`tangent_ranges`].
+    pub tangents: Vec<f64>,
+    pub jacobian: Vec<f64>,
+    pub residual: Vec<f64>,
+    /// Units of the residual.
+    pub units: Vec<f64>,
+    /// Newton step, in units of the unknowns.
+    pub step: Vec<f64>,
+    /// The solution before this step, and the best solution of the search.
+    pub previous: HarmonicSolution,
+    pub best: HarmonicSolution,
+    /// Forces on the structure: those of the ports minus those of the springs of closed contacts,
+    /// [axis][harmonic], N.
+    pub acting: Vec<Complex64>,
     /// Motions along the axes under the forces, [axis][harmonic].
-    moved: Vec<Complex64>,
-    product: Vec<f64>,
+    pub moved: Vec<Complex64>,
+    pub image: Vec<Complex64>,
+    pub product: Vec<f64>,
+}
+
+/// State of the present search.
+#[derive(Debug, Clone)]
+pub(super) struct SearchState {
+    /// Forces to which [`Homotopy::proximal_weight`] draws the force unknowns, [axis][harmonic], N.
+    pub anchor: Vec<Complex64>,
+    /// Springs of the proximal point method for static equilibrium.
+    pub tether: Option<ProximalSprings>,
+    /// Per port with memory: the states at t = 0 in the motion evaluated last, and how they are
+    /// forgotten.
+    pub states: Vec<InitialState>,
+    /// True if laws that forget their initial states begin the next motion with these. They reach
+    /// the same states as from static equilibrium, in fewer periods.
+    pub reuses_states: bool,
+    /// True if the search uses the coarse sampling.
+    pub uses_coarse: bool,
+    /// True if the tangents are those of the present search, without added springs.
+    pub linearised: bool,
+    /// True if the tangents are those of the initial guess of the next search, by coarse sampling.
+    pub keeps_tangents: bool,
 }
 
 /// Springs along the axes that tie the mean to an anchor.
@@ -210,7 +218,7 @@ pub(super) enum DerivativeScope {
 impl Discretization {
     pub fn new(harmonics: Vec<usize>, samples: usize, ports: &Ports, banded: Option<BandedForm>) -> Self {
         let mut discretization = Discretization::without_solver(FrequencyTime::new(harmonics, samples), ports, banded);
-        let size = discretization.residual.len();
+        let size = discretization.workspace.residual.len();
         discretization.newton_krylov =
             (discretization.banded.is_none() && uses_krylov(size, ports)).then(NewtonKrylov::default);
         if discretization.newton_krylov.is_some() && !ports.has_forces() {
@@ -230,50 +238,51 @@ impl Discretization {
         let size = 2 * nh * axes;
         let (blocks, tangents) = tangent_ranges(ports, nh);
         let widest = ports.iter().map(|port| port.axes).max().unwrap_or(0);
+        let length = nh * axes;
         Discretization {
-            evaluations: 0,
-            eliminations: 0,
-            extends_shorter: false,
-            work_before: WorkShare::default(),
-            work_elsewhere: WorkShare::default(),
-            work_limit: POINT_LIMIT,
-            aft: aft,
-            receptance: Receptance::Formed(ReceptanceMatrices::default()),
-            penalty: vec![0.0; ports.len()],
-            largest_holding_force: 0.0,
-            linear_motion: vec![ZERO; nh * axes],
-            imposed: vec![0.0; axes],
-            equilibrium: ports.equilibrium().to_vec(),
-            tether: None,
-            series: ports.iter().flat_map(|port| vec![port.series_compliance; port.axes]).collect(),
-            closed_stiffness: Vec::new(),
-            acting: Vec::new(),
-            free_response: Vec::new(),
-            tangents: vec![0.0; tangents],
-            blocks,
-            forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
-            jacobian: Vec::new(),
-            elimination: None,
+            aft,
+            linear: LinearPart {
+                receptance: Receptance::Formed(ReceptanceMatrices::default()),
+                penalty: vec![0.0; ports.len()],
+                largest_holding_force: 0.0,
+                motion: vec![ZERO; length],
+                free_response: Vec::new(),
+                imposed: vec![0.0; axes],
+                series: ports.iter().flat_map(|port| vec![port.series_compliance; port.axes]).collect(),
+                closed_stiffness: Vec::new(),
+            },
+            banded,
             newton_krylov: None,
             with_matrix: false,
-            products: 0,
-            banded: banded,
-            residual: vec![0.0; size],
-            units: vec![1.0; size],
-            previous: HarmonicSolution::zero(nh * axes),
-            best: HarmonicSolution::zero(nh * axes),
-            anchor: Vec::new(),
-            step: vec![0.0; size],
-            image: vec![ZERO; nh * widest],
-            states: vec![InitialState::default(); ports.len()],
-            reuses_states: false,
+            elimination: None,
             coarse: None,
-            uses_coarse: false,
             twice: None,
-            linearised: false,
-            keeps_tangents: false,
-            moved: vec![ZERO; nh * axes],
-            product: Vec::new(),
+            equilibrium: ports.equilibrium().to_vec(),
+            forces: ports.iter().flat_map(|port| vec![port.is_force(); port.axes]).collect(),
+            blocks,
+            workspace: Workspace {
+                tangents: vec![0.0; tangents],
+                jacobian: Vec::new(),
+                residual: vec![0.0; size],
+                units: vec![1.0; size],
+                step: vec![0.0; size],
+                previous: HarmonicSolution::zero(length),
+                best: HarmonicSolution::zero(length),
+                acting: Vec::new(),
+                moved: vec![ZERO; length],
+                image: vec![ZERO; nh * widest],
+                product: Vec::new(),
+            },
+            search: SearchState {
+                anchor: Vec::new(),
+                tether: None,
+                states: vec![InitialState::default(); ports.len()],
+                reuses_states: false,
+                uses_coarse: false,
+                linearised: false,
+                keeps_tangents: false,
+            },
+            work: WorkCounter::default(),
         }
     }
 
@@ -301,15 +310,14 @@ impl Discretization {
             (0..cyclic.sectors).flat_map(|s| (0..own).map(move |i| values[i] * lead(s, i))).collect()
         };
         let motion = HarmonicSolution { c: all(&motion.c), force: all(&motion.force), ..*motion };
-        let discretization = Discretization {
-            penalty: (0..ports.len()).map(|p| self.penalty[p % self.penalty.len()]).collect(),
-            ..Discretization::without_solver(self.aft.clone(), ports, None)
-        };
+        let mut discretization = Discretization::without_solver(self.aft.clone(), ports, None);
+        let own = &self.linear.penalty;
+        discretization.linear.penalty = (0..ports.len()).map(|p| own[p % own.len()]).collect();
         (discretization, motion)
     }
 
     /// Evaluates forces and residual at the unknowns in `motion`, and updates the other part of
-    /// `motion`. Writes the derivatives of the ports into `self.tangents`, see
+    /// `motion`. Writes the derivatives of the ports into `self.workspace.tangents`, see
     /// [`DerivativeScope`]. Returns the relative size of the residual.
     pub fn evaluate(
         &mut self,
@@ -320,7 +328,7 @@ impl Discretization {
         length: f64,
         slopes: DerivativeScope,
     ) -> f64 {
-        self.evaluations += usize::from(slopes != DerivativeScope::None);
+        self.work.evaluations += usize::from(slopes != DerivativeScope::None);
         self.motion_port_forces(ports, omega, motion, homotopy, slopes);
         self.structure_motion(motion, homotopy);
         self.force_port_residuals(ports, omega, motion, homotopy, slopes);
@@ -332,8 +340,9 @@ impl Discretization {
             for q in port.range() {
                 for (k, &h) in self.aft.harmonics.iter().enumerate() {
                     let at = 2 * (q * nh + k);
-                    let square = self.residual[at] * self.residual[at] + self.residual[at + 1] * self.residual[at + 1];
-                    let unit = self.units[at];
+                    let square = self.workspace.residual[at] * self.workspace.residual[at]
+                        + self.workspace.residual[at + 1] * self.workspace.residual[at + 1];
+                    let unit = self.workspace.units[at];
                     sum += square * if port.is_force() { 1.0 } else { velocity_weight(h) } / (unit * unit);
                 }
             }
@@ -356,17 +365,17 @@ impl Discretization {
             let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
             let wanted =
                 slopes == DerivativeScope::All || (slopes == DerivativeScope::Cheap && !port.has_memory_steps());
-            let slot = wanted.then_some(&mut self.tangents[tangent_range(&self.blocks, p, port, nh)]);
+            let slot = wanted.then_some(&mut self.workspace.tangents[tangent_range(&self.blocks, p, port, nh)]);
             let (c, force) = (&motion.c[range.clone()], &mut motion.force[range]);
-            if port.has_memory_steps() && self.reuses_states {
-                self.aft.known_state = self.states[p].if_forgotten();
+            if port.has_memory_steps() && self.search.reuses_states {
+                self.aft.known_state = self.search.states[p].if_forgotten();
             }
             self.aft.motion_port_force(port, (omega, homotopy.limit_factor), c, force, slot);
             if wanted {
                 self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
             }
             if port.has_memory_steps() {
-                self.states[p].state.clone_from(&self.aft.state);
+                self.search.states[p].state.clone_from(&self.aft.state);
             }
         }
     }
@@ -377,12 +386,12 @@ impl Discretization {
         let nh = self.harmonics().len();
         let share = self.load_factor(homotopy);
         self.compute_structure_forces(motion, share);
-        let acting = if self.closed_stiffness.is_empty() { &motion.force } else { &self.acting };
+        let acting = if self.linear.closed_stiffness.is_empty() { &motion.force } else { &self.workspace.acting };
         if self.banded.is_none() {
-            self.receptance.apply(acting, &mut self.moved);
+            self.linear.receptance.apply(acting, &mut self.workspace.moved);
         }
         for k in 0..nh {
-            let (residual, linear, forces) = (&mut self.residual, &self.linear_motion, &self.forces);
+            let (residual, linear, forces) = (&mut self.workspace.residual, &self.linear.motion, &self.forces);
             let c = &mut motion.c;
             let share = if self.aft.harmonics[k] == 0 { share } else { 1.0 };
             let mut follow = |q: usize, u: Complex64| {
@@ -400,7 +409,7 @@ impl Discretization {
                     banded.response_along_axes(k, |q| acting[q * nh + k], follow);
                 }
                 None => {
-                    self.moved.chunks_exact(nh).enumerate().for_each(|(q, u)| follow(q, u[k]));
+                    self.workspace.moved.chunks_exact(nh).enumerate().for_each(|(q, u)| follow(q, u[k]));
                 }
             }
         }
@@ -431,10 +440,10 @@ impl Discretization {
     ) {
         let (port, nh) = (&ports[p], self.harmonics().len());
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
-        let penalty = self.penalty[p];
+        let penalty = self.linear.penalty[p];
         let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
-        let slot = &mut self.tangents[tangent_range(&self.blocks, p, port, nh)];
-        let image = &mut self.image[..range.len()];
+        let slot = &mut self.workspace.tangents[tangent_range(&self.blocks, p, port, nh)];
+        let image = &mut self.workspace.image[..range.len()];
         let slot = (slopes != DerivativeScope::None).then(|| {
             slot.fill(0.0);
             slot
@@ -443,9 +452,9 @@ impl Discretization {
         for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
             let mut r = force - image;
             if homotopy.proximal_weight > 0.0 {
-                r += (force - self.anchor[at]) * homotopy.proximal_weight;
+                r += (force - self.search.anchor[at]) * homotopy.proximal_weight;
             }
-            (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
+            (self.workspace.residual[2 * at], self.workspace.residual[2 * at + 1]) = (r.re, r.im);
         }
     }
 
@@ -456,33 +465,33 @@ impl Discretization {
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
             self.add_springs(p, port, -CLOSED_CONTACT_SIGN);
             let (wide, unit) = (pair * port.axes, port.unit(length));
-            let step = &self.step[port.first_axis * pair..][..wide];
-            let rows = self.tangents[tangent_range(&self.blocks, p, port, pair / 2)].chunks_exact(2 * wide);
+            let step = &self.workspace.step[port.first_axis * pair..][..wide];
+            let rows = self.workspace.tangents[tangent_range(&self.blocks, p, port, pair / 2)].chunks_exact(2 * wide);
             for (force, rows) in motion.force[port.first_axis * pair / 2..].iter_mut().zip(rows) {
                 let (re, im) = rows.split_at(wide);
                 *force -= Complex64::new(dot(re, step), dot(im, step)) * unit;
             }
         }
-        self.linearised = false;
+        self.search.linearised = false;
     }
 
     /// Begins a point. All searches of the point share one work limit.
     pub fn begin_point(&mut self) {
-        (self.evaluations, self.eliminations, self.products, self.aft.law_steps) = (0, 0, 0, 0);
-        (self.work_before, self.work_elsewhere) = (WorkShare::default(), WorkShare::default());
-        self.extends_shorter = false;
-        if let Some(settling) = &mut self.elimination {
-            settling.is_useful = true;
+        self.work.begin_point();
+        self.aft.law_steps = 0;
+        if let Some(elimination) = &mut self.elimination {
+            elimination.is_useful = true;
         }
     }
 
     /// Begins a search without known states of the laws with memory.
     pub fn begin_search(&mut self, ports: &Ports) {
-        self.work_before = self.point_work_used(ports);
-        (self.evaluations, self.eliminations, self.products, self.aft.law_steps) = (0, 0, 0, 0);
-        (self.reuses_states, self.linearised, self.uses_coarse) = (false, false, self.coarse.is_some());
-        self.keeps_tangents = false;
-        self.states.iter_mut().for_each(|known| *known = InitialState::default());
+        self.work.begin_search(self.point_work_used(ports));
+        self.aft.law_steps = 0;
+        let search = &mut self.search;
+        (search.reuses_states, search.linearised, search.keeps_tangents) = (false, false, false);
+        search.uses_coarse = self.coarse.is_some();
+        search.states.iter_mut().for_each(|known| *known = InitialState::default());
     }
 
     /// Tells whether the states of a law may cross their range between two
@@ -499,16 +508,16 @@ impl Discretization {
 
     /// Tells whether contacts alone hold some body.
     pub fn is_held_by_contacts(&self) -> bool {
-        !self.closed_stiffness.is_empty()
+        !self.linear.closed_stiffness.is_empty()
     }
 
     /// Returns the static equilibrium times `share`. If it is unknown, returns
     /// the mean on closed contacts.
     pub fn static_solution(&self, share: f64) -> HarmonicSolution {
         let nh = self.harmonics().len();
-        let mut motion = HarmonicSolution::zero(self.linear_motion.len());
+        let mut motion = HarmonicSolution::zero(self.linear.motion.len());
         let known = &self.equilibrium;
-        let still = |i: usize| known.get(i / nh).map_or(self.linear_motion[i], |u| Complex64::new(*u, 0.0));
+        let still = |i: usize| known.get(i / nh).map_or(self.linear.motion[i], |u| Complex64::new(*u, 0.0));
         motion.c.iter_mut().enumerate().step_by(nh).for_each(|(i, c)| *c = still(i) * share);
         motion
     }
@@ -527,13 +536,13 @@ impl Discretization {
             return;
         }
         let nh = self.aft.harmonics.len();
-        self.acting.clone_from(&motion.force);
-        for (q, (k, imposed)) in self.closed_stiffness.iter().zip(&self.imposed).enumerate() {
-            self.acting[q * nh] -= (motion.c[q * nh] - imposed * share) * *k;
+        self.workspace.acting.clone_from(&motion.force);
+        for (q, (k, imposed)) in self.linear.closed_stiffness.iter().zip(&self.linear.imposed).enumerate() {
+            self.workspace.acting[q * nh] -= (motion.c[q * nh] - imposed * share) * *k;
         }
-        if let Some(tether) = &self.tether {
-            for (q, (k, anchor)) in self.closed_stiffness.iter().zip(&tether.anchor).enumerate() {
-                self.acting[q * nh] += (motion.c[q * nh] - anchor) * (tether.relative_stiffness * k);
+        if let Some(tether) = &self.search.tether {
+            for (q, (k, anchor)) in self.linear.closed_stiffness.iter().zip(&tether.anchor).enumerate() {
+                self.workspace.acting[q * nh] += (motion.c[q * nh] - anchor) * (tether.relative_stiffness * k);
             }
         }
     }
@@ -542,12 +551,12 @@ impl Discretization {
     /// see [`Discretization::closed_stiffness`].
     pub fn structure_forces<'a>(&'a mut self, motion: &'a HarmonicSolution) -> &'a [Complex64] {
         self.compute_structure_forces(motion, 1.0);
-        if self.is_held_by_contacts() { &self.acting } else { &motion.force }
+        if self.is_held_by_contacts() { &self.workspace.acting } else { &motion.force }
     }
 
     /// Returns the stiffness of the tether, relative to the springs of closed contacts.
     pub(super) fn proximal_stiffness(&self) -> f64 {
-        self.tether.as_ref().map_or(0.0, |tether| tether.relative_stiffness)
+        self.search.tether.as_ref().map_or(0.0, |tether| tether.relative_stiffness)
     }
 
     /// Adds `share` times the springs of closed contacts to the derivative of
@@ -556,8 +565,8 @@ impl Discretization {
     pub(super) fn add_springs(&mut self, p: usize, port: &Port, share: f64) {
         let nh = self.aft.harmonics.len();
         let tall = 2 * nh * port.axes;
-        let tangent = &mut self.tangents[tangent_range(&self.blocks, p, port, nh)];
-        for (a, k) in self.closed_stiffness.iter().skip(port.first_axis).take(port.axes).enumerate() {
+        let tangent = &mut self.workspace.tangents[tangent_range(&self.blocks, p, port, nh)];
+        for (a, k) in self.linear.closed_stiffness.iter().skip(port.first_axis).take(port.axes).enumerate() {
             let at = 2 * nh * a;
             tangent[at * tall + at] += share * k;
         }
@@ -565,19 +574,19 @@ impl Discretization {
 
     /// Returns the motion without friction.
     pub fn frictionless_motion(&self) -> HarmonicSolution {
-        HarmonicSolution { c: self.linear_motion.clone(), ..HarmonicSolution::zero(self.linear_motion.len()) }
+        HarmonicSolution { c: self.linear.motion.clone(), ..HarmonicSolution::zero(self.linear.motion.len()) }
     }
 
     /// Samples the forces of a port, into `self.aft`.
     pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &HarmonicSolution) {
         let nh = self.harmonics().len();
         let port = &ports[p];
-        if self.linearised && port.has_memory_steps() {
-            self.aft.known_state = self.states[p].if_forgotten();
+        if self.search.linearised && port.has_memory_steps() {
+            self.aft.known_state = self.search.states[p].if_forgotten();
         }
         self.aft.static_share = 1.0;
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
-        self.aft.sample(port, (omega, self.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
+        self.aft.sample(port, (omega, self.linear.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
     }
 
     /// Returns the forces along all axes at the harmonics `wanted`, per harmonic, from the
@@ -599,7 +608,7 @@ impl Discretization {
         forces
     }
 
-    /// Computes the Newton step by GMRES. `self.step` contains the residual in units on entry
+    /// Computes the Newton step by GMRES. `self.workspace.step` contains the residual in units on entry
     /// and the step on return. Returns false if GMRES does not converge.
     pub(super) fn krylov_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
         let Some(coupled) = &mut self.newton_krylov else { return false };
@@ -609,39 +618,43 @@ impl Discretization {
             omega,
             homotopy,
             length: near.length,
-            penalty: &self.penalty,
-            tangents: &self.tangents,
+            penalty: &self.linear.penalty,
+            tangents: &self.workspace.tangents,
             blocks: &self.blocks,
-            units: &self.units,
+            units: &self.workspace.units,
         };
-        let (found, products) = coupled.step(&linear, &mut self.receptance, &mut self.step, near);
-        self.products += products;
+        let (found, products) = coupled.step(&linear, &mut self.linear.receptance, &mut self.workspace.step, near);
+        self.work.products += products;
         found
     }
 
     /// Assembles the Jacobian from the tangents, rows and columns in units.
     /// Returns false if the receptances are not matrices.
     pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, length: f64) -> bool {
-        let Receptance::Formed(formed) = &self.receptance else { return false };
+        let Receptance::Formed(formed) = &self.linear.receptance else { return false };
         let linear = LinearizedEquations {
             ports,
             harmonics: &self.aft.harmonics,
             omega,
             homotopy,
             length,
-            penalty: &self.penalty,
-            tangents: &self.tangents,
+            penalty: &self.linear.penalty,
+            tangents: &self.workspace.tangents,
             blocks: &self.blocks,
-            units: &self.units,
+            units: &self.workspace.units,
         };
-        linear.matrix(&formed.matrices, linear.harmonics.len(), (&mut self.product, &mut self.jacobian));
+        linear.matrix(
+            &formed.matrices,
+            linear.harmonics.len(),
+            (&mut self.workspace.product, &mut self.workspace.jacobian),
+        );
         true
     }
 
     /// Returns the mean of the joint's motion along an axis without the imposed motion, m.
     pub fn mean(&self, q: usize, motion: &HarmonicSolution) -> f64 {
         let at = q * self.harmonics().len();
-        motion.c[at].re + self.series[q] * motion.force[at].re - self.imposed[q]
+        motion.c[at].re + self.linear.series[q] * motion.force[at].re - self.linear.imposed[q]
     }
 }
 
@@ -726,8 +739,8 @@ mod tests {
         for (constant, harmonics) in [(0.0, vec![1, 3, 5]), (0.2, vec![0, 1, 2, 3])] {
             let case = Case::new(mixed(6, constant), 0.9);
             let mut discretization = case.discretization(harmonics, false);
-            let size = discretization.residual.len();
-            let mut motion = HarmonicSolution::zero(discretization.linear_motion.len());
+            let size = discretization.workspace.residual.len();
+            let mut motion = HarmonicSolution::zero(discretization.linear.motion.len());
             // the mean has no imaginary part
             let real =
                 |i: usize| discretization.harmonics()[(i / 2) % discretization.harmonics().len()] == 0 && i % 2 == 1;
@@ -789,7 +802,7 @@ mod tests {
                 let case = Case::new(system, std::f64::consts::TAU * hertz);
                 let solution = |top: usize, factor: f64| {
                     let mut discretization = case.discretization((1..=top).step_by(2).collect(), false);
-                    discretization.penalty[0] *= factor;
+                    discretization.linear.penalty[0] *= factor;
                     let start = discretization.initial_guess(&case.system, &case.ports, None, case.omega);
                     let motion = discretization.solve(&case.ports, case.omega, start).unwrap();
                     postprocess::places(&mut discretization, &case.dynamics, case.omega, &motion).unwrap()

@@ -21,12 +21,12 @@ impl Discretization {
         self.unpack(ports, (unknowns, length), motion);
         let slopes = if jacobian.is_some() { DerivativeScope::All } else { DerivativeScope::None };
         self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, slopes);
-        for ((out, r), unit) in residual.iter_mut().zip(&self.residual).zip(&self.units) {
+        for ((out, r), unit) in residual.iter_mut().zip(&self.workspace.residual).zip(&self.workspace.units) {
             *out = r / unit;
         }
         if let Some(jacobian) = jacobian {
             if self.assemble(ports, omega, GIVEN_EQUATIONS, length) {
-                jacobian.copy_from_slice(&self.jacobian);
+                jacobian.copy_from_slice(&self.workspace.jacobian);
             } else {
                 jacobian.fill(f64::NAN);
             }

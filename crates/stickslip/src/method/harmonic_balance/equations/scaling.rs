@@ -28,10 +28,10 @@ impl Discretization {
         let mut size = norm(&motion.c, 0);
         if self.is_held_by_contacts() {
             // a large mean must not define the length
-            let standing = norm(&self.linear_motion, 0);
+            let standing = norm(&self.linear.motion, 0);
             size = size.min(MEAN_BOUND * (norm(&motion.c, 1) + standing)).max(LEAST_LENGTH_SHARE * standing);
         }
-        (size + 1e-2 * norm(&self.linear_motion, 1)).max(ZERO_LENGTH)
+        (size + 1e-2 * norm(&self.linear.motion, 1)).max(ZERO_LENGTH)
     }
 
     /// Computes the units of the residual. The unit of motions is the length. The unit of
@@ -43,21 +43,21 @@ impl Discretization {
         let forces = ports.iter().filter(|port| port.is_force()).flat_map(Port::range);
         let largest =
             forces.flat_map(|q| &motion.force[q * nh..(q + 1) * nh]).map(|f| f.norm_sqr()).fold(0.0, f64::max);
-        let in_play = (self.largest_holding_force + largest.sqrt()).max(ZERO_LENGTH);
+        let in_play = (self.linear.largest_holding_force + largest.sqrt()).max(ZERO_LENGTH);
         for port in ports.iter() {
             let unit = port.unit(length);
             let unit = if port.is_force() { unit.min(in_play) } else { unit };
-            self.units[2 * nh * port.first_axis..2 * nh * (port.first_axis + port.axes)].fill(unit);
+            self.workspace.units[2 * nh * port.first_axis..2 * nh * (port.first_axis + port.axes)].fill(unit);
             if port.is_force() || self.aft.harmonics[0] != 0 {
                 continue;
             }
             for q in port.range() {
                 let moved = match self.banded {
                     Some(_) => 0.0,
-                    None => self.receptance.mean_receptance(q) * motion.force[q * nh].norm(),
+                    None => self.linear.receptance.mean_receptance(q) * motion.force[q * nh].norm(),
                 };
-                let large = unit + self.linear_motion[q * nh].norm().min(moved);
-                (self.units[2 * q * nh], self.units[2 * q * nh + 1]) = (large, large);
+                let large = unit + self.linear.motion[q * nh].norm().min(moved);
+                (self.workspace.units[2 * q * nh], self.workspace.units[2 * q * nh + 1]) = (large, large);
             }
         }
     }
@@ -67,6 +67,6 @@ impl Discretization {
     pub fn sticking_limit_factor(&self, ports: &Ports) -> f64 {
         let limits = ports.iter().filter(|port| port.is_force()).map(|port| port.scale);
         let least = limits.filter(|limit| *limit > 0.0).fold(f64::INFINITY, f64::min);
-        Some(4.0 * self.largest_holding_force / least).filter(|factor| factor.is_finite()).unwrap_or(1.0)
+        Some(4.0 * self.linear.largest_holding_force / least).filter(|factor| factor.is_finite()).unwrap_or(1.0)
     }
 }

@@ -90,7 +90,7 @@ impl Discretization {
             if !left.is_finite() || waited > STAGNATION_STEPS || self.is_budget_used(ports) {
                 return false;
             }
-            self.evaluations += 1;
+            self.work.evaluations += 1;
             self.motion_port_forces(ports, omega, motion, GIVEN_EQUATIONS, DerivativeScope::All);
             self.structure_motion(motion, GIVEN_EQUATIONS);
             let length = self.motion_scale(motion);
@@ -100,16 +100,16 @@ impl Discretization {
                 argument((self, p, port), omega, motion, &mut along.argument);
                 match &mut along.barriers[p] {
                     Some(barrier) => {
-                        barrier.linearise(&mut along.aft, &along.argument, &mut self.tangents[tangent]);
+                        barrier.linearise(&mut along.aft, &along.argument, &mut self.workspace.tangents[tangent]);
                     }
                     None => self.force_port_residual(ports, p, omega, motion, (GIVEN_EQUATIONS, DerivativeScope::All)),
                 }
             }
-            self.previous.copy_from(motion);
+            self.workspace.previous.copy_from(motion);
             let near = StepStart { length, residual: 1.0, coarse: false, same_derivatives: false };
             let Some(ahead) = self.interior_step(ports, omega, motion, &mut along, (0.0, near)) else { return false };
             let gap = along.gap(0.0) * (along.gap(ahead) / along.gap(0.0)).powi(3);
-            motion.copy_from(&self.previous);
+            motion.copy_from(&self.workspace.previous);
             self.structure_motion(motion, GIVEN_EQUATIONS);
             let Some(share) = self.interior_step(ports, omega, motion, &mut along, (gap, near)) else { return false };
             motion.iterations += 1;
@@ -131,7 +131,7 @@ impl Discretization {
             argument: vec![Complex64::default(); nh],
         };
         let limits: Vec<Option<f64>> =
-            ports.iter().zip(&self.penalty).map(|(port, e)| port.limit().filter(|_| e.is_finite())).collect();
+            ports.iter().zip(&self.linear.penalty).map(|(port, e)| port.limit().filter(|_| e.is_finite())).collect();
         if limits.iter().all(Option::is_none) {
             return None;
         }
@@ -165,11 +165,11 @@ impl Discretization {
         let corrected = gap > 0.0;
         for (p, port) in ports.iter().enumerate() {
             let Some(barrier) = &mut along.barriers[p] else { continue };
-            barrier.set_targets((gap, corrected), &mut along.aft, &mut self.image[..nh]);
+            barrier.set_targets((gap, corrected), &mut along.aft, &mut self.workspace.image[..nh]);
             let range = port.first_axis * nh..(port.first_axis + 1) * nh;
-            for (at, (force, image)) in range.clone().zip(motion.force[range].iter().zip(&self.image)) {
+            for (at, (force, image)) in range.clone().zip(motion.force[range].iter().zip(&self.workspace.image)) {
                 let r = force - image;
-                (self.residual[2 * at], self.residual[2 * at + 1]) = (r.re, r.im);
+                (self.workspace.residual[2 * at], self.workspace.residual[2 * at + 1]) = (r.re, r.im);
             }
         }
         let found = match corrected {
@@ -206,7 +206,7 @@ fn argument(
     let at = port.first_axis * y.len();
     let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(discretization.harmonics());
     for (y, ((c, force), h)) in y.iter_mut().zip(own) {
-        *y = force + c * Complex64::new(0.0, discretization.penalty[p] * *h as f64 * omega);
+        *y = force + c * Complex64::new(0.0, discretization.linear.penalty[p] * *h as f64 * omega);
     }
 }
 

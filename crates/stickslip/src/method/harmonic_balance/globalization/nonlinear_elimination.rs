@@ -56,13 +56,15 @@ impl Discretization {
     /// Tells whether nonlinear elimination can follow the next step. Stores the
     /// derivatives of that step.
     pub(crate) fn can_eliminate(&mut self, ports: &Ports) -> bool {
-        let Some(banded) = self.banded.as_ref().filter(|_| self.closed_stiffness.is_empty()) else { return false };
+        let Some(banded) = self.banded.as_ref().filter(|_| self.linear.closed_stiffness.is_empty()) else {
+            return false;
+        };
         if ports.iter().any(|port| port.is_force() || port.has_memory_steps()) {
             return false;
         }
         let settling = self.elimination.get_or_insert_with(|| NonlinearElimination::new(Adjacency::new(banded, ports)));
         if settling.is_useful {
-            settling.tangents.clone_from(&self.tangents);
+            settling.tangents.clone_from(&self.workspace.tangents);
         }
         settling.is_useful
     }
@@ -82,7 +84,7 @@ impl Discretization {
         settling.is_useful = after.is_some_and(|after| after < USEFUL_SHARE * beaten);
         let after = after.filter(|after| *after < (1.0 - SUFFICIENT_DECREASE) * beaten);
         if after.is_none() {
-            self.step.copy_from_slice(&settling.step);
+            self.workspace.step.copy_from_slice(&settling.step);
         }
         self.elimination = Some(settling);
         after
@@ -98,7 +100,7 @@ impl Discretization {
     ) -> Option<f64> {
         let NonlinearElimination { neighbours, tangents, step, nonlinear_forces: beyond, residual_steps: left, .. } =
             settling;
-        step.clone_from(&self.step);
+        step.clone_from(&self.workspace.step);
         let sizes: Vec<f64> = ports.iter().map(|port| self.port_residual(port)).collect();
         let largest = sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
         let missed: Vec<bool> = sizes.iter().map(|size| *size > LOCAL_RESIDUAL * largest).collect();
@@ -113,10 +115,10 @@ impl Discretization {
             let along = (&**tangents, &**step, &mut **beyond, &mut **left);
             self.solve_cluster(ports, &cluster, &mut subdomain, along, (omega, homotopy, length));
         }
-        self.eliminations += 1;
+        self.work.eliminations += 1;
         // the step of all contacts with the nonlinear parts of these forces
         self.banded.as_mut()?.solve_along_axes(beyond);
-        for ((d, left), (step, moved)) in self.step.iter_mut().zip(&*left).zip(step.iter().zip(&*beyond)) {
+        for ((d, left), (step, moved)) in self.workspace.step.iter_mut().zip(&*left).zip(step.iter().zip(&*beyond)) {
             *d = step + (moved + left) / length;
         }
         self.apply_step(ports, motion, 1.0, length);
@@ -126,7 +128,8 @@ impl Discretization {
     /// Returns the size of the residual along a port, weighted as velocities.
     fn port_residual(&self, port: &Port) -> f64 {
         let nh = self.harmonics().len();
-        let pairs = self.residual[2 * port.first_axis * nh..2 * (port.first_axis + port.axes) * nh].chunks_exact(2);
+        let pairs =
+            self.workspace.residual[2 * port.first_axis * nh..2 * (port.first_axis + port.axes) * nh].chunks_exact(2);
         let weights = self.harmonics().iter().cycle().map(|h| velocity_weight(*h));
         pairs.zip(weights).map(|(r, w)| w * (r[0] * r[0] + r[1] * r[1])).sum::<f64>().sqrt()
     }
@@ -157,7 +160,7 @@ impl Discretization {
             residual: Vec::new(),
             size: 0.0,
         };
-        let mut trial = TrialStep { step: along(&self.step), ..zero.clone() };
+        let mut trial = TrialStep { step: along(&self.workspace.step), ..zero.clone() };
         let mut now = zero;
         self.measure_cluster(ports, cluster, subdomain, tangents, &mut now);
         let whole = now.size;
@@ -221,7 +224,7 @@ impl Discretization {
             let step = &trial.step[at..at + own];
             let slopes = &mut trial.slopes[from..from + own * own];
             c.clear();
-            let before = self.previous.c[range.clone()].iter();
+            let before = self.workspace.previous.c[range.clone()].iter();
             c.extend(before.zip(step.chunks_exact(2)).map(|(c, d)| c - Complex64::new(d[0], d[1])));
             force.clone_from(&c);
             self.aft.motion_port_force(port, (omega, homotopy.limit_factor), &c, &mut force, Some(slopes));
@@ -229,7 +232,7 @@ impl Discretization {
             slopes.iter_mut().zip(given).for_each(|(slope, given)| *slope -= given);
             let changed = force
                 .iter()
-                .zip(&self.previous.force[range])
+                .zip(&self.workspace.previous.force[range])
                 .flat_map(|(f, before)| [f.re - before.re, f.im - before.im]);
             for (beyond, (changed, row)) in
                 trial.nonlinear_force[at..].iter_mut().zip(changed.zip(given.chunks_exact(own)))

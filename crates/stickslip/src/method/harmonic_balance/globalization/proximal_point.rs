@@ -48,7 +48,7 @@ impl Discretization {
         motion: &mut HarmonicSolution,
     ) -> Result<(), SolveError> {
         self.begin_search(ports);
-        self.anchor.clone_from(&motion.force);
+        self.search.anchor.clone_from(&motion.force);
         let mut good = HarmonicSolution { residual: f64::INFINITY, ..motion.clone() };
         let (mut pull, mut factor) = (FIRST_WEIGHT, 1.0f64);
         for _ in 0..MOST {
@@ -68,7 +68,7 @@ impl Discretization {
                     return Ok(());
                 }
                 good.copy_from(motion);
-                self.anchor.clone_from(&motion.force);
+                self.search.anchor.clone_from(&motion.force);
                 pull = next;
                 if motion.iterations - before <= QUICK || factor == 1.0 {
                     factor = (factor * factor).clamp(REDUCTION[0], REDUCTION[1]);

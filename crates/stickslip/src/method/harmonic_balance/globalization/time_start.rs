@@ -86,7 +86,7 @@ impl HarmonicBalanceSolver {
         let (nh, n) = (discretization.harmonics().len(), discretization.aft.samples());
         let mut motion = HarmonicSolution {
             found_by: FoundBy::TimeIntegration,
-            ..HarmonicSolution::zero(discretization.linear_motion.len())
+            ..HarmonicSolution::zero(discretization.linear.motion.len())
         };
         let samples: Vec<_> = (0..n).map(|i| path.sample(TAU / omega * i as f64 / n as f64).joints).collect();
         for port in self.ports.iter() {

@@ -727,13 +727,13 @@ mod tests {
             let directions: Vec<_> = (0..ports.count()).map(|q| ports.axis(system, q).rows().to_vec()).collect();
             let structure = Arc::new(UncoupledDynamics::new(system.structure(), &directions).unwrap());
             let series = vec![0.0; ports.count()];
-            discretization.receptance =
+            discretization.linear.receptance =
                 Receptance::Modal(ModalReceptance::new((&structure, None), (harmonics, omega), &series).unwrap());
         }
         let start = discretization.initial_guess(system, &ports, None, omega);
         let found = discretization.solve(&ports, omega, start);
         let found = found.unwrap_or_else(|error| panic!("{form:?} at {omega}: {error:?}"));
-        (found, discretization.products, discretization.aft.law_steps)
+        (found, discretization.work.products, discretization.aft.law_steps)
     }
 
     fn agree(system: &System, harmonics: &[usize], forms: &[SolverForm]) {
@@ -792,9 +792,9 @@ mod tests {
         let ports = Ports::new(&system).unwrap();
         let mut discretization = Discretization::new(vec![1], 64, &ports, None);
         discretization.begin_search(&ports);
-        discretization.evaluations = 10_000;
+        discretization.work.evaluations = 10_000;
         assert!(discretization.newton_krylov.is_some() && !discretization.is_budget_used(&ports));
-        discretization.products = 1_000_000;
+        discretization.work.products = 1_000_000;
         assert!(discretization.is_budget_used(&ports));
         discretization.begin_point();
         assert!(!discretization.is_budget_used(&ports));
@@ -811,16 +811,16 @@ mod tests {
         assert!(discretization.is_budget_used(&ports));
         discretization.begin_search(&ports);
         assert!(
-            discretization.work_before.exceeds(POINT_LIMIT) && discretization.is_budget_used(&ports),
+            discretization.work.before.exceeds(POINT_LIMIT) && discretization.is_budget_used(&ports),
             "the point has nothing left"
         );
         let share = |share: f64| WorkShare {
             multiplications: share * POINT_LIMIT.multiplications,
             time_steps: share * POINT_LIMIT.time_steps,
         };
-        (discretization.work_before, discretization.work_elsewhere) = (share(0.6), share(0.3));
+        (discretization.work.before, discretization.work.elsewhere) = (share(0.6), share(0.3));
         assert!(!discretization.is_budget_used(&ports));
-        discretization.work_elsewhere = share(0.5);
+        discretization.work.elsewhere = share(0.5);
         assert!(discretization.is_budget_used(&ports));
         discretization.begin_point();
         assert!(!discretization.is_budget_used(&ports));
@@ -858,9 +858,9 @@ mod tests {
         let ports = Ports::new(&system).unwrap();
         let mut discretization = Discretization::new((1..512).step_by(2).collect(), 8192, &ports, None);
         discretization.begin_search(&ports);
-        discretization.products = 1_000;
+        discretization.work.products = 1_000;
         assert!(discretization.newton_krylov.is_some() && !discretization.is_budget_used(&ports));
-        discretization.products = 2_000;
+        discretization.work.products = 2_000;
         assert!(discretization.is_budget_used(&ports));
     }
 

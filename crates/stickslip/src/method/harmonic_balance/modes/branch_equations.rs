@@ -86,7 +86,7 @@ impl<'a> BranchEquations<'a> {
         check_memory(unbanded_memory(&ports, &dynamics, harmonics, true), &ports, (harmonics, 1))?;
         let few = 2 * ports.count() * harmonic_set.up_to(harmonic_set.doubled(top)).len() <= MOST_ELIMINATED_UNKNOWNS;
         let (finer, discretization) = (few.then(|| discretization(harmonic_set.doubled(top))), discretization(top));
-        let motion = HarmonicSolution::zero(discretization.linear_motion.len());
+        let motion = HarmonicSolution::zero(discretization.linear.motion.len());
         Ok(BranchEquations {
             system_at: at,
             receptance_of: system.clone(),
@@ -162,7 +162,7 @@ impl<'a> BranchEquations<'a> {
         let solved = self.discretization.solve(&self.ports, self.omega, start);
         self.motion = solved.map_err(|error| self.not_converged(error.iterations, error.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-        let size = norm(&self.motion.c).max(1e-3 * norm(&self.discretization.linear_motion));
+        let size = norm(&self.motion.c).max(1e-3 * norm(&self.discretization.linear.motion));
         self.length = (UNIT_OF_MOTION * size).max(f64::MIN_POSITIVE);
         Ok(self.discretization.pack(&self.ports, &self.motion, self.length))
     }
