@@ -7,7 +7,9 @@ use super::aft::{Port, Ports};
 use super::budget::{LEAST_ELIMINATIONS, SEARCH_LIMIT, SEARCH_MULTIPLICATIONS, WorkShare};
 use super::dynamics::banded::StepParameters;
 use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use super::globalization::homotopy::{GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE};
+use super::globalization::SearchSettings;
+use super::globalization::homotopy::{RESIDUAL_TOLERANCE, SearchContext};
+use super::line_search::LineSearch;
 use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart, product_work};
 use num_complex::Complex64;
 use stickslip_numerics::{dense, interrupt};
@@ -43,13 +45,8 @@ const REUSE_REDUCTION: f64 = 0.1;
 /// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for
 /// Newton's method".
 const NONMONOTONE_MEMORY: usize = 4;
-/// Halvings of a step in the line search.
-pub(super) const HALVINGS: usize = 7;
 /// Growth of the residual in one step beyond which the search has diverged.
 pub(super) const DIVERGENCE: f64 = 100.0;
-/// Sufficient decrease in the line search: a step of fraction `t` must reduce the residual to at
-/// most `1 - t SUFFICIENT_DECREASE` of its value.
-pub(super) const SUFFICIENT_DECREASE: f64 = 1e-3;
 /// Mean displacement, relative to the extent of the motion, beyond which a body has left the
 /// contacts that alone support it. The mean of a supported body stays within about its
 /// vibration amplitude.
@@ -127,6 +124,61 @@ impl SolveError {
     }
 }
 
+/// Course of the residual in one search.
+struct Convergence {
+    residual: f64,
+    /// Least residual, infinite before the first step.
+    least: f64,
+    /// Residual that must be halved, and the number of steps since it was set.
+    to_halve: f64,
+    stagnating: usize,
+    /// The last residuals, for the non-monotone line search.
+    recent: [f64; NONMONOTONE_MEMORY],
+}
+
+impl Convergence {
+    fn new(residual: f64) -> Self {
+        let recent = [residual; NONMONOTONE_MEMORY];
+        Convergence { residual, least: f64::INFINITY, to_halve: residual, stagnating: 0, recent }
+    }
+
+    /// Adds the residual after a step. Returns true if it is the least one.
+    fn add(&mut self, residual: f64, iteration: usize) -> bool {
+        self.residual = residual;
+        self.recent[iteration % NONMONOTONE_MEMORY] = residual;
+        let is_least = residual < self.least;
+        self.least = self.least.min(residual);
+        if self.least < 0.5 * self.to_halve {
+            (self.to_halve, self.stagnating) = (self.least, 0);
+        } else {
+            self.stagnating += 1;
+        }
+        is_least
+    }
+
+    /// Continues with the residual in other units.
+    fn rescale(&mut self, residual: f64) {
+        (self.residual, self.least, self.recent) = (residual, f64::INFINITY, [residual; NONMONOTONE_MEMORY]);
+    }
+
+    fn largest_recent(&self) -> f64 {
+        self.recent.iter().fold(self.residual, |most, r| most.max(*r))
+    }
+
+    fn is_solved(&self, tolerance: f64) -> bool {
+        self.residual <= tolerance || self.is_rounding(self.least)
+    }
+
+    /// Returns true if the search stagnates at a residual that is rounding.
+    fn is_rounding(&self, residual: f64) -> bool {
+        self.stagnating > STAGNATION_ITERATIONS && residual <= STAGNATION_TOLERANCE
+    }
+
+    fn stagnates_beyond(&self, patience: usize) -> bool {
+        self.stagnating > patience && self.least < f64::INFINITY
+    }
+}
+
 impl Discretization {
     /// Newton's method.
     ///
@@ -134,26 +186,29 @@ impl Discretization {
     /// coarse Jacobian. If that fails, it iterates on all samples from the initial guess.
     pub(super) fn newton(
         &mut self,
-        ports: &Ports,
-        omega: f64,
+        context: SearchContext<'_>,
         motion: &mut HarmonicSolution,
-        homotopy: Homotopy,
-        (most, goal): (usize, StopCriterion),
+        settings: SearchSettings,
     ) -> Result<(), SolveError> {
+        let ports = context.ports;
         if !self.search.uses_coarse || self.coarse.is_none() {
-            return self.search(ports, omega, motion, homotopy, (most, goal));
+            return self.search(context, motion, settings);
         }
         let start = motion.clone();
         let taken = (self.work.evaluations, self.work.eliminations, self.work.products);
         self.exchange_samples();
-        let rough = self.search(ports, omega, motion, homotopy, (most, StopCriterion::Rough(self.coarse_tolerance())));
+        let rough = self.search(
+            context,
+            motion,
+            SearchSettings { goal: StopCriterion::Rough(self.coarse_tolerance()), ..settings },
+        );
         if rough.is_ok() {
             // the periodic state is known on these samples
-            self.complete_derivatives(ports, omega, motion, (homotopy, false));
+            self.complete_derivatives(context, motion, false);
             self.search.keeps_tangents = true;
         }
         self.exchange_samples();
-        if rough.is_ok() && self.search(ports, omega, motion, homotopy, (most, goal)).is_ok() {
+        if rough.is_ok() && self.search(context, motion, settings).is_ok() {
             return Ok(());
         }
         // this retry happens once per search and gets the full work limit again
@@ -162,7 +217,7 @@ impl Discretization {
         self.work.before.multiplications += before - self.work_used(ports).multiplications;
         self.search.uses_coarse = false;
         *motion = HarmonicSolution { iterations: motion.iterations, ..start };
-        self.search(ports, omega, motion, homotopy, (most, goal))
+        self.search(context, motion, settings)
     }
 
     /// Returns the residual at which a search on coarse samples ends, see [`COARSE_TOLERANCE`].
@@ -177,108 +232,92 @@ impl Discretization {
     /// samples the line search is non-monotone, see [`NONMONOTONE_MEMORY`].
     fn search(
         &mut self,
-        ports: &Ports,
-        omega: f64,
+        context: SearchContext<'_>,
         motion: &mut HarmonicSolution,
-        homotopy: Homotopy,
-        (most, goal): (usize, StopCriterion),
+        settings: SearchSettings,
     ) -> Result<(), SolveError> {
-        let rough = matches!(goal, StopCriterion::Rough(_));
+        let ports = context.ports;
+        let rough = matches!(settings.goal, StopCriterion::Rough(_));
         let mut length = self.motion_scale(motion);
         self.search.reuses_states = self.search.uses_coarse;
-        let mut residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
-        let solved = match goal {
+        let first = self.evaluate(context, motion, length, DerivativeScope::Cheap);
+        let solved = match settings.goal {
             StopCriterion::Solved => RESIDUAL_TOLERANCE,
             StopCriterion::Rough(solved) => solved,
-            StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * residual),
+            StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
         };
         let mut sketched = self.search.uses_coarse && !rough;
         let mut kept = self.search.keeps_tangents && sketched;
         let mut rough_slopes = kept;
-        let mut recent = [residual; NONMONOTONE_MEMORY];
-        let mut least = f64::INFINITY;
-        // residual that must be halved, and iterations since it was set
-        let (mut to_halve, mut stagnating) = (residual, 0);
+        let mut course = Convergence::new(first);
         // the proximal point method finds forces that do not settle
-        let most_stagnating = if ports.has_forces() { STAGNATION_ITERATIONS } else { most };
-        for _ in 0..most {
+        let patience = if ports.has_forces() { STAGNATION_ITERATIONS } else { settings.iterations };
+        for _ in 0..settings.iterations {
             interrupt::check();
-            let found = residual <= solved || (stagnating > STAGNATION_ITERATIONS && least <= STAGNATION_TOLERANCE);
-            if found || self.is_budget_used(ports) || (stagnating > most_stagnating && least < f64::INFINITY) {
+            if course.is_solved(solved) || self.is_budget_used(ports) || course.stagnates_beyond(patience) {
                 break;
             }
             if !kept {
-                rough_slopes = self.complete_derivatives(ports, omega, motion, (homotopy, sketched));
+                rough_slopes = self.complete_derivatives(context, motion, sketched);
             }
+            let residual = course.residual;
             let near = StepStart { length, residual, coarse: rough_slopes || rough, same_derivatives: kept };
             self.workspace.previous.copy_from(motion);
-            if !self.regularized_step(ports, (omega, homotopy), motion, near) {
+            if !self.regularized_step(context, motion, near) {
                 break;
             }
             motion.iterations += 1;
-            let reference = if rough { recent.iter().fold(residual, |most, r| most.max(*r)) } else { residual };
-            let mut fraction = 1.0;
-            let mut after = f64::INFINITY;
-            let settles = self.can_eliminate(ports);
-            for halving in 0..=HALVINGS + 1 {
-                if halving > HALVINGS {
-                    fraction = 1.0;
-                }
-                self.apply_step(ports, motion, fraction, length);
-                after = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
-                if after < (1.0 - SUFFICIENT_DECREASE * fraction) * reference || self.is_budget_used(ports) {
-                    break;
-                }
-                if settles && halving == 0 && after.is_finite() {
-                    // the step may be right for most contacts; solve for the others separately
-                    if let Some(settled) =
-                        self.eliminate_nonlinear(ports, (omega, homotopy), motion, (length, reference))
-                    {
-                        after = settled;
-                        break;
-                    }
-                }
-                fraction *= 0.5;
-            }
+            let reference = if rough { course.largest_recent() } else { residual };
+            let after = self.line_search(context, motion, length, reference);
             if !after.is_finite() || after > DIVERGENCE * residual {
                 break;
             }
             sketched &= after < COARSE_JACOBIAN_REDUCTION * residual || residual > COARSE_JACOBIAN_FROM;
             kept = rough_slopes && after < REUSE_REDUCTION * residual && self.search.linearised;
-            residual = after;
-            recent[motion.iterations % NONMONOTONE_MEMORY] = residual;
-            if residual < least {
-                least = residual;
+            if course.add(after, motion.iterations) {
                 self.workspace.best.copy_from(motion);
             }
-            (to_halve, stagnating) = if least < 0.5 * to_halve { (least, 0) } else { (to_halve, stagnating + 1) };
             let now = self.motion_scale(motion);
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from its initial guess; rescale with its own size
                 length = now;
-                residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::Cheap);
-                recent = [residual; NONMONOTONE_MEMORY];
-                least = f64::INFINITY;
+                course.rescale(self.evaluate(context, motion, length, DerivativeScope::Cheap));
             }
         }
-        if residual > solved && least < f64::INFINITY {
+        if course.residual > solved && course.least < f64::INFINITY {
             let iterations = motion.iterations;
             motion.c.clone_from(&self.workspace.best.c);
             motion.force.clone_from(&self.workspace.best.force);
             motion.iterations = iterations;
-            residual = self.evaluate(ports, omega, motion, homotopy, length, DerivativeScope::None);
+            course.residual = self.evaluate(context, motion, length, DerivativeScope::None);
         }
         self.search.reuses_states = false;
         self.search.keeps_tangents = false;
-        motion.residual = residual;
-        if residual <= solved || (stagnating > STAGNATION_ITERATIONS && residual <= STAGNATION_TOLERANCE) {
+        motion.residual = course.residual;
+        if course.residual <= solved || course.is_rounding(course.residual) {
             Ok(())
         } else {
             Err(SolveError {
                 left_contacts: self.left_contacts(motion),
-                ..SolveError::not_converged(motion.iterations, residual)
+                ..SolveError::not_converged(motion.iterations, course.residual)
             })
         }
+    }
+
+    /// Moves to the fraction of the step that reduces the residual below `reference`, or to the
+    /// whole step if none does. Returns the residual there.
+    fn line_search(
+        &mut self,
+        context: SearchContext<'_>,
+        motion: &mut HarmonicSolution,
+        length: f64,
+        reference: f64,
+    ) -> f64 {
+        let mut trial = |fraction: f64| {
+            self.apply_step(context.ports, motion, fraction, length);
+            self.evaluate(context, motion, length, DerivativeScope::Cheap)
+        };
+        LineSearch::default().run(reference, &mut trial).unwrap_or_else(|| trial(1.0))
     }
 
     /// Solves for the Newton step from `self.before` into `self.workspace.step`. Returns false if there
@@ -288,14 +327,9 @@ impl Discretization {
     /// the restoring stiffness. A step that moves the mean far is then compared with
     /// regularized ones, in which springs hold the mean. Their stiffness rises from soft to
     /// stiff. The step with the least residual is taken.
-    fn regularized_step(
-        &mut self,
-        ports: &Ports,
-        (omega, homotopy): (f64, Homotopy),
-        motion: &mut HarmonicSolution,
-        at: StepStart,
-    ) -> bool {
-        if !self.newton_step(ports, omega, homotopy, at) {
+    fn regularized_step(&mut self, context: SearchContext<'_>, motion: &mut HarmonicSolution, at: StepStart) -> bool {
+        let ports = context.ports;
+        if !self.newton_step(context, at) {
             return false;
         }
         let extent = self.extent(motion);
@@ -309,17 +343,17 @@ impl Discretization {
                 // restore the residual at the start of the step; evaluations without
                 // derivatives keep the tangents
                 motion.copy_from(&self.workspace.previous);
-                self.evaluate(ports, omega, motion, homotopy, at.length, DerivativeScope::None);
+                self.evaluate(context, motion, at.length, DerivativeScope::None);
                 for (p, port) in ports.iter().enumerate() {
                     self.add_springs(p, port, share - held);
                 }
                 held = share;
-                if !self.newton_step(ports, omega, homotopy, StepStart { same_derivatives: false, ..at }) {
+                if !self.newton_step(context, StepStart { same_derivatives: false, ..at }) {
                     break;
                 }
             }
             self.apply_step(ports, motion, 1.0, at.length);
-            let after = self.evaluate(ports, omega, motion, homotopy, at.length, DerivativeScope::None);
+            let after = self.evaluate(context, motion, at.length, DerivativeScope::None);
             // a step that moves the mean far must lead almost to the solution
             let near =
                 self.mean_change(ports, at.length) <= LEFT_CONTACTS * extent || after <= NEAR_SOLUTION * at.residual;
@@ -405,7 +439,8 @@ impl Discretization {
     }
 
     /// Solves for the Newton step into `self.workspace.step`, in units of the unknowns.
-    pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
+    pub(super) fn newton_step(&mut self, context: SearchContext<'_>, near: StepStart) -> bool {
+        let SearchContext { ports, homotopy, .. } = context;
         self.work.eliminations += 1;
         if let Some(banded) = &mut self.banded {
             let along = StepParameters { penalty: &self.linear.penalty, homotopy: homotopy };
@@ -413,18 +448,13 @@ impl Discretization {
                 return false;
             }
         }
-        self.newton_step_same_jacobian(ports, omega, homotopy, near)
+        self.newton_step_same_jacobian(context, near)
     }
 
     /// Solves for the step of another residual with the Jacobian of the last step. The banded
     /// form reuses its factors.
-    pub(super) fn newton_step_same_jacobian(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        homotopy: Homotopy,
-        near: StepStart,
-    ) -> bool {
+    pub(super) fn newton_step_same_jacobian(&mut self, context: SearchContext<'_>, near: StepStart) -> bool {
+        let ports = context.ports;
         let pair = 2 * self.harmonics().len();
         self.workspace.step.copy_from_slice(&self.workspace.residual);
         match &mut self.banded {
@@ -442,14 +472,14 @@ impl Discretization {
                 for (d, unit) in self.workspace.step.iter_mut().zip(&self.workspace.units) {
                     *d /= unit;
                 }
-                if self.newton_krylov.is_some() && self.krylov_step(ports, omega, homotopy, near) {
+                if self.newton_krylov.is_some() && self.krylov_step(context, near) {
                     return true;
                 }
                 let size = self.workspace.step.len();
                 if self.newton_krylov.is_some() && size > FORMED_UNKNOWNS {
                     return false;
                 }
-                self.assemble(ports, omega, homotopy, near.length)
+                self.assemble(context, near.length)
                     && dense::solve(&mut self.workspace.jacobian, size, &mut self.workspace.step)
             }
         }
@@ -478,11 +508,9 @@ impl Discretization {
         let mut motion = HarmonicSolution { iterations: 0, ..start.clone() };
         self.exchange_samples();
         let found = self.search(
-            ports,
-            omega,
+            SearchContext::given(ports, omega),
             &mut motion,
-            GIVEN_EQUATIONS,
-            (ITERATIONS, StopCriterion::Rough(self.coarse_tolerance())),
+            SearchSettings { goal: StopCriterion::Rough(self.coarse_tolerance()), ..SearchSettings::default() },
         );
         self.exchange_samples();
         (found.is_ok() && !self.left_contacts(&motion)).then_some(motion)
@@ -497,6 +525,10 @@ impl Discretization {
         most: usize,
     ) -> Result<(), SolveError> {
         self.begin_search(ports);
-        self.newton(ports, omega, motion, GIVEN_EQUATIONS, (most, StopCriterion::Solved))
+        self.newton(
+            SearchContext::given(ports, omega),
+            motion,
+            SearchSettings { iterations: most, ..SearchSettings::default() },
+        )
     }
 }

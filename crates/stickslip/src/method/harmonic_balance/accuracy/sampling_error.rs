@@ -5,7 +5,7 @@
 
 use crate::method::harmonic_balance::aft::{FrequencyTime, InitialState, Port, Ports};
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::globalization::homotopy::{GIVEN_EQUATIONS, RESIDUAL_TOLERANCE};
+use crate::method::harmonic_balance::globalization::homotopy::{GIVEN_EQUATIONS, RESIDUAL_TOLERANCE, SearchContext};
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 
 /// Ratio of the last step to the distance from the coarse solution at which the distance counts
@@ -45,7 +45,7 @@ impl Discretization {
         {
             // the coarse samples start from these states and find their periodic states
             self.search.states.clone_from_slice(states);
-            self.complete_derivatives(ports, omega, &mut start.clone(), (GIVEN_EQUATIONS, true));
+            self.complete_derivatives(SearchContext::given(ports, omega), &mut start.clone(), true);
         }
         if let Some((motion, true)) = self.correct_twice_the_samples(ports, omega, start, coarse) {
             return Some(motion);
@@ -85,13 +85,14 @@ impl Discretization {
         loop {
             self.swap_double_samples();
             self.search.reuses_states = true;
-            let residual = self.evaluate(ports, omega, &mut motion, GIVEN_EQUATIONS, length, DerivativeScope::None);
+            let residual =
+                self.evaluate(SearchContext::given(ports, omega), &mut motion, length, DerivativeScope::None);
             self.search.reuses_states = false;
             self.swap_double_samples();
             if residual <= RESIDUAL_TOLERANCE {
                 return Some((motion, true));
             }
-            if !self.newton_step(ports, omega, GIVEN_EQUATIONS, near(residual, last.is_finite())) {
+            if !self.newton_step(SearchContext::given(ports, omega), near(residual, last.is_finite())) {
                 return None;
             }
             self.workspace.previous.copy_from(&motion);
@@ -110,8 +111,8 @@ impl Discretization {
 
     /// Computes the Jacobians of all laws at a motion, from its periodic states.
     fn compute_jacobians(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution, length: f64) {
-        self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, DerivativeScope::Cheap);
-        self.complete_derivatives(ports, omega, motion, (GIVEN_EQUATIONS, self.has_coarse_sampling()));
+        self.evaluate(SearchContext::given(ports, omega), motion, length, DerivativeScope::Cheap);
+        self.complete_derivatives(SearchContext::given(ports, omega), motion, self.has_coarse_sampling());
     }
 
     /// Returns the distance between the unknowns of two solutions in their units, without

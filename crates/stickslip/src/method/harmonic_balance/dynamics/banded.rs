@@ -325,69 +325,6 @@ impl BandedForm {
         self.step_factor.factor()
     }
 
-    /// Returns the number of places.
-    pub fn places(&self) -> usize {
-        self.n
-    }
-
-    /// Returns the number of unknowns of a place.
-    pub fn unknowns(&self) -> usize {
-        2 * self.harmonics.len()
-    }
-
-    /// Returns the position of a place in the order of elimination.
-    pub fn position(&self, place: usize) -> usize {
-        self.position[place]
-    }
-
-    /// Returns (place, direction) of an axis.
-    pub fn ends(&self, axis: usize) -> &[(usize, f64)] {
-        &self.ends[axis]
-    }
-
-    /// Returns the pairs of places that the structure couples.
-    pub fn couplings(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        self.entries.iter().filter(|(i, l, _)| i != l).map(|(i, l, _)| (*i, *l))
-    }
-
-    /// Adds the structure's dynamic stiffness at all harmonics, between the
-    /// places that have a number.
-    pub fn add_structure(&self, number: impl Fn(usize) -> Option<usize>, matrix: &mut BandedMatrix) {
-        let size = self.unknowns();
-        for &(i, l, entry) in &self.entries {
-            let (Some(i), Some(l)) = (number(i), number(l)) else { continue };
-            for (k, harmonic) in self.harmonics.iter().enumerate() {
-                let (row, column) = (i * size + 2 * k, l * size + 2 * k);
-                let z = dynamic(entry, harmonic * self.omega, self.omega);
-                matrix.add(row, column, z.re);
-                matrix.add(row, column + 1, -z.im);
-                matrix.add(row + 1, column, z.im);
-                matrix.add(row + 1, column + 1, z.re);
-            }
-        }
-    }
-
-    /// Replaces forces along the axes, [axis][unknown], by the motions along
-    /// them, with the equations factored last.
-    pub fn solve_along_axes(&mut self, forces: &mut [f64]) {
-        let size = self.unknowns();
-        self.whole.fill(0.0);
-        for (ends, forces) in self.ends.iter().zip(forces.chunks_exact(size)) {
-            for &(i, w) in ends {
-                let at = self.position[i] * size;
-                self.whole[at..at + size].iter_mut().zip(forces).for_each(|(sum, f)| *sum += w * f);
-            }
-        }
-        self.step_factor.solve(&mut self.whole);
-        for (ends, motion) in self.ends.iter().zip(forces.chunks_exact_mut(size)) {
-            motion.fill(0.0);
-            for &(i, w) in ends {
-                let at = self.position[i] * size;
-                motion.iter_mut().zip(&self.whole[at..at + size]).for_each(|(u, x)| *u += w * x);
-            }
-        }
-    }
-
     /// Replaces the residual by the Newton step, with the factored equations.
     /// Returns false if the step is not finite.
     pub fn step(&mut self, ports: &Ports, tangents: &[f64], residual: &mut [f64]) -> bool {

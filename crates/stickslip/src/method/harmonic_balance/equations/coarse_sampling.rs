@@ -1,8 +1,8 @@
 //! Coarse sampling of the period, for derivatives of many contacts.
 
 use super::{CLOSED_CONTACT_SIGN, Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::aft::{FrequencyTime, PERIODICITY_TOLERANCE, Ports, tangent_range};
-use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
+use crate::method::harmonic_balance::aft::{FrequencyTime, PERIODICITY_TOLERANCE, tangent_range};
+use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
 
 /// The coarse sampling has at least `1/MOST_REDUCTION` of all samples, at least
 /// `SAMPLES_PER_WAVE` samples per wave of the highest harmonic, and at most half of all samples.
@@ -35,11 +35,11 @@ impl Discretization {
     /// all samples itself. Returns whether some derivatives are coarse.
     pub fn complete_derivatives(
         &mut self,
-        ports: &Ports,
-        omega: f64,
+        context: SearchContext<'_>,
         motion: &mut HarmonicSolution,
-        (homotopy, sketched): (Homotopy, bool),
+        sketched: bool,
     ) -> bool {
+        let SearchContext { ports, omega, homotopy } = context;
         let nh = self.harmonics().len();
         self.aft.static_share = self.load_factor(homotopy) / homotopy.limit_factor;
         let mut any = false;

@@ -45,8 +45,7 @@ use super::dynamics::banded::BandedForm;
 use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
 use super::equations::harmonic_set::velocity_weight;
 use super::globalization::found_by::FoundBy;
-use super::globalization::homotopy::Homotopy;
-use super::globalization::subdomain::NonlinearElimination;
+use super::globalization::homotopy::{Homotopy, SearchContext};
 use super::linear_solve::linearization::LinearizedEquations;
 use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, dot, uses_krylov};
 use crate::model::CyclicSymmetry;
@@ -74,8 +73,6 @@ pub(super) struct Discretization {
     pub(super) newton_krylov: Option<NewtonKrylov>,
     /// True if the Jacobian is needed as a matrix, and the receptances with it.
     with_matrix: bool,
-    /// Memory of the nonlinear elimination, if the system allows it.
-    pub(super) elimination: Option<NonlinearElimination>,
     /// Coarse sampling of the period, for derivatives of many contacts: see
     /// [`Discretization::complete_derivatives`].
     pub(super) coarse: Option<FrequencyTime>,
@@ -254,7 +251,6 @@ impl Discretization {
             banded,
             newton_krylov: None,
             with_matrix: false,
-            elimination: None,
             coarse: None,
             twice: None,
             equilibrium: ports.equilibrium().to_vec(),
@@ -321,17 +317,16 @@ impl Discretization {
     /// [`DerivativeScope`]. Returns the relative size of the residual.
     pub fn evaluate(
         &mut self,
-        ports: &Ports,
-        omega: f64,
+        context: SearchContext<'_>,
         motion: &mut HarmonicSolution,
-        homotopy: Homotopy,
         length: f64,
         slopes: DerivativeScope,
     ) -> f64 {
+        let ports = context.ports;
         self.work.evaluations += usize::from(slopes != DerivativeScope::None);
-        self.motion_port_forces(ports, omega, motion, homotopy, slopes);
-        self.structure_motion(motion, homotopy);
-        self.force_port_residuals(ports, omega, motion, homotopy, slopes);
+        self.motion_port_forces(context, motion, slopes);
+        self.structure_motion(motion, context.homotopy);
+        self.force_port_residuals(context, motion, slopes);
         self.set_residual_units(ports, motion, length);
         // relative to the units of the residual; motions are weighted as velocities
         let nh = self.harmonics().len();
@@ -353,12 +348,11 @@ impl Discretization {
     /// Computes the forces of motion ports, and their derivatives.
     pub(super) fn motion_port_forces(
         &mut self,
-        ports: &Ports,
-        omega: f64,
+        context: SearchContext<'_>,
         motion: &mut HarmonicSolution,
-        homotopy: Homotopy,
         slopes: DerivativeScope,
     ) {
+        let SearchContext { ports, omega, homotopy } = context;
         let nh = self.harmonics().len();
         self.aft.static_share = self.load_factor(homotopy) / homotopy.limit_factor;
         for (p, port) in ports.iter().enumerate().filter(|(_, port)| !port.is_force()) {
@@ -416,28 +410,22 @@ impl Discretization {
     }
 
     /// Computes the residual of all force ports, and its derivatives.
-    fn force_port_residuals(
-        &mut self,
-        ports: &Ports,
-        omega: f64,
-        motion: &HarmonicSolution,
-        homotopy: Homotopy,
-        slopes: DerivativeScope,
-    ) {
+    fn force_port_residuals(&mut self, context: SearchContext<'_>, motion: &HarmonicSolution, slopes: DerivativeScope) {
+        let ports = context.ports;
         for p in (0..ports.len()).filter(|p| ports[*p].is_force()) {
-            self.force_port_residual(ports, p, omega, motion, (homotopy, slopes));
+            self.force_port_residual(context, p, motion, slopes);
         }
     }
 
     /// Computes the residual of one force port, and its derivatives.
     pub(super) fn force_port_residual(
         &mut self,
-        ports: &Ports,
+        context: SearchContext<'_>,
         p: usize,
-        omega: f64,
         motion: &HarmonicSolution,
-        (homotopy, slopes): (Homotopy, DerivativeScope),
+        slopes: DerivativeScope,
     ) {
+        let SearchContext { ports, omega, homotopy } = context;
         let (port, nh) = (&ports[p], self.harmonics().len());
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
         let penalty = self.linear.penalty[p];
@@ -479,9 +467,6 @@ impl Discretization {
     pub fn begin_point(&mut self) {
         self.work.begin_point();
         self.aft.law_steps = 0;
-        if let Some(elimination) = &mut self.elimination {
-            elimination.is_useful = true;
-        }
     }
 
     /// Begins a search without known states of the laws with memory.
@@ -610,7 +595,8 @@ impl Discretization {
 
     /// Computes the Newton step by GMRES. `self.workspace.step` contains the residual in units on entry
     /// and the step on return. Returns false if GMRES does not converge.
-    pub(super) fn krylov_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
+    pub(super) fn krylov_step(&mut self, context: SearchContext<'_>, near: StepStart) -> bool {
+        let SearchContext { ports, omega, homotopy } = context;
         let Some(coupled) = &mut self.newton_krylov else { return false };
         let linear = LinearizedEquations {
             ports,
@@ -630,7 +616,8 @@ impl Discretization {
 
     /// Assembles the Jacobian from the tangents, rows and columns in units.
     /// Returns false if the receptances are not matrices.
-    pub(super) fn assemble(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, length: f64) -> bool {
+    pub(super) fn assemble(&mut self, context: SearchContext<'_>, length: f64) -> bool {
+        let SearchContext { ports, omega, homotopy } = context;
         let Receptance::Formed(formed) = &self.linear.receptance else { return false };
         let linear = LinearizedEquations {
             ports,

@@ -2,7 +2,7 @@
 
 use super::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::globalization::homotopy::GIVEN_EQUATIONS;
+use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
 use num_complex::Complex64;
 
 impl Discretization {
@@ -20,12 +20,12 @@ impl Discretization {
     ) {
         self.unpack(ports, (unknowns, length), motion);
         let slopes = if jacobian.is_some() { DerivativeScope::All } else { DerivativeScope::None };
-        self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, slopes);
+        self.evaluate(SearchContext::given(ports, omega), motion, length, slopes);
         for ((out, r), unit) in residual.iter_mut().zip(&self.workspace.residual).zip(&self.workspace.units) {
             *out = r / unit;
         }
         if let Some(jacobian) = jacobian {
-            if self.assemble(ports, omega, GIVEN_EQUATIONS, length) {
+            if self.assemble(SearchContext::given(ports, omega), length) {
                 jacobian.copy_from_slice(&self.workspace.jacobian);
             } else {
                 jacobian.fill(f64::NAN);

@@ -1,5 +1,6 @@
 //! Parameters of the homotopies, and the tolerance of a solution.
 
+use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::regularization::force_regularization;
 
 /// Residual, relative to the motion and to the slip limits, at which the equations count as
@@ -24,5 +25,21 @@ impl Homotopy {
     /// Returns the term on the diagonal of the Jacobian of a force equation, at harmonic `h`.
     pub fn diagonal_term(self, h: usize) -> f64 {
         self.proximal_weight + force_regularization(h)
+    }
+}
+
+/// The equations of one search: ports, frequency and homotopy.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SearchContext<'a> {
+    pub ports: &'a Ports,
+    /// Frequency of the motion, rad/s.
+    pub omega: f64,
+    pub homotopy: Homotopy,
+}
+
+impl<'a> SearchContext<'a> {
+    /// Returns the context of the given equations.
+    pub fn given(ports: &'a Ports, omega: f64) -> Self {
+        SearchContext { ports, omega, homotopy: GIVEN_EQUATIONS }
     }
 }

@@ -15,13 +15,14 @@
 //! Sources: Mehrotra (1992), "On the implementation of a primal-dual interior point method";
 //! Wright, "Primal-Dual Interior-Point Methods" (1997).
 
-use super::homotopy::GIVEN_EQUATIONS;
+use super::SearchSettings;
+use super::homotopy::{GIVEN_EQUATIONS, SearchContext};
 use crate::method::harmonic_balance::aft::{FrequencyTime, InteriorPort, Port, Ports, tangent_range};
 use crate::method::harmonic_balance::equations::{
     CLOSED_CONTACT_SIGN, DerivativeScope, Discretization, HarmonicSolution,
 };
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
-use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
+use crate::method::harmonic_balance::newton::SolveError;
 use num_complex::Complex64;
 use stickslip_numerics::interrupt;
 
@@ -73,7 +74,11 @@ impl Discretization {
         if !self.follow_central_path(ports, omega, motion) {
             return Err(SolveError::not_converged(motion.iterations, f64::INFINITY));
         }
-        self.newton(ports, omega, motion, GIVEN_EQUATIONS, (ITERATIONS, StopCriterion::Solved))
+        self.newton(
+            SearchContext::given(ports, omega),
+            motion,
+            SearchSettings { iterations: ITERATIONS, ..SearchSettings::default() },
+        )
     }
 
     /// Follows the path. Returns true if its end was reached.
@@ -91,7 +96,7 @@ impl Discretization {
                 return false;
             }
             self.work.evaluations += 1;
-            self.motion_port_forces(ports, omega, motion, GIVEN_EQUATIONS, DerivativeScope::All);
+            self.motion_port_forces(SearchContext::given(ports, omega), motion, DerivativeScope::All);
             self.structure_motion(motion, GIVEN_EQUATIONS);
             let length = self.motion_scale(motion);
             self.set_residual_units(ports, motion, length);
@@ -102,7 +107,9 @@ impl Discretization {
                     Some(barrier) => {
                         barrier.linearise(&mut along.aft, &along.argument, &mut self.workspace.tangents[tangent]);
                     }
-                    None => self.force_port_residual(ports, p, omega, motion, (GIVEN_EQUATIONS, DerivativeScope::All)),
+                    None => {
+                        self.force_port_residual(SearchContext::given(ports, omega), p, motion, DerivativeScope::All)
+                    }
                 }
             }
             self.workspace.previous.copy_from(motion);
@@ -138,7 +145,7 @@ impl Discretization {
         for (port, _) in ports.iter().zip(&limits).filter(|(_, limit)| limit.is_some()) {
             motion.force[port.first_axis * nh..][..nh].fill(Complex64::default());
         }
-        self.motion_port_forces(ports, omega, motion, GIVEN_EQUATIONS, DerivativeScope::None);
+        self.motion_port_forces(SearchContext::given(ports, omega), motion, DerivativeScope::None);
         self.structure_motion(motion, GIVEN_EQUATIONS);
         for (p, (port, limit)) in ports.iter().zip(limits).enumerate() {
             argument((self, p, port), omega, motion, &mut along.argument);
@@ -173,8 +180,8 @@ impl Discretization {
             }
         }
         let found = match corrected {
-            true => self.newton_step_same_jacobian(ports, omega, GIVEN_EQUATIONS, near),
-            false => self.newton_step(ports, omega, GIVEN_EQUATIONS, near),
+            true => self.newton_step_same_jacobian(SearchContext::given(ports, omega), near),
+            false => self.newton_step(SearchContext::given(ports, omega), near),
         };
         if !found {
             return None;

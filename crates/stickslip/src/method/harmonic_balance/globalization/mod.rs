@@ -9,25 +9,21 @@
 //! - `interior_point`: interior point method for rigid friction
 //! - `proximal_point`: proximal point method for forces that the equations leave undetermined
 //! - `slip_limit_homotopy`: homotopy in the slip limits
-//! - `nonlinear_elimination`: nonlinear elimination of contacts that dominate the residual
-//! - `subdomain`: subdomains of large structures for the nonlinear elimination
 //! - `time_start`: initial guesses from time integration
 //! - `found_by`: the search that found a solution
 
 pub(super) mod found_by;
 pub(super) mod homotopy;
 pub(super) mod interior_point;
-pub(super) mod nonlinear_elimination;
 pub(super) mod proximal_point;
 mod slip_limit_homotopy;
-pub(super) mod subdomain;
 pub(super) mod time_start;
 
 use super::aft::Ports;
 use super::equations::{Discretization, HarmonicSolution};
 use super::newton::{ITERATIONS, SolveError, StopCriterion};
 use found_by::FoundBy;
-use homotopy::GIVEN_EQUATIONS;
+use homotopy::SearchContext;
 
 /// A search that follows if Newton's method fails.
 struct Fallback {
@@ -101,7 +97,7 @@ impl Discretization {
         let begin = HarmonicSolution { iterations: 0, ..start };
         let mut motion = begin.clone();
         self.begin_search(ports);
-        let newton = self.newton(ports, omega, &mut motion, GIVEN_EQUATIONS, (settings.iterations, settings.goal));
+        let newton = self.newton(SearchContext::given(ports, omega), &mut motion, settings);
         let mut failure = match self.supported(newton, &motion) {
             Ok(()) => return Ok(motion),
             Err(failure) => failure,

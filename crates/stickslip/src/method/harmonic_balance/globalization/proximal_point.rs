@@ -12,10 +12,11 @@
 //!
 //! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
 
-use super::homotopy::{GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE};
+use super::SearchSettings;
+use super::homotopy::{GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE, SearchContext};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
+use crate::method::harmonic_balance::newton::SolveError;
 
 /// First value of `s`.
 const FIRST_WEIGHT: f64 = 1.0;
@@ -55,15 +56,18 @@ impl Discretization {
             let next = pull * factor;
             let before = motion.iterations;
             let found = self.newton(
-                ports,
-                omega,
+                SearchContext {
+                    ports: ports,
+                    omega: omega,
+                    homotopy: Homotopy { proximal_weight: next, ..GIVEN_EQUATIONS },
+                },
                 motion,
-                Homotopy { proximal_weight: next, ..GIVEN_EQUATIONS },
-                (ITERATIONS, StopCriterion::Solved),
+                SearchSettings { iterations: ITERATIONS, ..SearchSettings::default() },
             );
             if found.is_ok() {
                 let length = self.motion_scale(motion);
-                motion.residual = self.evaluate(ports, omega, motion, GIVEN_EQUATIONS, length, DerivativeScope::None);
+                motion.residual =
+                    self.evaluate(SearchContext::given(ports, omega), motion, length, DerivativeScope::None);
                 if motion.residual <= RESIDUAL_TOLERANCE {
                     return Ok(());
                 }

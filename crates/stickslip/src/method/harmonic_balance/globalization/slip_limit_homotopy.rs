@@ -3,10 +3,11 @@
 //! With all joints stuck the equations are linear. The limits then fall to the given ones, and
 //! each solution is the initial guess of the next.
 
-use super::homotopy::{GIVEN_EQUATIONS, Homotopy};
+use super::SearchSettings;
+use super::homotopy::{GIVEN_EQUATIONS, Homotopy, SearchContext};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::newton::{ITERATIONS, SolveError, StopCriterion};
+use crate::method::harmonic_balance::newton::{ITERATIONS, SolveError};
 
 /// Total Newton iterations while slip limits are raised. One is enough at limits at which all
 /// joints stick.
@@ -46,11 +47,13 @@ impl Discretization {
             };
             let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { ITERATIONS };
             raised = self.newton(
-                ports,
-                omega,
+                SearchContext {
+                    ports: ports,
+                    omega: omega,
+                    homotopy: Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS },
+                },
                 &mut good,
-                Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS },
-                (most, StopCriterion::Solved),
+                SearchSettings { iterations: most, ..SearchSettings::default() },
             );
             if raised.is_ok() || self.is_budget_used(ports) || good.iterations - motion.iterations > MOST_RAISING {
                 break;
@@ -62,11 +65,13 @@ impl Discretization {
             motion.copy_from(&good);
             let next = (limits * factor).max(1.0);
             let done = self.newton(
-                ports,
-                omega,
+                SearchContext {
+                    ports: ports,
+                    omega: omega,
+                    homotopy: Homotopy { limit_factor: next, ..GIVEN_EQUATIONS },
+                },
                 motion,
-                Homotopy { limit_factor: next, ..GIVEN_EQUATIONS },
-                (ITERATIONS, StopCriterion::Solved),
+                SearchSettings::default(),
             );
             good.iterations = motion.iterations;
             match done {

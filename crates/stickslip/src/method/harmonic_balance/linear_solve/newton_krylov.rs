@@ -672,7 +672,7 @@ mod tests {
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
     use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
     use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
-    use crate::method::harmonic_balance::globalization::homotopy::GIVEN_EQUATIONS;
+    use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
     use crate::model::{Axis, System};
     use crate::structure::Structure;
     use std::sync::Arc;
@@ -879,14 +879,12 @@ mod tests {
             discretization.set_frequency(&system, &ports, &dynamics, 0.7).unwrap();
             let mut motion = discretization.initial_guess(&system, &ports, None, 0.7);
             discretization.evaluate(
-                &ports,
-                0.7,
+                SearchContext::given(&ports, 0.7),
                 &mut motion,
-                GIVEN_EQUATIONS,
                 1.0,
                 crate::method::harmonic_balance::equations::DerivativeScope::All,
             );
-            assert_eq!(discretization.assemble(&ports, 0.7, GIVEN_EQUATIONS, 1.0), needed);
+            assert_eq!(discretization.assemble(SearchContext::given(&ports, 0.7), 1.0), needed);
         }
     }
 }
