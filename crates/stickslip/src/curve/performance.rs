@@ -8,7 +8,7 @@
 
 use super::bidirectional_sweep::{BidirectionalSweep, other_intervals};
 use super::branch_following;
-use super::peak::{CurvePoint, Peak, highest_peak};
+use super::peak::{CurvePoint, Peak, drop_unused_series, highest_peak};
 use super::sweep::{Watch, solve_sequence};
 use crate::method::{Method, MethodError};
 use crate::model::System;
@@ -137,6 +137,7 @@ impl<E: Send> Performance<'_, E> {
                     CurvePoint::failed(omega)
                 }
             });
+            drop_unused_series(&mut points);
         });
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
         let mut peak = highest_peak(&mut *solver, &points, wanted, self.quantities);

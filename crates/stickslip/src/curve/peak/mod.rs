@@ -153,6 +153,16 @@ pub fn local_peaks(
     Ok(peaks)
 }
 
+/// Drops the series of the point before the last one, unless a peak search begins there. Series
+/// take most of the memory of a long curve of a large system.
+pub fn drop_unused_series(points: &mut [CurvePoint]) {
+    let Some(near) = points.len().checked_sub(3).map(|first| &mut points[first..]) else { return };
+    let is_top = (0..near[1].values.len()).any(|quantity| is_maximum(near, quantity));
+    if let Some(seed) = near[1].seed.as_mut().filter(|_| !is_top) {
+        seed.drop_series();
+    }
+}
+
 /// Tells whether the middle one of three points is a maximum. Among two equal points, the second
 /// one counts.
 fn is_maximum(near: &[CurvePoint], quantity: usize) -> bool {

@@ -41,7 +41,7 @@ use peaks::{FoundPeak, PeakQuantities};
 use references::{REFERENCE_POINTS, references};
 use stickslip::curve::adaptive::AdaptiveCurve;
 use stickslip::curve::bidirectional_sweep::{self, BidirectionalSweep, OtherOrbit};
-use stickslip::curve::peak::CurvePoint;
+use stickslip::curve::peak::{CurvePoint, drop_unused_series};
 use stickslip::dimension::Dimension;
 use stickslip::method::{MethodError, OrbitError, solver_with_alternatives};
 use stickslip::orbit::{Orbit, Seed};
@@ -333,6 +333,7 @@ fn sweep_given(work: &UnitTask<'_>, builder: &mut ResponseBuilder<'_>) -> Result
         ways.iter_mut().zip(outcome).for_each(|(ways, outcome)| ways.add(omega, outcome));
         if let Some(outcome) = outcome.filter(|_| wanted) {
             points.push(outcome.map_or_else(|_| CurvePoint::failed(omega), point));
+            drop_unused_series(&mut points);
         }
     })?;
     let others = builder.compare(work, ways)?;
