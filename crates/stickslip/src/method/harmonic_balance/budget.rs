@@ -1,42 +1,15 @@
 //! Work limits: when a search ends, and when a point is given up.
 
-/// Work limit of one search, relative to [`SEARCH_MULTIPLICATIONS`].
-pub(super) const SEARCH_LIMIT: WorkShare = WorkShare { multiplications: 1.0, time_steps: 1.0 };
-/// Work limit of all searches of a point, including those of the error estimate.
-///
-/// Newton's method, the interior point method, and the proximal point method with the
-/// slip-limit homotopy after it may each use the eliminations of one search. All together may
-/// use the time steps of one search. Measured on 173 random points with half of
-/// [`SEARCH_MULTIPLICATIONS`]: converged points used at most 1.01 of the 3.0 eliminations, all
-/// but one at most 0.4.
-pub(super) const POINT_LIMIT: WorkShare = WorkShare { multiplications: 3.0, time_steps: 1.0 };
-
-/// Multiplications of one search; about four seconds on one core.
-pub(super) const SEARCH_MULTIPLICATIONS: f64 = 2e10;
-/// Least number of eliminations in the work limit of a search. A converging search takes a few.
-/// It does not apply to a series with force ports that refines a shorter one.
-pub(super) const LEAST_ELIMINATIONS: f64 = 40.0;
-/// Newton steps that the remaining budget of a point must cover before a longer series is
-/// begun. Refining a shorter series takes 6 to 25 steps in banded form. With GMRES the steps
-/// are then short, and the total is at most three counted steps: `coulomb-2d` with 4 contacts
-/// reaches its 1023 harmonics within 0.3 s.
-const RESERVED_STEPS: f64 = 3.0;
+use super::settings::WorkSettings;
 
 /// Returns true if the remaining budget of a point covers a longer series.
 ///
 /// `step` is the number of multiplications of one of its Newton steps, `taken` the work used by
 /// the point, and `allowed` its limit.
 pub(super) fn is_affordable(step: f64, taken: WorkShare, allowed: WorkShare) -> bool {
-    RESERVED_STEPS * step <= SEARCH_MULTIPLICATIONS * (allowed.multiplications - taken.multiplications)
-}
-
-/// Work of a point, relative to that of its first orbit, up to which longer series may reduce the
-/// error of that orbit: a few doublings of the number of harmonics.
-const IMPROVES: f64 = 8.0;
-
-/// Returns the work limit of a point that found its first orbit with this work.
-pub(super) fn to_improve(taken: WorkShare) -> WorkShare {
-    taken.times(IMPROVES)
+    let settings = WorkSettings::default();
+    let left = allowed.multiplications - taken.multiplications;
+    settings.reserved_steps * step <= settings.multiplications * left
 }
 
 /// Work relative to the limit of one search.
@@ -106,7 +79,7 @@ impl Default for WorkCounter {
             extends_shorter: false,
             before: WorkShare::default(),
             elsewhere: WorkShare::default(),
-            limit: POINT_LIMIT,
+            limit: WorkSettings::default().point,
         }
     }
 }

@@ -15,6 +15,7 @@
 //!
 //! The solver and its options:
 //! - `options`: number of harmonics, number of samples, tolerance;
+//! - `settings`: the knobs of the searches;
 //! - `solver`: the solver of a system, with its warm starts;
 //! - `warm_start`: the last orbits, for warm starts and the secant predictor;
 //! - `subharmonic`: orbits of several periods of the excitation;
@@ -50,6 +51,7 @@ mod modes;
 mod newton;
 mod options;
 mod postprocess;
+mod settings;
 mod solver;
 mod static_equilibrium;
 mod subharmonic;

@@ -4,37 +4,17 @@
 //! fails stand in `globalization`.
 
 use super::aft::{Port, Ports};
-use super::budget::{LEAST_ELIMINATIONS, SEARCH_LIMIT, SEARCH_MULTIPLICATIONS, WorkShare};
+use super::budget::WorkShare;
 use super::dynamics::banded::StepParameters;
 use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use super::globalization::SearchSettings;
 use super::globalization::homotopy::{RESIDUAL_TOLERANCE, SearchContext};
 use super::line_search::LineSearch;
 use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart, product_work};
+use super::settings::{NewtonSettings, WorkSettings};
 use num_complex::Complex64;
 use stickslip_numerics::{dense, interrupt};
 
-/// Newton iterations; 3 to 15 are usual.
-pub(super) const ITERATIONS: usize = 60;
-/// Residual at which a stagnating search counts as converged. Forces are differentiable
-/// functions of the harmonics, so the remainder is the rounding of structures whose stiffnesses
-/// differ widely.
-const STAGNATION_TOLERANCE: f64 = 1e-8;
-/// Iterations without a halved least residual after which a search counts as stagnating.
-const STAGNATION_ITERATIONS: usize = 8;
-/// Residual at which a search on coarse samples ends, for 1024 full samples. For fewer samples
-/// it grows with the square of their spacing. The sampling error of the coarse samples has this
-/// size.
-const COARSE_TOLERANCE: f64 = 8e-4;
-/// Residual below which a step with the Jacobian of coarse samples must leave at most
-/// [`COARSE_JACOBIAN_REDUCTION`].
-const COARSE_JACOBIAN_FROM: f64 = 1e-3;
-/// Largest share of the residual that such a step may leave. A larger share ends the use of
-/// coarse Jacobians.
-const COARSE_JACOBIAN_REDUCTION: f64 = 0.1;
-/// Share of the residual below which the next step reuses the Jacobian of coarse samples. A new
-/// one would have the same sampling error, and would not leave less.
-const REUSE_REDUCTION: f64 = 0.1;
 /// Number of last residuals in the non-monotone line search on coarse samples. A step is
 /// accepted if its residual is below the largest of them.
 ///
@@ -45,41 +25,6 @@ const REUSE_REDUCTION: f64 = 0.1;
 /// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for
 /// Newton's method".
 const NONMONOTONE_MEMORY: usize = 4;
-/// Growth of the residual in one step beyond which the search has diverged.
-pub(super) const DIVERGENCE: f64 = 100.0;
-/// Mean displacement, relative to the extent of the motion, beyond which a body has left the
-/// contacts that alone support it. The mean of a supported body stays within about its
-/// vibration amplitude.
-const LEFT_CONTACTS: f64 = 10.0;
-/// Stiffness of the springs that regularize a step whose mean is too long, relative to closed
-/// contacts.
-const REGULARIZING_SHARES: [f64; 6] = [0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0];
-/// Share of the residual below which even a long step counts as leading to the solution.
-const NEAR_SOLUTION: f64 = 0.1;
-/// Mean displacement of a step, relative to the extent of the motion, above which regularized
-/// steps are tried too. It applies if only contacts support a body.
-const LONG_MEAN_STEP: f64 = 2.0;
-/// Multiplications of one evaluation per sample and axis: both Fourier transforms and the law.
-/// Measured: 15 µs for 2048 samples.
-const EVALUATION_COST: f64 = 40.0;
-/// Multiplications per sample and axis for friction that falls with velocity. Its force is
-/// solved for at six instants of each sample. Measured: 0.4 µs.
-const FALLING_EVALUATION_COST: f64 = 2000.0;
-/// Time steps of laws with memory in the work limit of a search, unless [`EVALUATIONS`] ask for
-/// more. A converging search of one joint takes a few hundred thousand. With a stiff law this
-/// limit takes ten seconds.
-const MOST_TIME_STEPS: usize = 3_000_000;
-/// Number of evaluations of all laws that the work limit of a search always covers. Homotopies
-/// take hundreds.
-const EVALUATIONS: usize = 800;
-/// Rough number of periods over which a law with memory is integrated in one evaluation.
-const PERIODS_PER_EVALUATION: usize = 4;
-/// Largest number of samples per period that enters this limit. With more samples, hundreds of
-/// evaluations would take minutes.
-const COUNTED_SAMPLES: usize = 1024;
-/// Rough number of products with the Jacobian in one step by GMRES.
-const PRODUCTS_PER_STEP: f64 = 30.0;
-
 /// Residual at which a search ends.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum StopCriterion {
@@ -171,7 +116,8 @@ impl Convergence {
 
     /// Returns true if the search stagnates at a residual that is rounding.
     fn is_rounding(&self, residual: f64) -> bool {
-        self.stagnating > STAGNATION_ITERATIONS && residual <= STAGNATION_TOLERANCE
+        let settings = NewtonSettings::default();
+        self.stagnating > settings.stagnation_iterations && residual <= settings.stagnation_tolerance
     }
 
     fn stagnates_beyond(&self, patience: usize) -> bool {
@@ -220,9 +166,10 @@ impl Discretization {
         self.search(context, motion, settings)
     }
 
-    /// Returns the residual at which a search on coarse samples ends, see [`COARSE_TOLERANCE`].
+    /// Returns the residual at which a search on coarse samples ends, see [`CoarseSettings`](super::settings::CoarseSettings).
     fn coarse_tolerance(&self) -> f64 {
-        COARSE_TOLERANCE * (COUNTED_SAMPLES as f64 / self.all_samples() as f64).powi(2).max(1.0)
+        let spacing = 1024.0 / self.all_samples() as f64;
+        NewtonSettings::default().coarse.tolerance * spacing.powi(2).max(1.0)
     }
 
     /// Newton's method with a line search, to a given residual.
@@ -236,7 +183,7 @@ impl Discretization {
         motion: &mut HarmonicSolution,
         settings: SearchSettings,
     ) -> Result<(), SolveError> {
-        let ports = context.ports;
+        let (ports, newton) = (context.ports, NewtonSettings::default());
         let rough = matches!(settings.goal, StopCriterion::Rough(_));
         let mut length = self.motion_scale(motion);
         self.search.reuses_states = self.search.uses_coarse;
@@ -251,7 +198,7 @@ impl Discretization {
         let mut rough_slopes = kept;
         let mut course = Convergence::new(first);
         // the proximal point method finds forces that do not settle
-        let patience = if ports.has_forces() { STAGNATION_ITERATIONS } else { settings.iterations };
+        let patience = if ports.has_forces() { newton.stagnation_iterations } else { settings.iterations };
         for _ in 0..settings.iterations {
             interrupt::check();
             if course.is_solved(solved) || self.is_budget_used(ports) || course.stagnates_beyond(patience) {
@@ -269,11 +216,12 @@ impl Discretization {
             motion.iterations += 1;
             let reference = if rough { course.largest_recent() } else { residual };
             let after = self.line_search(context, motion, length, reference);
-            if !after.is_finite() || after > DIVERGENCE * residual {
+            if !after.is_finite() || after > newton.divergence * residual {
                 break;
             }
-            sketched &= after < COARSE_JACOBIAN_REDUCTION * residual || residual > COARSE_JACOBIAN_FROM;
-            kept = rough_slopes && after < REUSE_REDUCTION * residual && self.search.linearised;
+            let reduced = after < newton.coarse.reduction * residual;
+            sketched &= reduced || residual > newton.coarse.checked_from;
+            kept = rough_slopes && reduced && self.search.linearised;
             if course.add(after, motion.iterations) {
                 self.workspace.best.copy_from(motion);
             }
@@ -328,17 +276,17 @@ impl Discretization {
     /// regularized ones, in which springs hold the mean. Their stiffness rises from soft to
     /// stiff. The step with the least residual is taken.
     fn regularized_step(&mut self, context: SearchContext<'_>, motion: &mut HarmonicSolution, at: StepStart) -> bool {
-        let ports = context.ports;
+        let (ports, settings) = (context.ports, NewtonSettings::default().mean);
         if !self.newton_step(context, at) {
             return false;
         }
         let extent = self.extent(motion);
-        if !self.is_held_by_contacts() || self.mean_change(ports, at.length) <= LONG_MEAN_STEP * extent {
+        if !self.is_held_by_contacts() || self.mean_change(ports, at.length) <= settings.long_step * extent {
             return true;
         }
         let mut best = (f64::INFINITY, self.workspace.step.clone());
         let mut held = 0.0;
-        for share in REGULARIZING_SHARES {
+        for share in [0.0].into_iter().chain(settings.springs) {
             if share > 0.0 {
                 // restore the residual at the start of the step; evaluations without
                 // derivatives keep the tangents
@@ -355,8 +303,8 @@ impl Discretization {
             self.apply_step(ports, motion, 1.0, at.length);
             let after = self.evaluate(context, motion, at.length, DerivativeScope::None);
             // a step that moves the mean far must lead almost to the solution
-            let near =
-                self.mean_change(ports, at.length) <= LEFT_CONTACTS * extent || after <= NEAR_SOLUTION * at.residual;
+            let near = self.mean_change(ports, at.length) <= settings.left_contacts * extent
+                || after <= settings.near_solution * at.residual;
             if near && after < best.0 {
                 best = (after, self.workspace.step.clone());
             }
@@ -393,37 +341,43 @@ impl Discretization {
     pub(super) fn left_contacts(&self, motion: &HarmonicSolution) -> bool {
         let nh = self.harmonics().len();
         let mean = motion.c.iter().step_by(nh).fold(0.0, |m: f64, c| m.max(c.norm()));
-        self.is_held_by_contacts() && mean > LEFT_CONTACTS * self.extent(motion)
+        self.is_held_by_contacts() && mean > NewtonSettings::default().mean.left_contacts * self.extent(motion)
     }
 
-    /// Returns the work of the present search relative to [`SEARCH_MULTIPLICATIONS`] and
-    /// [`MOST_TIME_STEPS`].
+    /// Returns the work of the present search relative to the limits of [`WorkSettings`].
     pub(super) fn work_used(&self, ports: &Ports) -> WorkShare {
-        let size = self.workspace.residual.len() as f64;
+        let settings = WorkSettings::default();
+        let (size, harmonics) = (self.workspace.residual.len() as f64, self.harmonics().len());
         let of_port = |port: &Port| {
-            port.axes as f64 * if port.least_penalty > 0.0 { FALLING_EVALUATION_COST } else { EVALUATION_COST }
+            let falls = port.least_penalty > 0.0;
+            port.axes as f64 * if falls { settings.falling_evaluation } else { settings.evaluation }
         };
         let evaluated = (self.all_samples() * self.work.evaluations) as f64 * ports.iter().map(of_port).sum::<f64>();
-        let (taken, one, fewest) = match self.banded {
-            Some(ref banded) => (self.work.eliminations, banded.work(self.harmonics().len()), LEAST_ELIMINATIONS),
+        let (taken, least) = match &self.banded {
+            Some(banded) => {
+                let one = banded.work(harmonics);
+                (self.work.eliminations as f64 * one + evaluated, settings.eliminations * one)
+            }
             // GMRES counts its products; the line search takes none
-            None if self.newton_krylov.is_some() => (
-                self.work.products,
-                product_work(ports, self.harmonics().len()),
-                LEAST_ELIMINATIONS * PRODUCTS_PER_STEP,
-            ),
-            None => (self.work.eliminations, size * size * size / 3.0, LEAST_ELIMINATIONS),
+            None if self.newton_krylov.is_some() => {
+                let one = product_work(ports, harmonics);
+                (self.work.products as f64 * one, settings.eliminations * settings.products_per_step * one)
+            }
+            None => {
+                let one = size.powi(3) / 3.0;
+                (self.work.eliminations as f64 * one + evaluated, settings.eliminations * one)
+            }
         };
-        let counted = taken as f64 * one + if self.newton_krylov.is_some() { 0.0 } else { evaluated };
         let most = if self.work.extends_shorter && ports.has_forces() {
-            SEARCH_MULTIPLICATIONS
+            settings.multiplications
         } else {
-            SEARCH_MULTIPLICATIONS.max(fewest * one)
+            settings.multiplications.max(least)
         };
-        let marched = EVALUATIONS * PERIODS_PER_EVALUATION * self.all_samples().min(COUNTED_SAMPLES) * ports.len();
+        // four periods of at most 1024 samples in one evaluation
+        let stepped = settings.evaluations * 4 * self.all_samples().min(1024) * ports.len();
         WorkShare {
-            multiplications: counted / most,
-            time_steps: self.aft.law_steps as f64 / MOST_TIME_STEPS.max(marched) as f64,
+            multiplications: taken / most,
+            time_steps: self.aft.law_steps as f64 / settings.time_steps.max(stepped) as f64,
         }
     }
 
@@ -434,7 +388,7 @@ impl Discretization {
 
     /// Returns true if the search has used its work limit or that of its point.
     pub(super) fn is_budget_used(&self, ports: &Ports) -> bool {
-        self.work_used(ports).exceeds(SEARCH_LIMIT)
+        self.work_used(ports).exceeds(WorkShare { multiplications: 1.0, time_steps: 1.0 })
             || self.work.elsewhere.and(self.point_work_used(ports)).exceeds(self.work.limit)
     }
 

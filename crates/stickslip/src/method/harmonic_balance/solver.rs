@@ -1,7 +1,7 @@
 //! The solver of harmonic balance: one orbit after another, with warm starts.
 
 use super::aft::Ports;
-use super::budget::{POINT_LIMIT, WorkShare, is_affordable};
+use super::budget::{WorkShare, is_affordable};
 use super::dynamics::banded::{self, BandedForm};
 use super::dynamics::linear_dynamics::LinearDynamics;
 use super::equations::harmonic_set::HarmonicSet;
@@ -11,6 +11,7 @@ use super::linear_solve::newton_krylov;
 use super::memory_estimate::{MEMORY, check_memory, level_memory};
 use super::newton::SolveError;
 use super::options::{FIRST_HARMONICS, HarmonicBalance, NAME, TOLERANCE};
+use super::settings::WorkSettings;
 use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
 use super::{cost_model, postprocess, warm_start};
 use crate::method::orbit_search::describing_guess::DescribingGuess;
@@ -173,7 +174,7 @@ impl HarmonicBalanceSolver {
 
     /// Returns the work limit of the point.
     fn work_limit(&self) -> WorkShare {
-        let allowed = POINT_LIMIT.times(self.point_limit.min(1.0));
+        let allowed = WorkSettings::default().point.times(self.point_limit.min(1.0));
         self.limit.map_or(allowed, |limit| limit.and_at_most(allowed))
     }
 
@@ -184,8 +185,8 @@ impl HarmonicBalanceSolver {
 
     /// Returns the work of the point as a fraction of the default limit.
     fn work_fraction(&self) -> f64 {
-        let WorkShare { multiplications, time_steps } = self.work_used(None);
-        (multiplications / POINT_LIMIT.multiplications).max(time_steps / POINT_LIMIT.time_steps)
+        let (used, limit) = (self.work_used(None), WorkSettings::default().point);
+        (used.multiplications / limit.multiplications).max(used.time_steps / limit.time_steps)
     }
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in

@@ -4,11 +4,12 @@
 use super::truncation_error::{ComparedSolution, truncation_error};
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::aft::Port;
-use crate::method::harmonic_balance::budget::{self, WorkShare};
+use crate::method::harmonic_balance::budget::WorkShare;
 use crate::method::harmonic_balance::equations::{self, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::globalization::SearchSettings;
 use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 use crate::method::harmonic_balance::options::{NAME, TOLERANCE};
+use crate::method::harmonic_balance::settings::WorkSettings;
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::orbit::Orbit;
 use nalgebra::DVector;
@@ -201,7 +202,7 @@ impl HarmonicBalanceSolver {
                     return Ok(orbit);
                 }
                 if returned.is_none() {
-                    self.limit = Some(budget::to_improve(self.work_used(None)));
+                    self.limit = Some(self.work_used(None).times(WorkSettings::default().improvement));
                 }
                 *returned = Some(orbit);
                 error = judged;

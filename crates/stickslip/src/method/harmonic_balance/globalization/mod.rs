@@ -21,7 +21,8 @@ pub(super) mod time_start;
 
 use super::aft::Ports;
 use super::equations::{Discretization, HarmonicSolution};
-use super::newton::{ITERATIONS, SolveError, StopCriterion};
+use super::newton::{SolveError, StopCriterion};
+use super::settings::NewtonSettings;
 use found_by::FoundBy;
 use homotopy::SearchContext;
 
@@ -71,7 +72,11 @@ pub(super) struct SearchSettings {
 
 impl Default for SearchSettings {
     fn default() -> Self {
-        SearchSettings { iterations: ITERATIONS, goal: StopCriterion::Solved, between_orbits: false }
+        SearchSettings {
+            iterations: NewtonSettings::default().iterations,
+            goal: StopCriterion::Solved,
+            between_orbits: false,
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::SearchSettings;
 use super::homotopy::{GIVEN_EQUATIONS, Homotopy, SearchContext};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::newton::{ITERATIONS, SolveError};
+use crate::method::harmonic_balance::newton::SolveError;
 
 /// Total Newton iterations while slip limits are raised. One is enough at limits at which all
 /// joints stick.
@@ -45,7 +45,7 @@ impl Discretization {
                 true => HarmonicSolution { iterations, ..self.static_solution(limits) },
                 false => HarmonicSolution { iterations, ..self.frictionless_motion() },
             };
-            let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { ITERATIONS };
+            let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { SearchSettings::default().iterations };
             raised = self.newton(
                 SearchContext {
                     ports: ports,

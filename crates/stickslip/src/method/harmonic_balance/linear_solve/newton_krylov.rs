@@ -668,11 +668,12 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};
-    use crate::method::harmonic_balance::budget::{POINT_LIMIT, WorkShare};
+    use crate::method::harmonic_balance::budget::WorkShare;
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
     use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
     use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
     use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
+    use crate::method::harmonic_balance::settings::WorkSettings;
     use crate::model::{Axis, System};
     use crate::structure::Structure;
     use std::sync::Arc;
@@ -811,12 +812,12 @@ mod tests {
         assert!(discretization.is_budget_used(&ports));
         discretization.begin_search(&ports);
         assert!(
-            discretization.work.before.exceeds(POINT_LIMIT) && discretization.is_budget_used(&ports),
+            discretization.work.before.exceeds(WorkSettings::default().point) && discretization.is_budget_used(&ports),
             "the point has nothing left"
         );
         let share = |share: f64| WorkShare {
-            multiplications: share * POINT_LIMIT.multiplications,
-            time_steps: share * POINT_LIMIT.time_steps,
+            multiplications: share * WorkSettings::default().point.multiplications,
+            time_steps: share * WorkSettings::default().point.time_steps,
         };
         (discretization.work.before, discretization.work.elsewhere) = (share(0.6), share(0.3));
         assert!(!discretization.is_budget_used(&ports));

@@ -9,7 +9,7 @@
 
 use super::nonlinear_mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
 use crate::method::harmonic_balance::line_search::LineSearch;
-use crate::method::harmonic_balance::newton::DIVERGENCE;
+use crate::method::harmonic_balance::settings::NewtonSettings;
 use num_complex::Complex64;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::{dense, interrupt};
@@ -263,7 +263,8 @@ impl ModeEquations<'_> {
                     now = evaluate(self, &point, &mut residual, &mut jacobian);
                 }
                 None => {
-                    let after = Some(step(self, 1.0)).filter(|after| bold && *after < DIVERGENCE * now)?;
+                    let after = Some(step(self, 1.0))
+                        .filter(|after| bold && *after < NewtonSettings::default().divergence * now)?;
                     (point, now) = (trial, after);
                 }
             }

@@ -1,0 +1,137 @@
+//! Settings of the searches of harmonic balance: every knob with its default and its reason.
+//!
+//! The options that users set are in `options`.
+
+use super::budget::WorkShare;
+
+/// Settings of Newton's method.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NewtonSettings {
+    /// Largest number of iterations. Default 60; 3 to 15 are usual.
+    pub iterations: usize,
+    /// Iterations without a halved least residual after which a search stagnates. Default 8.
+    pub stagnation_iterations: usize,
+    /// Residual at which a stagnating search counts as converged. Default 1e-8: forces are
+    /// differentiable functions of the harmonics, so the remainder is the rounding of structures
+    /// whose stiffnesses differ widely.
+    pub stagnation_tolerance: f64,
+    /// Growth of the residual in one step beyond which the search has diverged. Default 100.
+    pub divergence: f64,
+    /// Newton's method on coarse samples, for many contacts.
+    pub coarse: CoarseSettings,
+    /// Steps of a body that contacts alone support.
+    pub mean: MeanSettings,
+}
+
+impl Default for NewtonSettings {
+    fn default() -> Self {
+        NewtonSettings {
+            iterations: 60,
+            stagnation_iterations: 8,
+            stagnation_tolerance: 1e-8,
+            divergence: 100.0,
+            coarse: CoarseSettings::default(),
+            mean: MeanSettings::default(),
+        }
+    }
+}
+
+/// Settings of Newton's method with coarse samples.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CoarseSettings {
+    /// Residual at which a search on coarse samples ends, for 1024 full samples. For fewer samples
+    /// it grows with the square of their spacing. Default 8e-4: the sampling error of the coarse
+    /// samples has this size.
+    pub tolerance: f64,
+    /// Residual below which a step with the coarse Jacobian must leave at most `reduction` of it.
+    /// Default 1e-3.
+    pub checked_from: f64,
+    /// Largest share of the residual that such a step may leave. A larger share ends the use of
+    /// coarse Jacobians. A smaller one keeps the Jacobian for the next step, because a new one
+    /// would have the same sampling error. Default 0.1.
+    pub reduction: f64,
+}
+
+impl Default for CoarseSettings {
+    fn default() -> Self {
+        CoarseSettings { tolerance: 8e-4, checked_from: 1e-3, reduction: 0.1 }
+    }
+}
+
+/// Settings for a body that contacts alone support: a step that opens all of them, or slips in
+/// all, loses the restoring stiffness.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeanSettings {
+    /// Mean displacement of a step, relative to the extent of the motion, above which regularized
+    /// steps are tried too. Default 2.
+    pub long_step: f64,
+    /// Stiffnesses of the springs that regularize such a step, relative to closed contacts.
+    pub springs: [f64; 5],
+    /// Mean displacement, relative to the extent of the motion, beyond which a body has left its
+    /// contacts. Default 10: the mean of a supported body stays within about its vibration
+    /// amplitude.
+    pub left_contacts: f64,
+    /// Share of the residual below which even a long step counts as leading to the solution.
+    /// Default 0.1.
+    pub near_solution: f64,
+}
+
+impl Default for MeanSettings {
+    fn default() -> Self {
+        MeanSettings { long_step: 2.0, springs: [1e-3, 1e-2, 0.1, 1.0, 10.0], left_contacts: 10.0, near_solution: 0.1 }
+    }
+}
+
+/// Settings of the work limits.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WorkSettings {
+    /// Multiplications of one search. Default 2e10, about four seconds on one core.
+    pub multiplications: f64,
+    /// Least number of eliminations in the limit of a search. Default 40; a converging search takes
+    /// a few. It does not apply to a series with force ports that refines a shorter one.
+    pub eliminations: f64,
+    /// Products with the Jacobian in one step by GMRES, roughly. Default 30.
+    pub products_per_step: f64,
+    /// Multiplications of one evaluation per sample and axis: both Fourier transforms and the law.
+    /// Default 40, measured: 15 µs for 2048 samples.
+    pub evaluation: f64,
+    /// The same for friction that falls with velocity, whose force is solved for at six instants of
+    /// each sample. Default 2000, measured: 0.4 µs.
+    pub falling_evaluation: f64,
+    /// Time steps of laws with memory in one search, unless `evaluations` ask for more. Default
+    /// 3e6: a converging search of one joint takes a few hundred thousand, and with a stiff law the
+    /// limit takes ten seconds.
+    pub time_steps: usize,
+    /// Number of evaluations of all laws with memory that the limit of a search always covers, each
+    /// over four periods of at most 1024 samples. Default 800; homotopies take hundreds.
+    pub evaluations: usize,
+    /// Limit of all searches of a point, relative to one search, including those of the error
+    /// estimate. Default 3 for multiplications: Newton's method, and two fallbacks, may each use
+    /// the eliminations of one search. Converged points of 173 random systems used at most 1.01 of
+    /// half of it, all but one at most 0.4. Default 1 for time steps.
+    pub point: WorkShare,
+    /// Work of a point, relative to that of its first orbit, up to which longer series may reduce
+    /// the error of that orbit. Default 8: a few doublings of the number of harmonics.
+    pub improvement: f64,
+    /// Newton steps that the remaining budget of a point must cover before a longer series is
+    /// begun. Default 3: refining a shorter series takes 6 to 25 steps in banded form, and at most
+    /// three counted steps with GMRES.
+    pub reserved_steps: f64,
+}
+
+impl Default for WorkSettings {
+    fn default() -> Self {
+        WorkSettings {
+            multiplications: 2e10,
+            eliminations: 40.0,
+            products_per_step: 30.0,
+            evaluation: 40.0,
+            falling_evaluation: 2000.0,
+            time_steps: 3_000_000,
+            evaluations: 800,
+            point: WorkShare { multiplications: 3.0, time_steps: 1.0 },
+            improvement: 8.0,
+            reserved_steps: 3.0,
+        }
+    }
+}
