@@ -46,15 +46,11 @@ impl Seed {
 /// Fourier series of the relative motions and forces of the joints.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JointSeries {
-    /// Frequency of the motion, rad/s.
-    pub omega: f64,
     pub highest_harmonic: usize,
     /// Harmonics of the motions along the axes, [axis][harmonic], m.
     pub motions: Vec<Complex64>,
     /// Harmonics of the forces along them, N.
     pub forces: Vec<Complex64>,
-    /// The orbit before this one, for a secant predictor.
-    pub previous: Option<Arc<JointSeries>>,
 }
 
 impl Orbit {

@@ -17,7 +17,6 @@
 //! - `options`: number of harmonics, number of samples, tolerance;
 //! - `settings`: the knobs of the searches;
 //! - `solver`: the solver of a system, with its warm starts;
-//! - `warm_start`: the last orbits, for warm starts and the secant predictor;
 //! - `subharmonic`: orbits of several periods of the excitation;
 //! - `static_equilibrium`: the equilibrium under the constant loads, by harmonic 0 alone;
 //! - `budget`, `cost_model`, `memory_estimate`: work limits, operation counts, estimates of
@@ -55,7 +54,6 @@ mod settings;
 mod solver;
 mod static_equilibrium;
 mod subharmonic;
-mod warm_start;
 
 use super::options::{PERIOD, periods};
 use super::{Method, MethodError, MethodInfo, MethodOption, Solver};

@@ -13,7 +13,7 @@ use super::newton::SolveError;
 use super::options::{FIRST_HARMONICS, HarmonicBalance, NAME, TOLERANCE};
 use super::settings::WorkSettings;
 use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
-use super::{cost_model, postprocess, warm_start};
+use super::{cost_model, postprocess};
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
 use crate::method::{Budget, ErrorEstimate, MethodError, OrbitError, Request, Solver};
@@ -307,7 +307,7 @@ impl HarmonicBalanceSolver {
         truncation: Option<f64>,
     ) -> Result<Orbit, OrbitError> {
         let orbit = self.orbit_of(top, omega, &motion, x, truncation)?;
-        let series = motion.into_series(omega, top);
+        let series = motion.into_series(top);
         Ok(Orbit { series: Some(Arc::new(series)), ..orbit })
     }
 
@@ -375,21 +375,11 @@ impl HarmonicBalanceSolver {
         }
     }
 
-    /// Returns true if warm starts extrapolate the last two orbits (secant predictor).
-    ///
-    /// This holds in systems with many contacts. It also holds for elastic friction if no two
-    /// motions separate, because every initial guess then leads to the same orbit. With rigid
-    /// friction the set of slipping samples changes abruptly, and extrapolation does not help.
-    pub(super) fn extrapolates(&self, top: usize) -> bool {
-        let unique = self.orbit_check.proves() && !self.ports.has_forces();
-        unique || self.discretizations.get(&top).is_some_and(Discretization::uses_krylov)
-    }
-
-    /// Returns the warm start from a seed: the series of the joints, extrapolated along a secant,
-    /// or the harmonics of a time integration that begins at the state.
+    /// Returns the warm start from a seed: the series of the joints, or the harmonics of a time
+    /// integration that begins at the state.
     fn warm_start(&mut self, seed: &Seed, omega: f64) -> Option<(usize, HarmonicSolution)> {
         match self.series_of(seed) {
-            Some(series) => Some((series.highest_harmonic, warm_start::extrapolate(series, omega))),
+            Some(series) => Some((series.highest_harmonic, HarmonicSolution::from_series(series))),
             None => self.guess_from_state(&seed.state, omega),
         }
     }
@@ -422,16 +412,6 @@ impl HarmonicBalanceSolver {
         }
         found
     }
-
-    /// Adds the seed's series to the series of an orbit, for a secant predictor.
-    fn link_series(&self, orbit: &mut Orbit, seed: Option<&Seed>) {
-        let Some(series) = orbit.series.as_mut().and_then(Arc::get_mut) else { return };
-        let before = seed.and_then(|seed| self.series_of(seed));
-        let before = before.filter(|before| before.highest_harmonic == series.highest_harmonic);
-        if self.extrapolates(series.highest_harmonic) {
-            series.previous = before.map(|before| Arc::new(JointSeries { previous: None, ..before.clone() }));
-        }
-    }
 }
 
 impl Solver for HarmonicBalanceSolver {
@@ -443,9 +423,7 @@ impl Solver for HarmonicBalanceSolver {
         self.begin_point(omega, budget.remaining());
         let found = self.solve_point(request, omega / self.periods as f64);
         budget.charge(self.work_fraction());
-        let mut orbit = found?;
-        self.link_series(&mut orbit, request.seed);
-        Ok(orbit)
+        found
     }
 }
 

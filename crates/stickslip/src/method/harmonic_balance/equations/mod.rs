@@ -188,9 +188,9 @@ impl HarmonicSolution {
         HarmonicSolution { c: series.motions.clone(), force: series.forces.clone(), ..HarmonicSolution::default() }
     }
 
-    /// Converts the solution to the series of an orbit at `omega` (rad/s).
-    pub fn into_series(self, omega: f64, highest_harmonic: usize) -> JointSeries {
-        JointSeries { omega, highest_harmonic, motions: self.c, forces: self.force, previous: None }
+    /// Converts the solution to the series of an orbit.
+    pub fn into_series(self, highest_harmonic: usize) -> JointSeries {
+        JointSeries { highest_harmonic, motions: self.c, forces: self.force }
     }
 
     /// Copies `other` without new memory.
