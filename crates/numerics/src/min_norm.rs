@@ -11,6 +11,7 @@
 //! (2003), Ch. 3 (Moore-Penrose inverse).
 
 use crate::dense::DenseLu;
+use crate::vector::dot;
 
 /// Change of the equations by a step of one along a null direction, both
 /// relative, at most. Rounding leaves 1e-13. Friction of only 1e-4 of the
@@ -77,10 +78,6 @@ fn orthonormal(columns: &mut Vec<Vec<f64>>, inner: &dyn Fn(&[f64], &[f64]) -> f6
         }
     }
     *columns = made;
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

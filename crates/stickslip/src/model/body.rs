@@ -10,6 +10,7 @@ use crate::structure::reduction::Row;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use stickslip_numerics::eigen;
+use stickslip_numerics::vector::dot;
 
 /// Directions of displacement of a rigid body.
 pub const TRANSLATIONS: [&str; 3] = ["x", "y", "z"];
@@ -98,7 +99,7 @@ impl Body {
             let find = |names: [&str; 3]| names.iter().position(|name| name == direction);
             match (find(TRANSLATIONS), find(ROTATIONS)) {
                 (Some(axis), _) => along[axis],
-                (None, Some(axis)) => dot(cross(unit(axis), offset), along),
+                (None, Some(axis)) => dot(&cross(unit(axis), offset), &along),
                 (None, None) => 0.0,
             }
         };
@@ -260,10 +261,6 @@ fn unit(axis: usize) -> [f64; 3] {
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -429,7 +426,7 @@ mod tests {
             for r in &cloud {
                 for (i, row) in inertia.iter_mut().enumerate() {
                     for (k, entry) in row.iter_mut().enumerate() {
-                        let own = if i == k { dot(*r, *r) } else { 0.0 };
+                        let own = if i == k { dot(r, r) } else { 0.0 };
                         *entry += mass / 6.0 * (own - r[i] * r[k]);
                     }
                 }

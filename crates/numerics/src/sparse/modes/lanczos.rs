@@ -4,7 +4,9 @@
 use super::natural_modes::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::interrupt;
+use crate::random::SplitMix64;
 use crate::sparse::{LdlFactor, SparseMatrix, multi_vector};
+use crate::vector::dot;
 use nalgebra::DMatrix;
 
 /// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
@@ -49,7 +51,7 @@ pub(super) struct Lanczos<'a> {
     /// Components of the last expansion along the block that it added.
     coupling: DMatrix<f64>,
     /// State of the random start vectors.
-    seed: u64,
+    random: SplitMix64,
 }
 
 impl<'a> Lanczos<'a> {
@@ -67,7 +69,7 @@ impl<'a> Lanczos<'a> {
             projected: vec![],
             expanded: 0,
             coupling,
-            seed: 0,
+            random: SplitMix64::new(0),
         }
     }
 
@@ -220,14 +222,9 @@ impl<'a> Lanczos<'a> {
         Ok(())
     }
 
-    /// Returns a random number between -1 and 1, with the same bits on every
-    /// machine (Steele, Lea and Flood 2014, splitmix64).
+    /// Returns a random number between -1 and 1, with the same bits on every machine.
     fn random(&mut self) -> f64 {
-        self.seed = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.seed;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        2.0 * self.random.next_unit() - 1.0
     }
 
     /// Returns the eigenvalues of the projected operator, in falling order of |θ|.
@@ -310,10 +307,6 @@ impl<'a> Lanczos<'a> {
         modes.merge(n, NaturalModes { values, shapes, residuals, ..NaturalModes::empty() });
         Ok(modes)
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn scale(v: &mut [f64], factor: f64) {

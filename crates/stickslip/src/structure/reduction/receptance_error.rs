@@ -12,6 +12,7 @@
 
 use super::{FullStructure, ReducedMatrices, ReductionError, ResidualSeries, StructureDamping};
 use nalgebra::{Complex, DMatrix};
+use stickslip_numerics::random::SplitMix64;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
 /// Largest number of samples; each needs a factorization of the whole structure.
@@ -227,11 +228,8 @@ fn local_sizes(whole: &FullStructure) -> Vec<f64> {
 
 /// Returns a reproducible pseudo-random sign ±1.
 pub(super) fn sign(number: usize) -> f64 {
-    // mixing function of splitmix64: Steele, Lea, Flood (2014)
-    let mut z = (number as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
+    let bits = SplitMix64::new(0).skip(number as u64).next_u64();
+    if bits & 1 == 0 { 1.0 } else { -1.0 }
 }
 
 /// Returns sample frequencies, alternately next to modes and between them, from the first
