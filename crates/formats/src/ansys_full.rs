@@ -24,17 +24,12 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Words of the standard header, and its item for the kind of file: 4 for `.full`.
-const STANDARD: u32 = 100;
-const FULL: u32 = 4;
-
 /// First word of the header of the matrices.
 const HEADER: usize = 103;
 
 /// Flags of a record.
 const INTEGERS: u32 = 1 << 31;
 const SHORT: u32 = 1 << 30;
-const PACKED: u32 = 0x3f << 24;
 
 /// Items of the header of the matrices, counted from zero.
 mod item {
@@ -55,7 +50,8 @@ fn order(bytes: &[u8]) -> Option<ByteOrder> {
     [ByteOrder::Little, ByteOrder::Big].into_iter().find(|&order| {
         let mut words = ByteCursor::new(bytes, order);
         let mut word = || words.u32().ok();
-        (word(), word().is_some(), word()) == (Some(STANDARD), true, Some(FULL))
+        // Words of the standard header, and its item for the kind of file: 4 for `.full`.
+        (word(), word().is_some(), word()) == (Some(100), true, Some(4))
     })
 }
 
@@ -69,7 +65,7 @@ fn record<'a>(file: &mut ByteCursor<'a>) -> Result<(u32, ByteCursor<'a>), Error>
     let location = file.clone();
     let words = file.u32()? as usize;
     let flags = file.u32()?;
-    if flags & PACKED != 0 {
+    if flags & (0x3f << 24) != 0 {
         let problem = format!("the record is compressed (flags {flags:#x}), which is not supported");
         let remedy = "switch off compression with /FCOMP before the solution, or export with HBMAT";
         return Err(Error::new(ErrorKind::Unsupported, location.location(), problem, remedy));

@@ -227,10 +227,6 @@ fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) ->
     }
 }
 
-/// Number of rows or columns that is always accepted. Larger numbers must
-/// satisfy [`ROWS_PER_BYTE`].
-const MIN_ROW_LIMIT: usize = 1 << 20;
-
 /// Maximum number of rows or columns per byte of a file.
 ///
 /// A row with an entry takes a line of text, or about two bytes if it belongs to a compressed
@@ -240,7 +236,9 @@ const ROWS_PER_BYTE: usize = 1;
 /// Rejects sizes that a file of this length cannot fill, because users allocate
 /// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
-    let most = MIN_ROW_LIMIT.max(length.saturating_mul(ROWS_PER_BYTE));
+    // Number of rows or columns that is always accepted. Larger numbers must satisfy
+    // `ROWS_PER_BYTE`.
+    let most = (1 << 20).max(length.saturating_mul(ROWS_PER_BYTE));
     if rows.max(columns) <= most {
         return Ok(());
     }

@@ -21,9 +21,6 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Number of bytes of a member that certainly contain the header of an array.
-const HEADER: usize = 8192;
-
 /// The supported layouts of SciPy.
 const LAYOUTS: &str = "csc, csr or coo";
 
@@ -150,9 +147,11 @@ impl<'a> Member<'a> {
     }
 
     fn beginning(&self) -> Cow<'a, [u8]> {
+        // Number of bytes of a member that certainly contain the header of an array.
+        let header = 8192;
         match self.deflated {
-            true => Cow::Owned(beginning(self.packed, Container::Bare, HEADER)),
-            false => Cow::Borrowed(&self.packed[..self.packed.len().min(HEADER)]),
+            true => Cow::Owned(beginning(self.packed, Container::Bare, header)),
+            false => Cow::Borrowed(&self.packed[..self.packed.len().min(header)]),
         }
     }
 
@@ -175,8 +174,6 @@ impl<'a> Member<'a> {
 const LOCAL: u32 = 0x0403_4b50;
 const CENTRAL: u32 = 0x0201_4b50;
 const END: u32 = 0x0605_4b50;
-const END_64: u32 = 0x0606_4b50;
-const LOCATOR_64: u32 = 0x0706_4b50;
 
 /// Value of a 32-bit field if the number is in the 64-bit extra field.
 const IN_EXTRA: usize = u32::MAX as usize;
@@ -258,13 +255,13 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
         return Ok(start);
     }
     zip.seek(end.saturating_sub(20))?;
-    if zip.u32()? != LOCATOR_64 {
+    if zip.u32()? != 0x0706_4b50 {
         return Ok(start);
     }
     zip.skip(4);
     let record = NumberType::U64.index(&mut zip)?;
     zip.seek(record)?;
-    if zip.u32()? != END_64 {
+    if zip.u32()? != 0x0606_4b50 {
         return Err(zip.malformed("the 64-bit end record of a zip", "something else"));
     }
     zip.skip(44);

@@ -80,12 +80,6 @@ pub enum BranchEnd {
 /// At kinks, Newton's method first has to find the right side of each kink. It then takes more
 /// than the usual three iterations without a risk of failure.
 const ITERATIONS: usize = 20;
-/// A step with at most this number of corrector iterations makes the next step
-/// longer. See [`ITERATIONS`].
-const EASY_ITERATIONS: usize = 10;
-/// A step below the largest step size divided by this number calls
-/// [`ParametricEquations::jump_kink`].
-const JUMP_DIVISOR: f64 = 32.0;
 
 /// Follows the branch from `(x, p)`, which solves the equations.
 ///
@@ -117,6 +111,9 @@ pub fn trace<E: ParametricEquations>(
     steps: ContinuationSettings,
     visit: &mut dyn FnMut(&mut E, &[f64], f64) -> bool,
 ) -> BranchEnd {
+    // A step below the largest step size divided by this number calls
+    // `ParametricEquations::jump_kink`.
+    let jump_divisor = 32.0;
     let n = equations.size();
     let mut corrector = Corrector::new(n);
     let (mut x, mut p) = (x.to_vec(), p);
@@ -170,9 +167,9 @@ pub fn trace<E: ParametricEquations>(
         };
         let Some(iterations) = accepted else {
             step_size *= 0.5;
-            if step_size < longest / JUMP_DIVISOR {
+            if step_size < longest / jump_divisor {
                 // Let the equations jump over the kink, by a fraction of the largest step size.
-                let q = (p + (4.0 / JUMP_DIVISOR) * steps.largest_step * steps.unit * direction).clamp(low, high);
+                let q = (p + (4.0 / jump_divisor) * steps.largest_step * steps.unit * direction).clamp(low, high);
                 next.copy_from_slice(&x);
                 if q != p && equations.jump_kink(&mut next, q) {
                     let border = q == low || q == high;
@@ -201,7 +198,9 @@ pub fn trace<E: ParametricEquations>(
         if border.is_some() {
             return BranchEnd::Border;
         }
-        if iterations <= EASY_ITERATIONS {
+        // A step with at most this number of corrector iterations makes the next step longer.
+        // See `ITERATIONS`.
+        if iterations <= 10 {
             step_size *= 1.5;
         }
     }

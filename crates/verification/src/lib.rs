@@ -336,6 +336,7 @@ pub fn zero(mut function: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2])
 /// Returns the integral of `function(t)` over `[0, end]`, with a function that is smooth
 /// between the `breaks`. Uses the Gauss rule with eight points on 16 parts of each piece.
 pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) -> f64 {
+    let parts: usize = 16;
     // abscissas and weights: Abramowitz and Stegun (1964), Table 25.4
     const POINTS: [(f64, f64); 4] = [
         (0.183_434_642_495_649_8, 0.362_683_783_378_362),
@@ -343,15 +344,14 @@ pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) 
         (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
         (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
     ];
-    const PARTS: usize = 16;
     let mut ends = vec![0.0];
     ends.extend(breaks.iter().copied().filter(|t| *t > 0.0 && *t < end));
     ends.push(end);
     ends.sort_by(f64::total_cmp);
     let mut sum = 0.0;
     for pair in ends.windows(2) {
-        let half = 0.5 * (pair[1] - pair[0]) / PARTS as f64;
-        for part in 0..PARTS {
+        let half = 0.5 * (pair[1] - pair[0]) / parts as f64;
+        for part in 0..parts {
             let centre = pair[0] + half * (2 * part + 1) as f64;
             for (x, weight) in POINTS {
                 sum += half * weight * (function(centre - half * x) + function(centre + half * x));

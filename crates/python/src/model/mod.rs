@@ -93,10 +93,6 @@ fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Sol
     Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
 }
 
-/// Largest number of degrees of freedom for which all natural frequencies are computed: one
-/// second.
-const MOST_SURVEYED: usize = 600;
-
 impl PyModel {
     /// Wraps a model.
     pub fn from_model(model: Model) -> Self {
@@ -558,7 +554,9 @@ impl PyModel {
         out.set_item("places", request.system.places())?;
         out.set_item("joints", self.joints())?;
         out.set_item("method", choice.to_string())?;
-        if request.system.dofs() <= MOST_SURVEYED {
+        // Largest number of degrees of freedom for which all natural frequencies are computed:
+        // one second.
+        if request.system.dofs() <= 600 {
             let survey = run_here(py, || self.model.survey())?.map_err(|cause| model_error(py, &cause, &self.model))?;
             let hertz = |modes: &stickslip::model::LinearModes| {
                 modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>()

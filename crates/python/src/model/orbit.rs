@@ -274,15 +274,14 @@ fn rows<'py>(py: Python<'py>, values: Vec<f64>, rows: usize, columns: usize) -> 
     PyArray1::from_vec(py, values).reshape([rows, columns])
 }
 
-/// Maximum number of times of a sampled motion: a few hundred megabytes.
-const MOST_INSTANTS: usize = 10_000_000;
-
 /// Checks a number of times.
 pub fn instants(py: Python<'_>, points: usize) -> PyResult<usize> {
-    if (1..=MOST_INSTANTS).contains(&points) {
+    // Maximum number of times of a sampled motion: a few hundred megabytes.
+    let most_instants: usize = 10_000_000;
+    if (1..=most_instants).contains(&points) {
         return Ok(points);
     }
-    Err(error::model(py, format!("`points` must be a whole number from 1 to {MOST_INSTANTS}, found {points}")))
+    Err(error::model(py, format!("`points` must be a whole number from 1 to {most_instants}, found {points}")))
 }
 
 impl PyOrbit {

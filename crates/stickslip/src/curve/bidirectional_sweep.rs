@@ -13,8 +13,6 @@ use std::sync::atomic::AtomicBool;
 /// amplitude, and by more than `ERRORS` times the estimated error.
 const DIFFERENCE: f64 = 1e-2;
 const ERRORS: f64 = 3.0;
-/// Amplitudes below this fraction of a mean are rounding.
-const ROUNDING: f64 = 1e-10;
 
 /// The points of a curve, as the forward sweep found them.
 ///
@@ -147,7 +145,8 @@ fn amplitude_ratio(point: &CurvePoint, orbit: &Orbit, held: f64) -> Option<f64> 
         return None;
     }
     let found = amplitudes(orbit);
-    let held = orbit.places.iter().map(|place| ROUNDING * place.mean.abs()).fold(held, f64::max);
+    // Amplitudes below this fraction of a mean are rounding.
+    let held = orbit.places.iter().map(|place| 1e-10 * place.mean.abs()).fold(held, f64::max);
     let largest = |values: &[f64]| values.iter().copied().fold(held.max(f64::MIN_POSITIVE), f64::max);
     let (here, there) = (largest(&point.values), largest(&found));
     let enough = (DIFFERENCE.max(ERRORS * point.error) * here.max(there)).max(held);

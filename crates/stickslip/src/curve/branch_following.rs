@@ -13,23 +13,14 @@ use num_complex::Complex64;
 /// Largest difference between two consecutive orbits of a branch, relative to the largest
 /// amplitude. It applies to amplitudes and to first harmonics, which include the phase.
 const MAX_CHANGE: f64 = 0.2;
-/// A step below this fraction of the interval is not halved again: the branch ends or turns
-/// there.
-const MIN_STEP: f64 = 1.0 / 512.0;
-/// Maximum number of steps in an interval.
-const MAX_STEPS: usize = 80;
-/// Work limit of all steps in an interval, as a fraction of the work limit of a point. After it
-/// is exceeded, no interval is repeated in smaller steps.
-const WORK_LIMIT: f64 = 0.3;
-/// Largest number of degrees of freedom plus joint directions for branch following and the
-/// reverse sweep, which takes as much time as the curve.
-const MAX_SIZE: usize = 24;
 
 /// Tells whether curves of a system use branch following and the reverse sweep: the system is
 /// small, and several orbits may exist at a frequency.
 pub fn is_followed(system: &System) -> bool {
     let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
-    system.dofs() + directions <= MAX_SIZE && !system.is_incrementally_stable()
+    // Largest number of degrees of freedom plus joint directions for branch following and the
+    // reverse sweep, which takes as much time as the curve.
+    system.dofs() + directions <= 24 && !system.is_incrementally_stable()
 }
 
 /// Returns a solver with branch following for systems that use it; otherwise the method's own
@@ -126,14 +117,17 @@ impl BranchFollower<'_> {
         let from = last.omega;
         let (mut at, mut step, mut effort) = (0.0, 0.5, 0.0);
         let mut beyond;
-        for _ in 0..MAX_STEPS {
+        // Maximum number of steps in an interval.
+        for _ in 0..80 {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
             let found = self.solve(target, Some(&last.start), between || !arrives);
             effort += self.solver.work_fraction();
+            // Work limit of all steps in an interval, as a fraction of the work limit of a
+            // point. After it is exceeded, no interval is repeated in smaller steps.
             self.work_limit_reached =
-                effort > WORK_LIMIT || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
+                effort > 0.3 || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
             match found.ok().filter(|orbit| last.may_precede(orbit)) {
                 Some(orbit) if arrives => return Some(orbit),
                 _ if self.work_limit_reached => return None,
@@ -141,7 +135,9 @@ impl BranchFollower<'_> {
                 None => (step, beyond) = (0.5 * step, target),
             }
             step = step.min(1.0 - at);
-            if step < MIN_STEP {
+            // A step below this fraction of the interval is not halved again: the branch ends or
+            // turns there.
+            if step < (1.0 / 512.0) {
                 self.end = Some(BranchEnd { last, beyond });
                 return None;
             }

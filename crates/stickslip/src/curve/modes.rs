@@ -104,9 +104,6 @@ pub struct ModeRequest {
     pub samples: usize,
 }
 
-/// Displacements of places below this fraction of a mode's largest coordinate are rounding.
-const PLACE_ROUNDING: f64 = 1e-12;
-
 /// Checks that a system can have nonlinear modes.
 ///
 /// # Errors
@@ -234,7 +231,9 @@ pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, Meth
     Ok(equations.linear_modes().get(index).and_then(|linear| {
         let shape = linear.shape.as_slice();
         let largest = size(&displacements(equations.at_places(shape)));
-        (largest > PLACE_ROUNDING * size(shape)).then(|| 1.0 / largest)
+        // Displacements of places below this fraction of a mode's largest coordinate are
+        // rounding.
+        (largest > 1e-12 * size(shape)).then(|| 1.0 / largest)
     }))
 }
 

@@ -80,16 +80,14 @@ impl Law for Coulomb2dArctan {
     }
 }
 
-/// Below this squared argument, `arctan x / x` is evaluated as a series. The sixth term is then
-/// below rounding.
-const SERIES_BELOW: f64 = 1e-3;
-
 impl RateLaw for Coulomb2dArctan {
     #[inline]
     fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let v = [motion.velocity[0] * self.alpha, motion.velocity[1] * self.alpha];
         let square = dot(v, v);
-        let share = if square.re() < SERIES_BELOW {
+        // Below this squared argument, `arctan x / x` is evaluated as a series. The sixth term
+        // is then below rounding.
+        let share = if square.re() < 1e-3 {
             (((square * (1.0 / 9.0) - 1.0 / 7.0) * square + 0.2) * square - 1.0 / 3.0) * square + 1.0
         } else {
             let size = square.sqrt();

@@ -453,10 +453,6 @@ impl SystemBuilder {
     }
 }
 
-/// Relative difference between loads of a sector and those of the first sector that counts as
-/// rounding of the phases. It is relative to the largest load.
-const SYMMETRY_TOLERANCE: f64 = 1e-12;
-
 impl System {
     /// Creates a builder for a system on a structure.
     pub fn builder(structure: Structure) -> SystemBuilder {
@@ -537,7 +533,9 @@ impl System {
         }
         let size = n / sectors;
         let near = |first: Complex64, harmonic: u32, sector: usize, z: Complex64, largest: f64| {
-            (first * cyclic.phase_factor(harmonic as usize, sector) - z).norm() <= SYMMETRY_TOLERANCE * largest
+            // Relative difference between loads of a sector and those of the first sector that
+            // counts as rounding of the phases. It is relative to the largest load.
+            (first * cyclic.phase_factor(harmonic as usize, sector) - z).norm() <= 1e-12 * largest
         };
         for load in &self.loads {
             for values in [&load.force, &load.by_velocity, &load.by_acceleration] {

@@ -161,15 +161,6 @@ pub(crate) enum ReducedForm {
     Ring(Arc<RingModes>),
 }
 
-/// Number of mistuning patterns whose modes are stored. A case is assembled several times in
-/// succession, and a campaign has a million patterns. The modes of 240 blades with five places
-/// each use 40 MB.
-const CACHED_PATTERNS: usize = 16;
-
-/// Ratio of the highest retained frequency to the highest frequency of interest. The last modes
-/// only improve those below.
-const MODE_MARGIN: f64 = 1.5;
-
 impl Component {
     /// Creates a component from row names and symmetric sparse matrices.
     ///
@@ -508,7 +499,10 @@ impl SectorCache {
         drop(known);
         let answer = self.best_mistuned(blade, deviations, seen, how)?;
         let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() >= CACHED_PATTERNS {
+        // Number of mistuning patterns whose modes are stored. A case is assembled several times
+        // in succession, and a campaign has a million patterns. The modes of 240 blades with
+        // five places each use 40 MB.
+        if known.len() >= 16 {
             known.remove(0);
         }
         known.push((asked, answer.clone()));
@@ -623,7 +617,9 @@ fn reduce_whole(whole: &FullStructure, how: &Reduction) -> Result<ReductionResul
         }
         Reduction::Modes { modes: count, kind, orders, up_to } => {
             let modes = whole.lowest_modes(count)?;
-            let serves = natural(&modes).last().map_or(0.0, |last| last / MODE_MARGIN);
+            // Ratio of the highest retained frequency to the highest frequency of interest. The
+            // last modes only improve those below.
+            let serves = natural(&modes).last().map_or(0.0, |last| last / 1.5);
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
                 ReductionKind::Rubin => RubinBasis::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,

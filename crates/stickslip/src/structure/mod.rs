@@ -80,8 +80,6 @@ pub struct Matrices {
 pub const MAX_FULL_DOFS: usize = 2000;
 /// Number of degrees of freedom from which matrices are stored sparse.
 pub const MIN_SPARSE_DOFS: usize = 40;
-/// Fraction of nonzero entries above which matrices are stored full at any size.
-const FULL_FRACTION: f64 = 0.3;
 
 /// The reason why matrices do not form a valid structure.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -531,7 +529,8 @@ impl Matrices {
 /// Returns whether matrices with these numbers of entries are stored full.
 fn is_full(n: usize, entries: [usize; 3]) -> bool {
     let most = entries.into_iter().max().unwrap_or(0);
-    n < MIN_SPARSE_DOFS || most as f64 > FULL_FRACTION * (n as f64) * (n as f64)
+    // Fraction of nonzero entries above which matrices are stored full at any size.
+    n < MIN_SPARSE_DOFS || most as f64 > 0.3 * (n as f64) * (n as f64)
 }
 
 fn to_full(mass: &SparseMatrix, damping: &SparseMatrix, stiffness: &SparseMatrix) -> Matrices {

@@ -16,10 +16,6 @@ use stickslip_numerics::sparse::{Singular, SparseMatrix};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Difference between the matrices of a sector and those of the first one that counts as
-/// rounding of sums in another order. It is relative to the largest entry.
-const EQUAL: f64 = 1e-12;
-
 /// The rows of the first sector in the matrices of a ring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RingSector {
@@ -116,7 +112,9 @@ impl RingSector {
         let mut met = 0;
         for (row, column, values) in ring.entries() {
             let key = key(row, column);
-            let near = |first: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= EQUAL * largest[k]);
+            // Difference between the matrices of a sector and those of the first one that counts
+            // as rounding of sums in another order. It is relative to the largest entry.
+            let near = |first: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= 1e-12 * largest[k]);
             match entries.binary_search_by_key(&key, |entry| (entry.0, entry.1, entry.2)) {
                 Ok(at) if near(&entries[at].3) => met += 1,
                 _ => return None,

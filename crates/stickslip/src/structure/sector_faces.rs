@@ -11,11 +11,6 @@ use std::f64::consts::TAU;
 /// A node and its coordinates, in any unit of length.
 pub type NodeCoordinates = (String, [f64; 3]);
 
-/// Tolerance for the distance between a node and its rotated counterpart, relative to the
-/// largest distance of a node from the axis. Meshes are written with six digits or more, and
-/// elements are larger.
-const COINCIDENT: f64 = 1e-4;
-
 /// The reason why pairs of nodes are not the two sides of a sector.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FacesError {
@@ -105,7 +100,10 @@ impl<'a> SectorFaces<'a> {
     }
 
     fn tolerance(&self) -> f64 {
-        COINCIDENT * self.radius
+        // Tolerance for the distance between a node and its rotated counterpart, relative to the
+        // largest distance of a node from the axis. Meshes are written with six digits or more,
+        // and elements are larger.
+        1e-4 * self.radius
     }
 
     fn cell(&self, at: [f64; 3]) -> [i64; 3] {

@@ -202,7 +202,9 @@ pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, inde
         return if cycles { radians(value) } else { value };
     }
     let decimal = match usize::try_from(digits) {
-        Ok(digits @ ..=MAX_DECIMALS) => format!("{value:.digits$}"),
+        // Largest number of decimals. A value that needs more is far below 1 in its unit and
+        // stays as computed.
+        Ok(digits @ ..=300) => format!("{value:.digits$}"),
         _ => format!("{value:e}"),
     };
     let unit = if dimension == Dimension::ANGLE { "deg" } else { "Hz" };
@@ -211,10 +213,6 @@ pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, inde
         None => decimal.parse().unwrap_or(value),
     }
 }
-
-/// Largest number of decimals. A value that needs more is far below 1 in its unit and stays as
-/// computed.
-const MAX_DECIMALS: usize = 300;
 
 /// One resolved value.
 #[derive(Debug, Clone, PartialEq)]

@@ -95,10 +95,6 @@ fn element_error(by: Element, message: String) -> ModelError {
     ModelError { element: by, key, message, wrong_name: None }
 }
 
-/// Factor of inertia over rounding at the suggested frequency; the motion is still quasi-static
-/// there.
-const INERTIA_MARGIN: f64 = 100.0;
-
 /// Returns the error of an excitation frequency `omega`, rad/s, that is too slow for every
 /// mass.
 pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
@@ -116,7 +112,9 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
     }
     let (own, name) = softest?;
     let shown = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
-    let enough = TAU * 10f64.powf((INERTIA_MARGIN.sqrt() * slowest / TAU).log10().ceil());
+    // Factor of inertia over rounding at the suggested frequency; the motion is still
+    // quasi-static there.
+    let enough = TAU * 10f64.powf((100f64.sqrt() * slowest / TAU).log10().ceil());
     let message = format!(
         "at {} inertia has no effect, because it is lost in rounding; the lowest natural frequency of a single mass is \
          {}, that of `{name}`",

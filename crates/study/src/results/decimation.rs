@@ -101,7 +101,9 @@ impl DecimatedTable {
                 study.cases().div_ceil(each)
             };
             // a bin keeps at most two rows for every column: a few dozen
-            bin = (kept * rows_per_case > most).then(|| (rows_per_case * kept).div_ceil(most).max(1) * ROWS_PER_BIN);
+            // Approximate number of rows that a bin keeps: a table has about a dozen columns
+            // with extremes at different rows.
+            bin = (kept * rows_per_case > most).then(|| (rows_per_case * kept).div_ceil(most).max(1) * 24);
         }
         DecimatedTable { rows: empty.clone(), cases, bin, key_columns: keys, current_case: None, open_bin: empty }
     }
@@ -170,10 +172,6 @@ impl DecimatedTable {
         self.rows
     }
 }
-
-/// Approximate number of rows that a bin keeps: a table has about a dozen columns with extremes
-/// at different rows.
-const ROWS_PER_BIN: usize = 24;
 
 fn key(table: &Table, row: usize, keys: usize) -> Vec<u64> {
     let columns = table.columns.iter().take(keys);

@@ -28,10 +28,6 @@ const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibr
     ramp. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
     orbit that its run reached.";
 
-/// Relative change of the amplitudes with the history above which it is reported: the tolerance
-/// of harmonic balance.
-const HISTORY_TOLERANCE: f64 = 1e-3;
-
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Note {
@@ -150,7 +146,9 @@ impl Note {
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
         let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::UnknownStability(1));
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
-        let spread = orbit.evidence.history_spread.filter(|spread| *spread > HISTORY_TOLERANCE);
+        // Relative change of the amplitudes with the history above which it is reported: the
+        // tolerance of harmonic balance.
+        let spread = orbit.evidence.history_spread.filter(|spread| *spread > 1e-3);
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
         said.chain(Note::stuck_offset_note(model, orbit))
             .chain(range)

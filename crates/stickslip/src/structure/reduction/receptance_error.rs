@@ -15,23 +15,6 @@ use nalgebra::{Complex, DMatrix};
 use stickslip_numerics::random::SplitMix64;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
-/// Largest number of samples; each needs a factorization of the whole structure.
-const SAMPLES: usize = 9;
-/// Distance of a sample from a mode, relative to its frequency, unless the damping is larger:
-/// the half width of a resonance.
-const MODE_DISTANCE: f64 = 1e-3;
-/// Samples closer than this, relative to the frequency, are merged.
-const MERGE_DISTANCE: f64 = 1e-4;
-/// Relative shift of a sample that coincides with a mode of the whole structure.
-const SAMPLE_SHIFT: f64 = 3e-5;
-/// Attempts to shift a sample away from a mode.
-const ATTEMPTS: usize = 5;
-
-/// Number of ports up to which each port is loaded separately. More ports are loaded all
-/// together, with [`PROBES`] vectors of random signs. Separate loads would need one solution
-/// per port and sample. The norm of the response to random signs is on average that of the
-/// matrix, here within a tenth.
-const MAX_SEPARATE_PORTS: usize = 96;
 const PROBES: usize = 48;
 
 /// ω in rad/s, and displacements of the ports under the loads in m.
@@ -65,7 +48,8 @@ impl ReferenceReceptance {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn new(whole: &FullStructure, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
-        Self::with_samples(whole, modes, up_to, SAMPLES)
+        // Largest number of samples; each needs a factorization of the whole structure.
+        Self::with_samples(whole, modes, up_to, 9)
     }
 
     /// Computes at most `most` samples.
@@ -84,7 +68,11 @@ impl ReferenceReceptance {
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn at_frequencies(whole: &FullStructure, frequencies: &[f64]) -> Result<Self, ReductionError> {
         let ports = whole.ports.len();
-        let alone = ports <= MAX_SEPARATE_PORTS;
+        // Number of ports up to which each port is loaded separately. More ports are loaded all
+        // together, with `PROBES` vectors of random signs. Separate loads would need one
+        // solution per port and sample. The norm of the response to random signs is on average
+        // that of the matrix, here within a tenth.
+        let alone = ports <= 96;
         let local = local_sizes(whole);
         let mut factors = Factors { whole, last: None };
         let loads = match alone {
@@ -160,8 +148,10 @@ impl Factors<'_> {
     /// mode. `together` contains loads on all ports; `None` loads each port separately.
     fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<ReceptanceSample, ReductionError> {
         let mut failed = ReductionError::OutOfRange;
-        for attempt in 0..ATTEMPTS {
-            let omega = omega * (1.0 + SAMPLE_SHIFT * attempt as f64);
+        // Attempts to shift a sample away from a mode.
+        for attempt in 0..5 {
+            // Relative shift of a sample that coincides with a mode of the whole structure.
+            let omega = omega * (1.0 + 3e-5 * attempt as f64);
             match self.answers(omega, together) {
                 Ok(receptance) => return Ok((omega, receptance)),
                 Err(error) => failed = error,
@@ -235,15 +225,20 @@ pub(super) fn sign(number: usize) -> f64 {
 /// Returns sample frequencies, alternately next to modes and between them, from the first
 /// elastic mode to the end of the range.
 fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
+    // Distance of a sample from a mode, relative to its frequency, unless the damping is larger:
+    // the half width of a resonance.
+    let mode_distance = 1e-3;
+    // Samples closer than this, relative to the frequency, are merged.
+    let merge_distance = 1e-4;
     let offset = match whole.damping {
-        StructureDamping::Ratio { ratio, .. } => ratio.max(MODE_DISTANCE),
-        _ => MODE_DISTANCE,
+        StructureDamping::Ratio { ratio, .. } => ratio.max(mode_distance),
+        _ => mode_distance,
     };
     let inside: Vec<f64> = modes
         .values
         .iter()
         .map(|value| value.max(0.0).sqrt())
-        .filter(|omega| *omega > MERGE_DISTANCE * up_to && *omega < up_to)
+        .filter(|omega| *omega > merge_distance * up_to && *omega < up_to)
         .collect();
     let mut all = Vec::new();
     for (k, omega) in inside.iter().enumerate() {
@@ -253,10 +248,10 @@ fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: us
     all.push(0.5 * inside.first().copied().unwrap_or(up_to));
     // equal modes, as in a square section, have no middle; at a mode, rounding would dominate
     // the error
-    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= MERGE_DISTANCE * mode));
+    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= merge_distance * mode));
     all.push(up_to);
     all.sort_by(f64::total_cmp);
-    all.dedup_by(|next, kept| *next - *kept < MERGE_DISTANCE * *kept);
+    all.dedup_by(|next, kept| *next - *kept < merge_distance * *kept);
     // evenly spaced indices of mixed parity keep both kinds of samples
     let last = all.len() - 1;
     let mut at: Vec<usize> = (0..most.min(all.len())).map(|i| i * last / (most - 1).min(last).max(1)).collect();

@@ -78,7 +78,9 @@ fn feistel_permutation(index: u64, count: u64, key: u64) -> u64 {
     let mut at = index;
     loop {
         let (mut left, mut right) = (at >> half, at & mask);
-        for round in 0..ROUNDS {
+        // Rounds of the network: four give a random appearance, and small networks need a few
+        // more.
+        for round in 0..8 {
             (left, right) = (right, left ^ hash(&[key, round, right]) & mask);
         }
         at = left << half | right;
@@ -88,9 +90,6 @@ fn feistel_permutation(index: u64, count: u64, key: u64) -> u64 {
         }
     }
 }
-
-/// Rounds of the network: four give a random appearance, and small networks need a few more.
-const ROUNDS: u64 = 8;
 
 /// Returns a coordinate of the Sobol sequence, 32 bits: element `index` in Gray code order.
 fn sobol(index: u32, dimension: usize) -> u32 {

@@ -82,25 +82,21 @@ pub(super) const KIND: Kind = Kind {
     draw: figure::draw,
 };
 
-/// Points of a branch per requested step; the continuation shortens steps where the branch
-/// bends.
-///
-/// Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border of stick.
-const POINTS: f64 = 5.0;
-/// Peaks and turning points per branch.
-const MARKS: f64 = 2.0;
-
 fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let values = &inputs.case.values;
     let branches = if along_parameter(inputs.study) { inputs.curves() } else { inputs.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
     let length = values.count("harmonics").unwrap_or(HARMONICS as u64) as f64;
     let samples = values.count("samples").unwrap_or(SERIES_SAMPLES) as f64;
-    let rows = steps * POINTS;
+    // Points of a branch per requested step; the continuation shortens steps where the branch
+    // bends. Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border
+    // of stick.
+    let rows = steps * 5.0;
     PlannedSize {
         tables: vec![
             inputs.orbits(rows),
-            TableShape { rows: branches * MARKS, numbers: inputs.varied + 2.0, words: 0.0 },
+            // Peaks and turning points per branch.
+            TableShape { rows: branches * 2.0, numbers: inputs.varied + 2.0, words: 0.0 },
         ],
         drawn: rows * inputs.places,
         unit: rows / branches * inputs.kept_series_bytes(length, samples) + inputs.series_bytes(length),
