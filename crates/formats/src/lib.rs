@@ -227,18 +227,13 @@ fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) ->
     }
 }
 
-/// Maximum number of rows or columns per byte of a file.
-///
-/// A row with an entry takes a line of text, or about two bytes if it belongs to a compressed
-/// diagonal. Only small files have this many empty rows.
-const ROWS_PER_BYTE: usize = 1;
-
 /// Rejects sizes that a file of this length cannot fill, because users allocate
 /// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
-    // Number of rows or columns that is always accepted. Larger numbers must satisfy
-    // `ROWS_PER_BYTE`.
-    let most = (1 << 20).max(length.saturating_mul(ROWS_PER_BYTE));
+    // As many rows or columns as the file has bytes, and at least 2²⁰. A row with an entry takes
+    // a line of text, or about two bytes if it belongs to a compressed diagonal. Only small
+    // files have more empty rows.
+    let most = length.max(1 << 20);
     if rows.max(columns) <= most {
         return Ok(());
     }

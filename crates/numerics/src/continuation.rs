@@ -75,12 +75,6 @@ pub enum BranchEnd {
     Stopped,
 }
 
-/// Maximum number of corrector iterations.
-///
-/// At kinks, Newton's method first has to find the right side of each kink. It then takes more
-/// than the usual three iterations without a risk of failure.
-const ITERATIONS: usize = 20;
-
 /// Follows the branch from `(x, p)`, which solves the equations.
 ///
 /// `visit` receives every point and returns true to continue.
@@ -199,7 +193,6 @@ pub fn trace<E: ParametricEquations>(
             return BranchEnd::Border;
         }
         // A step with at most this number of corrector iterations makes the next step longer.
-        // See `ITERATIONS`.
         if iterations <= 10 {
             step_size *= 1.5;
         }
@@ -276,10 +269,14 @@ impl Corrector {
         unit: f64,
         across: Option<(&[f64], &Predicted)>,
     ) -> Option<usize> {
+        // Maximum number of corrector iterations. At kinks, Newton's method first has to find
+        // the right side of each kink. It then takes more than the usual three iterations
+        // without a risk of failure.
+        let most: usize = 20;
         let n = self.n;
         let mut fixed_parameter_row = vec![0.0; n + 1];
         fixed_parameter_row[n] = 1.0;
-        for iteration in 0..=ITERATIONS {
+        for iteration in 0..=most {
             if !equations.evaluate(x, *p, &mut self.f, &mut self.by_x, &mut self.by_p) {
                 return None;
             }
@@ -287,7 +284,7 @@ impl Corrector {
             if size <= equations.tolerance() {
                 return Some(iteration);
             }
-            if !size.is_finite() || iteration == ITERATIONS {
+            if !size.is_finite() || iteration == most {
                 return None;
             }
             self.right[..n].copy_from_slice(&self.f);

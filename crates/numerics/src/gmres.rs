@@ -120,7 +120,9 @@ impl Gmres {
             outcome.residual = left / size;
             // SLACK: rounding of the product may make the true residual larger
             // than that of the recurrence.
-            outcome.solved = left <= SLACK * limits.tolerance * size;
+            // Factor on the tolerance by which the true residual may exceed that of the
+            // recurrence, because of rounding in the products.
+            outcome.solved = left <= 2.0 * limits.tolerance * size;
             if outcome.solved || outcome.products >= limits.products || left.is_nan() || left >= before {
                 return outcome;
             }
@@ -196,10 +198,6 @@ impl Gmres {
         weights
     }
 }
-
-/// Factor on the tolerance by which the true residual may exceed that of the
-/// recurrence, because of rounding in the products.
-const SLACK: f64 = 2.0;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four partial sums, always in the same order.

@@ -9,11 +9,6 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
 
-/// Two orbits differ if their amplitudes differ by more than `DIFFERENCE` times the largest
-/// amplitude, and by more than `ERRORS` times the estimated error.
-const DIFFERENCE: f64 = 1e-2;
-const ERRORS: f64 = 3.0;
-
 /// The points of a curve, as the forward sweep found them.
 ///
 /// # Example
@@ -149,7 +144,9 @@ fn amplitude_ratio(point: &CurvePoint, orbit: &Orbit, held: f64) -> Option<f64> 
     let held = orbit.places.iter().map(|place| 1e-10 * place.mean.abs()).fold(held, f64::max);
     let largest = |values: &[f64]| values.iter().copied().fold(held.max(f64::MIN_POSITIVE), f64::max);
     let (here, there) = (largest(&point.values), largest(&found));
-    let enough = (DIFFERENCE.max(ERRORS * point.error) * here.max(there)).max(held);
+    // Two orbits differ if their amplitudes differ by more than a hundredth of the largest
+    // amplitude, and by more than three times the estimated error.
+    let enough = (1e-2f64.max(3.0 * point.error) * here.max(there)).max(held);
     let differs = point.values.iter().zip(&found).any(|(a, b)| (a - b).abs() > enough);
     differs.then(|| (there / here).clamp(f64::MIN_POSITIVE, f64::MAX))
 }

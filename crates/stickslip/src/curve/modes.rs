@@ -178,16 +178,16 @@ impl ModeBranches {
         // A single mode has the same number at both ends. For a law with memory, large motions
         // are expensive, so the branch from small amplitudes is tried first.
         let rising = match equations.is_single_dof_with_memory() {
-            true => ModeCurve::from_small_amplitude(equations, request.mode, request.range),
+            true => ModeCurve::from_small_amplitude(equations, request.mode, request.range.0, request.range.1),
             false => None,
         };
         if rising.as_ref().is_some_and(|rising| rising.largest_amplitude() >= high) {
             return ModeBranches { falling: None, rising };
         }
-        let falling = ModeCurve::follow(equations, request.mode, request.range);
+        let falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
         let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
-        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, (low, end)) } else { None };
+        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, low, end) } else { None };
         ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
 
@@ -244,7 +244,7 @@ pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, Meth
 /// See [`nonlinear_mode`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
-    let path = ModeCurve::follow(&mut equations, request.mode, request.range);
+    let path = ModeCurve::follow(&mut equations, request.mode, request.range.0, request.range.1);
     let mut orbits = Vec::new();
     for pair in path.states_within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
@@ -473,7 +473,7 @@ mod tests {
         let mut equations = ModeEquations::new(&system, 31, 1024).unwrap();
         let mut slipping = 0;
         for index in [0, 1] {
-            let path = ModeCurve::follow(&mut equations, index, (1e-4, 2e-2));
+            let path = ModeCurve::follow(&mut equations, index, 1e-4, 2e-2);
             for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
                 let state = path.state_at(&mut equations, amplitude).unwrap();
                 let n = system.dofs();

@@ -34,10 +34,6 @@ use stickslip_numerics::dual::Real;
 /// Largest number of sliders.
 const MAX_ELEMENTS: u32 = 1000;
 
-/// Ratio of successive bin edges is `exp(GRADING / √elements)`. More elements make both the bins
-/// and the first bin smaller.
-const GRADING: f64 = 1.5;
-
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "iwan",
@@ -165,7 +161,9 @@ impl Law for Iwan {
         let limit = stiffness * (chi + 1.0) / (chi + 2.0);
         let edge = |bin: u32| match bin {
             0 => 0.0,
-            bin => (-GRADING / f64::from(count).sqrt() * f64::from(count - bin)).exp(),
+            // Ratio of successive bin edges is `exp(1.5 / √elements)`. More elements make
+            // both the bins and the first bin smaller.
+            bin => (-1.5 / f64::from(count).sqrt() * f64::from(count - bin)).exp(),
         };
         let mut pieces: Vec<IdealElement> = (0..count)
             .map(|bin| {

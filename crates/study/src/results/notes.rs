@@ -15,10 +15,6 @@ use stickslip::structure::Reduction;
 /// Prefix of a note that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
-/// Largest number of cases that a note names. If it applies to more cases, it gives their
-/// number.
-const MAX_NAMED_CASES: usize = 3;
-
 /// Largest number of cases with a permanently stuck joint that are named one by one. The points
 /// of all other such cases are counted together.
 const MAX_STUCK_CASES: usize = 4;
@@ -39,7 +35,7 @@ pub enum Note {
     Cases {
         /// Number of cases.
         cases: usize,
-        /// The first cases, at most [`MAX_NAMED_CASES`].
+        /// The first cases, at most three.
         named: Vec<String>,
         /// The sentence. It begins with [`WARNING`] if it is a warning.
         text: String,
@@ -236,7 +232,9 @@ impl Note {
                     if text == same =>
                 {
                     *cases += more;
-                    let free_names = MAX_NAMED_CASES.saturating_sub(named.len());
+                    // Largest number of cases that a note names. If it applies to more cases, it
+                    // gives their number.
+                    let free_names = 3usize.saturating_sub(named.len());
                     named.extend(others.iter().take(free_names).cloned());
                     return;
                 }

@@ -157,7 +157,7 @@ fn is_maximum(near: &[CurvePoint], quantity: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::bracket_reduction::MIN_RISE;
+    use super::bracket_reduction::ReductionSettings;
     use super::*;
     use crate::method::event_driven::EventDriven;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
@@ -189,7 +189,10 @@ mod tests {
         let peak = highest_peak(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
         // F / (c √(k/m - c²/4m²))
         let expected = 1.0 / f64::sqrt(1.21e4 - 0.25);
-        assert!((peak.value / expected - 1.0).abs() < MIN_RISE && peak.unresolved.is_none(), "{peak:?}");
+        assert!(
+            (peak.value / expected - 1.0).abs() < ReductionSettings::default().min_rise && peak.unresolved.is_none(),
+            "{peak:?}"
+        );
     }
 
     /// Without damping, a slider of 2 N cannot bound the response to 10 N, since 4/π·2 N < 10 N.

@@ -15,8 +15,6 @@ use nalgebra::{Complex, DMatrix};
 use stickslip_numerics::random::SplitMix64;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
-const PROBES: usize = 48;
-
 /// ω in rad/s, and displacements of the ports under the loads in m.
 type ReceptanceSample = (f64, DMatrix<Complex<f64>>);
 
@@ -67,9 +65,10 @@ impl ReferenceReceptance {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn at_frequencies(whole: &FullStructure, frequencies: &[f64]) -> Result<Self, ReductionError> {
+        let probes = 48;
         let ports = whole.ports.len();
         // Number of ports up to which each port is loaded separately. More ports are loaded all
-        // together, with `PROBES` vectors of random signs. Separate loads would need one
+        // together, with `probes` vectors of random signs. Separate loads would need one
         // solution per port and sample. The norm of the response to random signs is on average
         // that of the matrix, here within a tenth.
         let alone = ports <= 96;
@@ -77,7 +76,7 @@ impl ReferenceReceptance {
         let mut factors = Factors { whole, last: None };
         let loads = match alone {
             true => DMatrix::identity(ports, ports),
-            false => DMatrix::from_fn(ports, PROBES, |i, k| sign(i * PROBES + k) / local[i].sqrt()),
+            false => DMatrix::from_fn(ports, probes, |i, k| sign(i * probes + k) / local[i].sqrt()),
         };
         let together = (!alone).then_some(&loads);
         let samples: Vec<_> =
@@ -89,7 +88,7 @@ impl ReferenceReceptance {
         };
         let size = |port: usize| if alone { usual(port) } else { local[port] };
         let scales: Vec<f64> = (0..ports).map(|port| size(port).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
-        let of_loads = if alone { scales.clone() } else { vec![1.0; PROBES] };
+        let of_loads = if alone { scales.clone() } else { vec![1.0; probes] };
         Ok(ReferenceReceptance {
             samples,
             loads,
