@@ -40,13 +40,13 @@ pub(crate) fn points<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Ite
 }
 
 /// Returns `true` if a point can be drawn.
-pub(crate) fn drawable((x, y): (f64, f64)) -> bool {
+pub(crate) fn drawable(x: f64, y: f64) -> bool {
     x.is_finite() && y.is_finite()
 }
 
 /// Returns the points that can be drawn.
 pub(crate) fn drawn<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
-    points(panel, series).filter(|p| drawable(*p))
+    points(panel, series).filter(|p| drawable(p.0, p.1))
 }
 
 /// Returns the lower edge of a band or the foot of a bar at a point.
@@ -335,7 +335,7 @@ fn extent(panel: &Panel) -> Option<(AxisRange, AxisRange)> {
             let area = matches!(series.style, Style::Band | Style::Bars);
             points(panel, series)
                 .enumerate()
-                .filter(|(_, p)| drawable(*p))
+                .filter(|(_, p)| drawable(p.0, p.1))
                 .filter(move |(_, p)| inside(p))
                 .flat_map(move |(i, (_, y))| [Some(y), base(panel, series, i).filter(|_| area)].into_iter().flatten())
         })

@@ -4,8 +4,7 @@
 //! `coulomb-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2), made isotropic in a plane.
 
-use super::kernels::planar_slip::dot;
-use super::kernels::planar_slip::radial;
+use super::kernels::planar_slip::{RadialForce, dot, radial};
 use super::{CoulombArctan, Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -103,6 +102,6 @@ impl ProxView for Coulomb2dArctan {
         let size = y[0].hypot(y[1]);
         let (mut value, mut rise) = ([0.0], [0.0]);
         self.along().resolve(&[size], penalty, &mut value, &mut rise);
-        radial(y, size, (value[0], rise[0]), force, slope);
+        radial(y, size, RadialForce { value: value[0], rise: rise[0] }, force, slope);
     }
 }

@@ -197,7 +197,7 @@ impl PanelTraces<'_> {
 fn outline(panel: &Panel, series: &Series, range: AxisRange) -> (Vec<f64>, Vec<f64>) {
     let points: Vec<(usize, (f64, f64))> = panels::points(panel, series).enumerate().collect();
     let (mut x, mut y) = (Vec::new(), Vec::new());
-    for piece in points.split(|(_, p)| !panels::drawable(*p)).filter(|piece| !piece.is_empty()) {
+    for piece in points.split(|(_, p)| !panels::drawable(p.0, p.1)).filter(|piece| !piece.is_empty()) {
         let lower = piece.iter().rev().map(|(i, p)| (p.0, panels::base(panel, series, *i).unwrap_or(range.from)));
         for p in piece.iter().map(|(_, p)| *p).chain(lower).chain([(f64::NAN, f64::NAN)]) {
             x.push(p.0);
@@ -220,7 +220,7 @@ fn dash(style: Style) -> &'static str {
 fn isolated(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = panels::points(panel, series).collect();
     points
-        .split(|p| !panels::drawable(*p))
+        .split(|p| !panels::drawable(p.0, p.1))
         .filter_map(|piece| if let [point] = piece { Some(*point) } else { None })
         .collect()
 }

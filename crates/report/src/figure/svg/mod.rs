@@ -225,7 +225,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
 /// Draws the pieces of a curve between its gaps. A single point becomes a dot.
 fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen: &Pen<'_>) {
     let points: Vec<Point> = panels::points(panel, series).collect();
-    for piece in points.split(|p| !panels::drawable(*p)) {
+    for piece in points.split(|p| !panels::drawable(p.0, p.1)) {
         let piece: Vec<Point> = piece.iter().map(|p| plot.map(*p)).collect();
         match piece.as_slice() {
             [] => {}
@@ -277,7 +277,7 @@ struct Slot {
 fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, slot: &Slot, colour: &str) {
     let opacity = if series.emphasis == Emphasis::Pale { PALE } else { 1.0 };
     let scale = plot.width / plot.x.span();
-    for (i, point) in panels::points(panel, series).enumerate().filter(|(_, p)| panels::drawable(*p)) {
+    for (i, point) in panels::points(panel, series).enumerate().filter(|(_, p)| panels::drawable(p.0, p.1)) {
         let (x, y) = plot.map(point);
         let base = panels::base(panel, series, i).map_or(plot.top + plot.height, |base| plot.map((point.0, base)).1);
         let corners = box_around(x + slot.shift * scale, y, slot.width * scale, base - y);

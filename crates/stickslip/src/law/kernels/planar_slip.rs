@@ -78,8 +78,8 @@ pub(in crate::law) fn step<S: Real>(force: [S; 2], increment: [S; 2], stiffness:
         let size = dot(trial, trial).sqrt();
         return [trial[0] * last / size, trial[1] * last / size];
     }
-    // |force + stiffness s increment| reaches the limit at the fraction s of the path. It solves a s²
-    // + b s + c = 0 with c <= 0 and a + b + c > 0.
+    // |force + stiffness s increment| reaches the limit at the fraction s of the path. It solves
+    // a s² + b s + c = 0 with c <= 0 and a + b + c > 0.
     let change = last - first;
     let a = dot(increment, increment) * (stiffness * stiffness) - change * change;
     let b = (dot(force, increment) * stiffness - first * change) * 2.0;
@@ -301,9 +301,17 @@ fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     (mean, slope)
 }
 
-/// Writes a force along `y` and its derivative with respect to y. Given are the magnitude of the
-/// force and its derivative with respect to the magnitude of y.
-pub(in crate::law) fn radial(y: &[f64], size: f64, (value, rise): (f64, f64), force: &mut [f64], slope: &mut [f64]) {
+/// The magnitude of a force along a vector, as a function of the magnitude of the vector.
+pub(in crate::law) struct RadialForce {
+    /// Magnitude of the force.
+    pub value: f64,
+    /// Its derivative with respect to the magnitude of the vector.
+    pub rise: f64,
+}
+
+/// Writes a force along `y` of magnitude `size`, and its derivative with respect to y.
+pub(in crate::law) fn radial(y: &[f64], size: f64, magnitude: RadialForce, force: &mut [f64], slope: &mut [f64]) {
+    let RadialForce { value, rise } = magnitude;
     // perpendicular to y, only the direction changes
     let across = if size > 0.0 { value / size } else { rise };
     for i in 0..2 {

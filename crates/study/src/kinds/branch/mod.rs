@@ -199,7 +199,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         turns.end_row();
     }
     let reason = match branch.end {
-        BranchEnd::Border => missing_range_text(&branch, range, &name, factor),
+        BranchEnd::Border => missing_range_text(&branch, range.0, range.1, &name, factor),
         BranchEnd::Stalled { parameter: at } => {
             Some(format!("the continuation stopped at {name} = {:.9}: no step converges", at * factor))
         }
@@ -253,7 +253,7 @@ fn method(values: &Values) -> HarmonicBalance {
 }
 
 /// States which part of the range is missing after the branch left the range, and what to do.
-fn missing_range_text(branch: &Branch, (from, to): (f64, f64), name: &str, factor: f64) -> Option<String> {
+fn missing_range_text(branch: &Branch, from: f64, to: f64, name: &str, factor: f64) -> Option<String> {
     let reached = branch
         .points
         .iter()
