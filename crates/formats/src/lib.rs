@@ -5,7 +5,8 @@
 //! use stickslip_formats::{Matrix, Symmetry, list, read, write};
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("stiffness.mtx");
-//! let stiffness = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5), (1, 1, 1e5)])?;
+//! let stiffness =
+//!     Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5), (1, 1, 1e5)])?;
 //! write(&path, &stiffness)?;
 //!
 //! // The content determines the format; a file with several matrices needs a name.

@@ -82,19 +82,39 @@ pub enum BranchEnd {
 /// # Example
 /// A circle, past its turning points:
 /// ```
-/// use stickslip_numerics::continuation::{BranchEnd, ContinuationSettings, ParametricEquations, trace};
+/// use stickslip_numerics::continuation::{
+///     BranchEnd, ContinuationSettings, ParametricEquations, trace,
+/// };
 /// struct Circle;
 /// impl ParametricEquations for Circle {
-///     fn size(&self) -> usize { 1 }
-///     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
+///     fn size(&self) -> usize {
+///         1
+///     }
+///     fn evaluate(
+///         &mut self,
+///         x: &[f64],
+///         p: f64,
+///         f: &mut [f64],
+///         by_x: &mut [f64],
+///         by_p: &mut [f64],
+///     ) -> bool {
 ///         (f[0], by_x[0], by_p[0]) = (x[0] * x[0] + p * p - 1.0, 2.0 * x[0], 2.0 * p);
 ///         true
 ///     }
-///     fn tolerance(&self) -> f64 { 1e-12 }
+///     fn tolerance(&self) -> f64 {
+///         1e-12
+///     }
 /// }
-/// let steps = ContinuationSettings { unit: 1.0, points: 200, ..ContinuationSettings::between(-2.0, 2.0, 0.1) };
+/// let steps = ContinuationSettings {
+///     unit: 1.0,
+///     points: 200,
+///     ..ContinuationSettings::between(-2.0, 2.0, 0.1)
+/// };
 /// let mut lowest = 1.0f64;
-/// let end = trace(&mut Circle, &[1.0], 0.0, steps, &mut |_, x, _| { lowest = lowest.min(x[0]); true });
+/// let end = trace(&mut Circle, &[1.0], 0.0, steps, &mut |_, x, _| {
+///     lowest = lowest.min(x[0]);
+///     true
+/// });
 /// assert_eq!(end, BranchEnd::Points);
 /// assert!(lowest < -0.99);
 /// ```

@@ -55,7 +55,8 @@ pub fn symmetric(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let (values, vectors) = stickslip_numerics::eigen::symmetric_blocked(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
+/// let (values, vectors) =
+///     stickslip_numerics::eigen::symmetric_blocked(&dmatrix![2.0, 1.0; 1.0, 2.0]).unwrap();
 /// assert!((values[0] - 1.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
 /// assert!((vectors[(0, 1)] - vectors[(1, 1)]).abs() < 1e-14);
 /// ```
@@ -83,7 +84,11 @@ pub fn symmetric_blocked(matrix: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let (values, vectors) = stickslip_numerics::eigen::generalized_symmetric(&dmatrix![3.0, 0.0; 0.0, 8.0], &dmatrix![1.0, 0.0; 0.0, 4.0]).unwrap();
+/// let (values, vectors) = stickslip_numerics::eigen::generalized_symmetric(
+///     &dmatrix![3.0, 0.0; 0.0, 8.0],
+///     &dmatrix![1.0, 0.0; 0.0, 4.0],
+/// )
+/// .unwrap();
 /// assert!((values[0] - 2.0).abs() < 1e-14 && (values[1] - 3.0).abs() < 1e-14);
 /// assert!((vectors[(1, 0)].abs() - 0.5).abs() < 1e-14 && vectors[(0, 0)].abs() < 1e-14);
 /// ```
@@ -150,7 +155,8 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex64>> {
 /// # Example
 /// ```
 /// use nalgebra::dmatrix;
-/// let largest = stickslip_numerics::eigen::largest_modulus(&dmatrix![0.5, 1e3; 0.0, -0.9]).unwrap();
+/// let largest =
+///     stickslip_numerics::eigen::largest_modulus(&dmatrix![0.5, 1e3; 0.0, -0.9]).unwrap();
 /// assert!((largest - 0.9).abs() < 1e-13);
 /// ```
 pub fn largest_modulus(matrix: &DMatrix<f64>) -> Option<f64> {

@@ -117,10 +117,11 @@ impl PyOrbit {
 
     /// Error measures of the orbit.
     ///
-    /// ``residual``, ``energy_gap``, ``truncation`` and ``return_defect`` are dimensionless,
-    /// and ``None`` if the method does not compute them. The other keys are ``status``,
-    /// ``found_by`` (the algorithm), ``iterations``, ``switches``, and two lists of joints. ``stuck``: permanently stuck
-    /// joints. ``history``: joints whose mean force depends on the history of the motion.
+    /// ``residual``, ``energy_gap``, ``truncation`` and ``return_defect`` are dimensionless, and
+    /// ``None`` if the method does not compute them. The other keys are ``status``, ``found_by``
+    /// (the algorithm), ``iterations``, ``switches``, and two lists of joints. ``stuck``:
+    /// permanently stuck joints. ``history``: joints whose mean force depends on the history of
+    /// the motion.
     #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = &self.orbit.evidence;

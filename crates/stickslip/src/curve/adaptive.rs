@@ -45,7 +45,13 @@ impl AdaptiveCurve {
     /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// let range = (std::f64::consts::TAU * 110.0, std::f64::consts::TAU * 130.0);
     /// let curve = AdaptiveCurve { range, tolerance: 0.01 }
-    ///     .curve(&EventDriven, &system, &|orbit| vec![orbit.places[0].amplitude()], &|_| (), &|| false)
+    ///     .curve(
+    ///         &EventDriven,
+    ///         &system,
+    ///         &|orbit| vec![orbit.places[0].amplitude()],
+    ///         &|_| (),
+    ///         &|| false,
+    ///     )
     ///     .unwrap();
     /// // the resonance at 121.25 Hz is 0.2 Hz wide; a uniform grid takes 1000 points
     /// assert!(curve.len() < 200);

@@ -23,14 +23,19 @@ use std::sync::atomic::AtomicBool;
 /// let system = Model {
 ///     masses: vec![Mass::new("m", 1.0)],
 ///     springs: vec![Spring { between: on_ground(), stiffness: 1e4, damping: 2.0 }],
-///     joints: vec![Joint { name: "j".into(), between: on_ground(), law: Arc::new(stickslip::law::Cubic { stiffness: -1e9 }) }],
+///     joints: vec![Joint {
+///         name: "j".into(),
+///         between: on_ground(),
+///         law: Arc::new(stickslip::law::Cubic { stiffness: -1e9 }),
+///     }],
 ///     forces: vec![Force { on: "m".into(), amplitude: 0.3, phase: 0.0, harmonic: 1 }],
 ///     ..Model::default()
 /// }
 /// .assemble()
 /// .unwrap();
 /// let method = HarmonicBalance::default();
-/// let (mut sweep, mut solver, mut start) = (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap(), None);
+/// let (mut sweep, mut solver, mut start) =
+///     (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap(), None);
 /// for i in 0..41 {
 ///     let orbit = solver.orbit(88.0 + 0.4 * f64::from(i), start.as_deref()).unwrap();
 ///     sweep.add(orbit.omega, Ok(&orbit));

@@ -59,8 +59,18 @@ impl ModePoint {
     /// use num_complex::Complex64;
     /// use stickslip::curve::modes::ModePoint;
     /// let places = vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, -2.0)];
-    /// let point = ModePoint { amplitude: 1.0, omega: 1.0, damping: 0.0, viscous: 0.0, places, amplitudes: vec![1.0, 2.0] };
-    /// assert_eq!(point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(), [std::f64::consts::PI, 0.0]);
+    /// let point = ModePoint {
+    ///     amplitude: 1.0,
+    ///     omega: 1.0,
+    ///     damping: 0.0,
+    ///     viscous: 0.0,
+    ///     places,
+    ///     amplitudes: vec![1.0, 2.0],
+    /// };
+    /// assert_eq!(
+    ///     point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(),
+    ///     [std::f64::consts::PI, 0.0]
+    /// );
     /// ```
     pub fn phases(&self) -> Vec<f64> {
         let leading =
@@ -129,7 +139,8 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 /// use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// // friction affects only the mode in which the blades move in antiphase
-/// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
+/// let request =
+///     ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
 /// let mode = nonlinear_mode(&system, request).unwrap();
 /// assert!(mode.ended.is_none());
 /// let stuck = ((105_103.0 + 2.0 * 1e4) / 0.182f64).sqrt();

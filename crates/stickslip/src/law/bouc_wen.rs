@@ -53,7 +53,8 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{BoucWen, Law};
 /// let law = BoucWen { stiffness: 1e4, beta: 3e3, gamma: 2e3, exponent: 1.0 };
 /// assert_eq!(law.force_scale(), 2.0); // stiffness / (beta + gamma)
-/// assert!(BoucWen { gamma: -4e3, ..law }.check_consistency().is_err()); // the force would be unbounded
+/// // the force would be unbounded
+/// assert!(BoucWen { gamma: -4e3, ..law }.check_consistency().is_err());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWen {

@@ -30,7 +30,8 @@ pub const ROTATIONS: [&str; 3] = ["rx", "ry", "rz"];
 /// let (mass, length, stiffness) = (3.0, 0.8, 1e4);
 /// let bar = Body::in_plane("bar", mass, mass * length * length / 12.0, ["x", "z"]);
 /// let end = |name: &str, x: f64| bar.point(name, [x, 0.0, 0.0]);
-/// let spring = |end: &str| Spring { between: [end.into(), GROUND.into()], stiffness, damping: 0.0 };
+/// let spring =
+///     |end: &str| Spring { between: [end.into(), GROUND.into()], stiffness, damping: 0.0 };
 /// let model = Model {
 ///     places: vec![end("left", -length / 2.0), end("right", length / 2.0)],
 ///     springs: vec![spring("left.z"), spring("right.z"), spring("bar.x")],
@@ -38,7 +39,12 @@ pub const ROTATIONS: [&str; 3] = ["rx", "ry", "rz"];
 ///     ..Model::default()
 /// };
 /// let survey = model.survey().unwrap();
-/// let found: Vec<f64> = survey.free().elastic.iter().map(|mode| mode.omega * mode.omega * mass / stiffness).collect();
+/// let found: Vec<f64> = survey
+///     .free()
+///     .elastic
+///     .iter()
+///     .map(|mode| mode.omega * mode.omega * mass / stiffness)
+///     .collect();
 /// assert!(found.iter().zip([1.0, 2.0, 6.0]).all(|(a, b)| (a - b).abs() < 1e-12 * b), "{found:?}");
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]

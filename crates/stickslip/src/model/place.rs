@@ -27,7 +27,9 @@ pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
 /// // the contact plane is inclined by 30 degrees about x
 /// let (sin, cos) = (0.5, 0.75f64.sqrt());
 /// let frame = Frame::new([0.0, -sin, cos], Some([1.0, 0.0, 0.0])).unwrap();
-/// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).in_frame(frame);
+/// let node =
+///     Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec())
+///         .in_frame(frame);
 /// let normal = &node.displacements(&node.rows)[2];
 /// assert_eq!(normal.len(), 2);
 /// assert!((normal[0].1 + sin).abs() < 1e-15 && (normal[1].1 - cos).abs() < 1e-15);
@@ -81,7 +83,12 @@ impl Place {
     /// use stickslip::{Mass, Model};
     /// let (sin, cos) = (0.5, 0.75f64.sqrt());
     /// let node = Mass { directions: vec!["x".into(), "z".into()], ..Mass::new("block", 2.0) };
-    /// let face = Place::node("face", &["t", "n"], vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]]).as_view_of("block");
+    /// let face = Place::node(
+    ///     "face",
+    ///     &["t", "n"],
+    ///     vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]],
+    /// )
+    /// .as_view_of("block");
     /// let model = Model { masses: vec![node], places: vec![face], ..Model::default() };
     /// assert_eq!(model.assemble().unwrap().places(), ["block.x", "block.z", "face.t", "face.n"]);
     /// ```

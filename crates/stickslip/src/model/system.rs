@@ -26,7 +26,13 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// use stickslip::structure::Structure;
 /// let places = vec!["a".to_owned(), "b".to_owned()];
 /// let damping = dmatrix![0.1, 0.0; 0.0, 0.1];
-/// let structure = Structure::new(places, dmatrix![1.0, 0.4; 0.4, 1.0], damping, dmatrix![2.0, -1.0; -1.0, 2.0]).unwrap();
+/// let structure = Structure::new(
+///     places,
+///     dmatrix![1.0, 0.4; 0.4, 1.0],
+///     damping,
+///     dmatrix![2.0, -1.0; -1.0, 2.0],
+/// )
+/// .unwrap();
 /// let system = System::builder(structure)
 ///     .joint("rub", Arc::new(Coulomb { limit: 0.2 }), vec![Axis::new(vec![(0, 1.0)])])
 ///     .force(0, 1, Complex64::new(1.0, 0.0))

@@ -126,26 +126,46 @@ impl Orbit {
     /// use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
     /// use stickslip::structure::Structure;
     ///
-    /// struct Harmonic { x: Complex64, omega: f64 }
+    /// struct Harmonic {
+    ///     x: Complex64,
+    ///     omega: f64,
+    /// }
     ///
     /// impl Path for Harmonic {
     ///     fn sample(&self, time: f64) -> Sample {
-    ///         let (x, s) = (self.x * Complex64::cis(self.omega * time), Complex64::new(0.0, self.omega));
-    ///         let [displacement, velocity, acceleration] = [x, s * x, s * s * x].map(|z| vec![z.re]);
-    ///         Sample { displacement, velocity, acceleration, joints: Vec::new(), imposed: Vec::new() }
+    ///         let (x, s) =
+    ///             (self.x * Complex64::cis(self.omega * time), Complex64::new(0.0, self.omega));
+    ///         let [displacement, velocity, acceleration] =
+    ///             [x, s * x, s * s * x].map(|z| vec![z.re]);
+    ///         Sample {
+    ///             displacement,
+    ///             velocity,
+    ///             acceleration,
+    ///             joints: Vec::new(),
+    ///             imposed: Vec::new(),
+    ///         }
     ///     }
     ///     fn transition_times(&self) -> Vec<f64> {
     ///         Vec::new()
     ///     }
     /// }
     ///
-    /// let structure = Structure::new(vec!["m".into()], dmatrix![1.0], dmatrix![0.1], dmatrix![4.0]).unwrap();
-    /// let system = System::builder(structure).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap();
+    /// let structure =
+    ///     Structure::new(vec!["m".into()], dmatrix![1.0], dmatrix![0.1], dmatrix![4.0]).unwrap();
+    /// let system =
+    ///     System::builder(structure).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap();
     /// let omega = 1.5;
     /// let x = 1.0 / Complex64::new(4.0 - omega * omega, 0.1 * omega);
     /// let found = |x: Complex64| OrbitData {
-    ///     method: "by hand", omega, periods: 1, symmetry: Symmetry::HalfPeriod,
-    ///     initial_state: vec![x.re, -omega * x.im], residual: 0.0, iterations: 1, error_estimate: None, accuracy: Accuracy::Converged,
+    ///     method: "by hand",
+    ///     omega,
+    ///     periods: 1,
+    ///     symmetry: Symmetry::HalfPeriod,
+    ///     initial_state: vec![x.re, -omega * x.im],
+    ///     residual: 0.0,
+    ///     iterations: 1,
+    ///     error_estimate: None,
+    ///     accuracy: Accuracy::Converged,
     /// };
     /// let orbit = Orbit::new(&system, Arc::new(Harmonic { x, omega }), found(x)).unwrap();
     /// assert!((orbit.places[0].amplitude() - x.norm()).abs() < 1e-9);

@@ -29,7 +29,11 @@ use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, mult
 /// use stickslip_numerics::sparse::SparseMatrix;
 /// let n = 400;
 /// let stiffness = (0..n).flat_map(|i| {
-///     let linked = if i > 0 { vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)] } else { vec![] };
+///     let linked = if i > 0 {
+///         vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)]
+///     } else {
+///         vec![]
+///     };
 ///     linked.into_iter().chain([(i, i, 1e6)])
 /// });
 /// let stiffness = SparseMatrix::from_triplets(n, stiffness)?;
@@ -267,7 +271,8 @@ impl Component {
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let diagonal = |value: f64| SparseMatrix::from_triplets(2, [(0, 0, value), (1, 1, value)]);
     /// let turning = SparseMatrix::from_triplets(2, [(0, 1, 6.0), (1, 0, -6.0)])?;
-    /// let shaft = Component::new(vec![String::new(); 2], diagonal(1.0)?, Some(turning), diagonal(16.0)?)?;
+    /// let shaft =
+    ///     Component::new(vec![String::new(); 2], diagonal(1.0)?, Some(turning), diagonal(16.0)?)?;
     /// let found = shaft.free_vibration(2)?.unwrap();
     /// assert!((found[0] - 2.0).abs() < 1e-12 && (found[1] - 8.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -294,8 +299,15 @@ impl Component {
     /// ```
     /// use stickslip::structure::Component;
     /// use stickslip_numerics::sparse::SparseMatrix;
-    /// let diagonal = |values: [f64; 3]| SparseMatrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)));
-    /// let three = Component::new(vec![String::new(); 3], diagonal([1.0; 3])?, None, diagonal([1.0, 4.0, 9.0])?)?;
+    /// let diagonal = |values: [f64; 3]| {
+    ///     SparseMatrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)))
+    /// };
+    /// let three = Component::new(
+    ///     vec![String::new(); 3],
+    ///     diagonal([1.0; 3])?,
+    ///     None,
+    ///     diagonal([1.0, 4.0, 9.0])?,
+    /// )?;
     /// assert_eq!(three.modes_below(2.5), Some(2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -333,7 +345,20 @@ impl Component {
     /// ```
     /// use stickslip::structure::{Component, Reduction, ReductionKind};
     /// use stickslip_numerics::sparse::SparseMatrix;
-    /// let rod = |k: f64| SparseMatrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
+    /// let rod = |k: f64| {
+    ///     SparseMatrix::from_triplets(
+    ///         3,
+    ///         [
+    ///             (0, 0, 2.0 * k),
+    ///             (0, 1, -k),
+    ///             (1, 0, -k),
+    ///             (1, 1, 2.0 * k),
+    ///             (1, 2, -k),
+    ///             (2, 1, -k),
+    ///             (2, 2, k),
+    ///         ],
+    ///     )
+    /// };
     /// let mass = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
     /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 };

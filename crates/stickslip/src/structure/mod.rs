@@ -150,7 +150,9 @@ impl Structure {
     /// use nalgebra::dmatrix;
     /// use stickslip::structure::Structure;
     /// let (m, k) = (dmatrix![1.0, 0.4; 0.4, 1.0], dmatrix![2.0, -1.0; -1.0, 2.0]);
-    /// let structure = Structure::new(vec!["a".into(), "b".into()], m, dmatrix![0.1, 0.0; 0.0, 0.1], k).unwrap();
+    /// let structure =
+    ///     Structure::new(vec!["a".into(), "b".into()], m, dmatrix![0.1, 0.0; 0.0, 0.1], k)
+    ///         .unwrap();
     /// assert_eq!(structure.dofs(), 2);
     /// ```
     pub fn new(
@@ -195,8 +197,10 @@ impl Structure {
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let n = 50_000;
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
-    /// let diagonal = |value: f64| SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
-    /// let springs = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
+    /// let diagonal =
+    ///     |value: f64| SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
+    /// let springs = (1..n)
+    ///     .flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
     /// let stiffness = SparseMatrix::from_triplets(n, springs.chain([(0, 0, 1.0)])).unwrap();
     /// let chain = Structure::sparse(places, diagonal(1.0), diagonal(0.1), stiffness).unwrap();
     /// // pulled at its end, each of the springs carries the force

@@ -148,15 +148,19 @@ impl RingSector {
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let (n, d) = (12, 5);
     /// let entries = |own: f64, beside: f64| {
-    ///     let all = (0..n).flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
+    ///     let all = (0..n)
+    ///         .flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
     ///     SparseMatrix::from_triplets(n, all).unwrap()
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
-    /// let ring = Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5)).unwrap();
+    /// let ring =
+    ///     Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5))
+    ///         .unwrap();
     /// let wave = RingSector::from_ring(&ring, n).unwrap().wave(d).unwrap();
     /// let mut x = vec![Complex64::new(1.0, 0.0)];
     /// wave.dynamic_stiffness(Complex64::ZERO, 0.0).unwrap().solve(&mut x);
-    /// let stiffness = 2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
+    /// let stiffness =
+    ///     2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
     /// assert!((x[0] - 1.0 / stiffness).norm() < 1e-14);
     /// ```
     pub fn wave(&self, diameter: usize) -> Result<Wave, StructureError> {

@@ -69,13 +69,21 @@ pub enum FacesError {
 /// A quarter of a disk: nodes 1 and 2 are its low side, 3 and 4 its high side.
 /// ```
 /// use stickslip::structure::{CoordinateAxis, SectorFaces};
-/// let nodes = [("1", [1.0, 0.0]), ("2", [2.0, 0.0]), ("3", [0.0, 1.0]), ("4", [0.0, 2.0]), ("5", [1.0, 1.0])];
+/// let nodes = [
+///     ("1", [1.0, 0.0]),
+///     ("2", [2.0, 0.0]),
+///     ("3", [0.0, 1.0]),
+///     ("4", [0.0, 2.0]),
+///     ("5", [1.0, 1.0]),
+/// ];
 /// let nodes = nodes.map(|(name, [x, y])| (name.to_owned(), [x, y, 0.0]));
 /// let faces = SectorFaces::new(&nodes, CoordinateAxis::Z, 4);
 /// let pairs = faces.pairs().unwrap();
 /// assert_eq!(pairs, [("1".into(), "3".into()), ("2".into(), "4".into())]);
 /// assert!(faces.check(&pairs).is_ok());
-/// assert!(faces.check(&[("3".into(), "1".into())]).unwrap_err().to_string().contains("exchanged"));
+/// assert!(
+///     faces.check(&[("3".into(), "1".into())]).unwrap_err().to_string().contains("exchanged")
+/// );
 /// ```
 #[derive(Debug, Clone)]
 pub struct SectorFaces<'a> {

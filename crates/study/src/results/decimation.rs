@@ -19,11 +19,16 @@ pub const MAX_ROWS: usize = 500_000;
 ///
 /// # Example
 /// ```
-/// use stickslip_study::{read_study, run::{Context, check}, decimation::Decimation};
+/// use stickslip_study::{
+///     decimation::Decimation,
+///     read_study,
+///     run::{Context, check},
+/// };
 /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
 /// let block = check(&study).unwrap().block(0..4, &Context::without_progress(1)).unwrap();
-/// let rows: Vec<_> = block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
+/// let rows: Vec<_> =
+///     block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
 /// let mut decimation = Decimation::new(&study, &rows);
 /// block.tables.iter().cloned().for_each(|table| decimation.add(table));
 /// assert!(decimation.keeps_all());

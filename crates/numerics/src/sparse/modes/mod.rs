@@ -123,11 +123,17 @@ impl NaturalModes {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
+    /// use stickslip_numerics::sparse::{
+    ///     ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis,
+    /// };
     /// // two equal masses connected by two parallel springs, without support: 0 and 4
-    /// let k = SparseMatrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
+    /// let k =
+    ///     SparseMatrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)])
+    ///         .unwrap();
     /// let m = SparseMatrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
-    /// let modes = NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2)).unwrap();
+    /// let modes =
+    ///     NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2))
+    ///         .unwrap();
     /// assert!(modes.values[0].abs() < 1e-12 && (modes.values[1] - 4.0).abs() < 1e-12);
     /// ```
     pub fn new(

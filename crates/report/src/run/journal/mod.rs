@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! STICKJ01                                            eight bytes
-//! length u32 | check u32 | payload                    a frame, little endian; the check is CRC-32 of length and payload
+//! length u32 | check u32 | payload                    a frame, little endian; the check is the
+//!                                                     CRC-32 of length and payload
 //!   payload: 0, JSON of the header                    description of the run: the first frame
 //!   payload: 1, units, time, JSON of the tally, tables   a block, in the order of the units
 //!   payload: 2                                        end of a complete run: the last frame

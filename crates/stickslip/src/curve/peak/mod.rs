@@ -33,7 +33,8 @@ use rayon::prelude::*;
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
 /// let omegas = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i)));
-/// let points: Vec<CurvePoint> = omegas.map(|w| CurvePoint::new(&solver.orbit(w, None).unwrap(), &amplitude)).collect();
+/// let points: Vec<CurvePoint> =
+///     omegas.map(|w| CurvePoint::new(&solver.orbit(w, None).unwrap(), &amplitude)).collect();
 /// let peak = highest_peak(&mut *solver, &points, 1, &amplitude).unwrap();
 /// assert!((peak.value - 0.032_338).abs() < 1e-6);
 /// ```

@@ -200,7 +200,11 @@ impl Model {
     /// ```
     /// use stickslip::model::Disk;
     /// use stickslip::{GROUND, Mass, Model, Spring};
-    /// let spring = |other: &str, stiffness| Spring { between: ["b".into(), other.into()], stiffness, damping: 0.0 };
+    /// let spring = |other: &str, stiffness| Spring {
+    ///     between: ["b".into(), other.into()],
+    ///     stiffness,
+    ///     damping: 0.0,
+    /// };
     /// let sector = Model {
     ///     masses: vec![Mass::new("b", 1.0)],
     ///     springs: vec![spring(GROUND, 1.0), spring("next.b", 0.2)],

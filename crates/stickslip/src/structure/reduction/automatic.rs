@@ -30,13 +30,22 @@ fn orders(whole: &FullStructure) -> usize {
 /// // a rod of 400 masses, held at one end and seen at the other
 /// let n = 400;
 /// let stiffness = (0..n).flat_map(|i| {
-///     let linked = if i > 0 { vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)] } else { vec![] };
+///     let linked = if i > 0 {
+///         vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)]
+///     } else {
+///         vec![]
+///     };
 ///     linked.into_iter().chain([(i, i, 1e6)])
 /// });
 /// let stiffness = SparseMatrix::from_triplets(n, stiffness)?;
 /// let mass = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
 /// let up_to = TAU * 100.0;
-/// let whole = FullStructure::new(mass, StructureDamping::Ratio { ratio: 0.005, up_to }, stiffness, vec![vec![(n - 1, 1.0)]])?;
+/// let whole = FullStructure::new(
+///     mass,
+///     StructureDamping::Ratio { ratio: 0.005, up_to },
+///     stiffness,
+///     vec![vec![(n - 1, 1.0)]],
+/// )?;
 /// let chosen = AutomaticReduction { up_to, tolerance: 1e-4, kind: None }.apply(&whole)?;
 /// assert!(chosen.reduced.dofs() < 12 && chosen.deviation.error < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
