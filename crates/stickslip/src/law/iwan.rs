@@ -31,9 +31,6 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// Largest number of sliders.
-const MAX_ELEMENTS: u32 = 1000;
-
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "iwan",
@@ -56,7 +53,7 @@ pub(super) static INFO: LawInfo = LawInfo {
         Parameter::new(
             "elements",
             Dimension::NONE,
-            Range::UpTo(MAX_ELEMENTS),
+            Range::UpTo(1000),
             "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
         )
         .with_default(0.0),

@@ -163,10 +163,11 @@ fn is_unreduced(component: &Component) -> bool {
     // model lacks modes that harmonics of friction meet: a chain of 80 masses with a stiff
     // slider was wrong by 3 to 8 %. All rows are kept only if all laws are exact. Methods that
     // integrate in time pay for every fast mode: 60 rows with `bouc-wen` took 4.3 s instead of
-    // 0.07 s. Seconds per point, for chains of 60, 80, 100, 150 and 200 rows: - reduced,
-    // event-driven: 0.015; with ten joints 0.03 and up to 0.25; - all rows, event-driven: 0.19,
-    // 0.26, 0.26, 3.2, 4.2 with one joint; 0.02, 0.05, 0.1, 12 and more with ten; - all rows,
-    // `auto`: 0.02 to 0.1.
+    // 0.07 s. Seconds per point, for chains of 60, 80, 100, 150 and 200 rows:
+    // - reduced, event-driven: 0.015; with ten joints 0.03 and up to 0.25;
+    // - all rows, event-driven: 0.19, 0.26, 0.26, 3.2, 4.2 with one joint; 0.02, 0.05, 0.1, 12
+    //   and more with ten;
+    // - all rows, `auto`: 0.02 to 0.1.
     component.dofs() <= 100 && component.has_definite_mass()
 }
 

@@ -3,8 +3,6 @@
 use crate::results::dataset::{Axis, Panel, Series, Style};
 use crate::results::weibull::WeibullMaxima;
 
-/// Smallest number of values for a histogram.
-pub(crate) const MIN_VALUES: usize = 20;
 /// Smallest and largest number of bars.
 const BAR_LIMITS: (f64, f64) = (6.0, 60.0);
 /// Percentiles used in design.
@@ -19,7 +17,8 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let [low, .., high] = sorted[..] else { return None };
-    if sorted.len() < MIN_VALUES {
+    // Fewer values do not show a distribution.
+    if sorted.len() < 20 {
         return None;
     }
     let width = freedman_diaconis_width(&sorted);

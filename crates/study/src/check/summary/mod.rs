@@ -143,11 +143,11 @@ impl ModelSummary {
     pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
         let mut cases = vec![SurveyedCase::new(study, 0)?];
         let last = study.cases().saturating_sub(1);
-        // Number of cases that are checked for warnings, evenly spread over all cases. A warning
-        // about the model is true for all of them.
+        // Nine cases are checked for warnings, evenly spread over all cases. A warning about the
+        // model is true for all of them.
         // Degrees of freedom above which only the first case is checked, so that a summary takes
         // at most a second.
-        let others = if cases[0].survey.dofs() > 60 { 0 } else { last.min(9 - 1) };
+        let others = if cases[0].survey.dofs() > 60 { 0 } else { last.min(8) };
         for i in 1..=others {
             cases.push(SurveyedCase::new(study, last * i / others)?);
         }
