@@ -1,7 +1,7 @@
 """The block of steel of `cargo bench --bench reduction` with SciPy: SuperLU and ARPACK.
 
 Reads JSON from standard input, `{"elements": [50, 20, 18], "modes": 20, "held": true}`, and writes one line of JSON: degrees of freedom, seconds of one
-processor for the factor and for the modes with it, memory (MB), and the eigenvalues (rad²/s²) that `crates/stickslip/tests/reduction` holds modes against.
+processor for the factor and for the modes with it, memory (MB), and the eigenvalues (rad²/s²) that `crates/stickslip/tests/it/reduction` holds modes against.
 """
 
 import json

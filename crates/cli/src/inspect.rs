@@ -41,8 +41,6 @@ const WORDS: [(&str, Role); 3] = [("sti", Role::Stiffness), ("mas", Role::Mass),
 /// First letters of short names that state the role of a matrix: `K`, `KAAX`, `Mff`.
 const LETTERS: [(char, Role); 4] =
     [('k', Role::Stiffness), ('m', Role::Mass), ('c', Role::Damping), ('d', Role::Damping)];
-/// Maximum length of such a short name.
-const SHORT: usize = 4;
 
 impl Role {
     /// Returns the role that the name of a matrix states, or that of its file if the matrix has
@@ -55,7 +53,8 @@ impl Role {
         };
         let words = || all.split(|letter: char| !letter.is_alphabetic());
         let said = WORDS.iter().find(|(word, _)| words().any(|of| of.starts_with(word)));
-        let letter = short.chars().next().filter(|_| short.chars().count() <= SHORT);
+        // Maximum length of such a short name.
+        let letter = short.chars().next().filter(|_| short.chars().count() <= 4);
         let begun = || LETTERS.iter().find(|(begins, _)| Some(*begins) == letter).map(|(_, role)| *role);
         said.map(|(_, role)| *role).or_else(begun)
     }
@@ -159,8 +158,10 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
         }
         if matrix.rows() == matrix.columns() && matrix.rows() > 1 {
             let out = constrained_rows(&[&matrix], matrix.rows());
+            // Symmetry tolerance relative to the largest entry, for matrices written with ten
+            // digits.
             if let Some(sparse) = converted(&matrix, &out)
-                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(SYMMETRIC * sparse.max_abs()).is_none())
+                .filter(|sparse| sparse.n() > 0 && sparse.asymmetry(1e-9 * sparse.max_abs()).is_none())
             {
                 let exception = if out.is_empty() { "" } else { ", except for rows without an entry or with 1e36" };
                 let _ = writeln!(text, "  {}{exception}", definite(&sparse));
@@ -176,9 +177,6 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
     text.push('\n');
     Ok((found, whole))
 }
-
-/// Symmetry tolerance relative to the largest entry, for matrices written with ten digits.
-const SYMMETRIC: f64 = 1e-9;
 
 /// Returns a square matrix without some of its rows and columns.
 fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::SparseMatrix> {

@@ -432,9 +432,6 @@ pub(crate) fn report(assembled: &Assembled, known: &[String], display: Display) 
     }
 }
 
-/// Number of failed points named on standard error; the record names all.
-const NAMED_FAILURES: usize = 10;
-
 /// Prints one line of JSON on standard output. A closed pipe (`| head`) is not an error.
 fn print_json(dataset: &Dataset) -> Exit {
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
@@ -446,8 +443,10 @@ fn print_json(dataset: &Dataset) -> Exit {
 
 /// Prints the failed points and those of lower accuracy than requested on standard error.
 fn complain(dataset: &Dataset) {
+    // Number of failed points named on standard error; the record names all.
+    let named_failures = 10;
     let failures = dataset.failures_by_reason();
-    for failure in failures.iter().take(NAMED_FAILURES) {
+    for failure in failures.iter().take(named_failures) {
         complain!("{}: {failure}", dataset.name);
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
@@ -458,8 +457,8 @@ fn complain(dataset: &Dataset) {
             );
         }
     }
-    if failures.len() > NAMED_FAILURES {
-        complain!("{}: and {} more failed points, see record.json", dataset.name, failures.len() - NAMED_FAILURES);
+    if failures.len() > named_failures {
+        complain!("{}: and {} more failed points, see record.json", dataset.name, failures.len() - named_failures);
     }
 }
 

@@ -35,16 +35,13 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Maximum number of comment lines before the first keyword.
-const COMMENTS: usize = 1000;
-
 /// Maximum number of rows of an element. A larger matrix would take terabytes.
 const ROWS: usize = 1 << 20;
 
 fn sniff(bytes: &[u8]) -> bool {
-    let keyword = Lines::new(bytes)
-        .take(COMMENTS)
-        .find(|line| !line.text.starts_with(b"**") && !line.text.trim_ascii().is_empty());
+    // Maximum number of comment lines before the first keyword.
+    let keyword =
+        Lines::new(bytes).take(1000).find(|line| !line.text.starts_with(b"**") && !line.text.trim_ascii().is_empty());
     keyword.is_some_and(|line| is_keyword(&line, "*USERELEMENT"))
 }
 

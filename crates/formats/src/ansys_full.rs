@@ -24,30 +24,27 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Words of the standard header, and its item for the kind of file: 4 for `.full`.
-const STANDARD: u32 = 100;
-const FULL: u32 = 4;
-
 /// First word of the header of the matrices.
 const HEADER: usize = 103;
 
 /// Flags of a record.
 const INTEGERS: u32 = 1 << 31;
 const SHORT: u32 = 1 << 30;
-const PACKED: u32 = 0x3f << 24;
 
-/// Items of the header of the matrices, counted from zero.
-mod item {
-    pub const ORIGIN: usize = 0;
-    pub const EQUATIONS: usize = 1;
-    pub const LUMPED: usize = 10;
-    pub const UNSYMMETRIC: usize = 13;
-    pub const STIFFNESS: usize = 18;
-    pub const CONSTRAINTS: usize = 20;
-    pub const MASS: usize = 26;
-    pub const DAMPING: usize = 28;
-    pub const DOFS: usize = 35;
-    pub const COUNT: usize = 37;
+/// Items of the header of the matrices by their positions, counted from zero.
+#[derive(Debug, Clone, Copy)]
+enum HeaderItem {
+    Origin = 0,
+    Equations = 1,
+    Lumped = 10,
+    Unsymmetric = 13,
+    Stiffness = 18,
+    Constraints = 20,
+    Mass = 26,
+    Damping = 28,
+    Dofs = 35,
+    /// The number of items.
+    Count = 37,
 }
 
 /// Returns the byte order, if the file has a standard header of a full file.
@@ -55,7 +52,8 @@ fn order(bytes: &[u8]) -> Option<ByteOrder> {
     [ByteOrder::Little, ByteOrder::Big].into_iter().find(|&order| {
         let mut words = ByteCursor::new(bytes, order);
         let mut word = || words.u32().ok();
-        (word(), word().is_some(), word()) == (Some(STANDARD), true, Some(FULL))
+        // Words of the standard header, and its item for the kind of file: 4 for `.full`.
+        (word(), word().is_some(), word()) == (Some(100), true, Some(4))
     })
 }
 
@@ -69,7 +67,7 @@ fn record<'a>(file: &mut ByteCursor<'a>) -> Result<(u32, ByteCursor<'a>), Error>
     let location = file.clone();
     let words = file.u32()? as usize;
     let flags = file.u32()?;
-    if flags & PACKED != 0 {
+    if flags & (0x3f << 24) != 0 {
         let problem = format!("the record is compressed (flags {flags:#x}), which is not supported");
         let remedy = "switch off compression with /FCOMP before the solution, or export with HBMAT";
         return Err(Error::new(ErrorKind::Unsupported, location.location(), problem, remedy));
@@ -122,31 +120,31 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let mut file = ByteCursor::new(bytes, order);
     seek(&mut file, HEADER)?;
     let header = integers(&mut file)?;
-    if header.len() < item::COUNT {
-        return Err(file.malformed(&format!("a header of at least {} items", item::COUNT), header.len()));
+    if header.len() < HeaderItem::Count as usize {
+        return Err(file.malformed(&format!("a header of at least {} items", HeaderItem::Count as usize), header.len()));
     }
     let refuse = |problem: &str| {
         Err(Error::new(ErrorKind::Unsupported, file.location(), problem.into(), "export with HBMAT instead"))
     };
-    if header[item::ORIGIN] > 0 {
+    if header[HeaderItem::Origin as usize] > 0 {
         return refuse("the file comes from the frontal solver, which is not supported");
     }
-    if header[item::UNSYMMETRIC] != 0 {
+    if header[HeaderItem::Unsymmetric as usize] != 0 {
         return refuse("the matrices are unsymmetric, which is not supported");
     }
-    if header[item::CONSTRAINTS] != 0 {
+    if header[HeaderItem::Constraints as usize] != 0 {
         return refuse("the file has constraint equations that are not applied to its matrices");
     }
     let long = |at: usize| {
         let value = (header[at] as u32 as u64) | ((header[at + 1] as u32 as u64) << 32);
         usize::try_from(value).ok().filter(|&value| value > 0)
     };
-    let equations =
-        usize::try_from(header[item::EQUATIONS]).map_err(|_| file.malformed("a number of equations", "less than 0"))?;
+    let equations = usize::try_from(header[HeaderItem::Equations as usize])
+        .map_err(|_| file.malformed("a number of equations", "less than 0"))?;
     let labels = integers(&mut file)?;
     let nodes = integers(&mut file)?;
     let (mut constrained, mut names) = (Vec::new(), None);
-    if let Some(at) = long(item::DOFS) {
+    if let Some(at) = long(HeaderItem::Dofs as usize) {
         seek(&mut file, at)?;
         let counts = integers(&mut file)?;
         let dofs = integers(&mut file)?;
@@ -157,8 +155,13 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         names = names_of(&labels, &nodes, &counts, &dofs);
     }
     let left = equations - constrained.len();
-    let system = Rc::new(System { file, equations, constrained, names, lumped: header[item::LUMPED] != 0 });
-    let kinds = [("stiffness", item::STIFFNESS), ("mass", item::MASS), ("damping", item::DAMPING)];
+    let system =
+        Rc::new(System { file, equations, constrained, names, lumped: header[HeaderItem::Lumped as usize] != 0 });
+    let kinds = [
+        ("stiffness", HeaderItem::Stiffness as usize),
+        ("mass", HeaderItem::Mass as usize),
+        ("damping", HeaderItem::Damping as usize),
+    ];
     let items = kinds.into_iter().filter_map(|(name, at)| {
         let (start, system) = (long(at)?, system.clone());
         Some(Item::new(name, left, left, move || read(&system, name, start)))
@@ -269,16 +272,16 @@ mod tests {
         file.integers(&[1, 6]);
         file.integers(&[7, 5]);
         let mut header = [0; 100];
-        (header[item::ORIGIN], header[item::EQUATIONS]) = (-4, 4);
-        header[item::STIFFNESS] = file.integers(&[1]);
+        (header[HeaderItem::Origin as usize], header[HeaderItem::Equations as usize]) = (-4, 4);
+        header[HeaderItem::Stiffness as usize] = file.integers(&[1]);
         file.reals(&[1.0]);
         for (columns, values) in [(&[3, 2][..], &[-5.0, 9.0][..]), (&[4, 3], &[0.5, 8.0]), (&[4], &[7.0])] {
             file.integers(columns);
             file.reals(values);
         }
-        header[item::MASS] = file.reals(&[1.0, 2.0, 3.0, 4.0]);
-        header[item::LUMPED] = 1;
-        header[item::DOFS] = file.integers(&[2, 2]);
+        header[HeaderItem::Mass as usize] = file.reals(&[1.0, 2.0, 3.0, 4.0]);
+        header[HeaderItem::Lumped as usize] = 1;
+        header[HeaderItem::Dofs as usize] = file.integers(&[2, 2]);
         // Given by position and by number.
         file.integers(&[-1, 2, 1, 6]);
         change(&mut header);
@@ -308,12 +311,12 @@ mod tests {
             let found = read_bytes(&file(change), None, Some("stiffness")).map(|_| ());
             assert_eq!(found.map_err(|e| e.kind), Err(kind));
         };
-        check(|header| header[item::ORIGIN] = 4, ErrorKind::Unsupported);
-        check(|header| header[item::UNSYMMETRIC] = 1, ErrorKind::Unsupported);
-        check(|header| header[item::CONSTRAINTS] = 1, ErrorKind::Unsupported);
-        check(|header| header[item::STIFFNESS + 1] = 1, ErrorKind::Truncated);
-        check(|header| header[item::EQUATIONS] = 5, ErrorKind::Malformed);
-        check(|header| header[item::EQUATIONS] = -5, ErrorKind::Malformed);
+        check(|header| header[HeaderItem::Origin as usize] = 4, ErrorKind::Unsupported);
+        check(|header| header[HeaderItem::Unsymmetric as usize] = 1, ErrorKind::Unsupported);
+        check(|header| header[HeaderItem::Constraints as usize] = 1, ErrorKind::Unsupported);
+        check(|header| header[HeaderItem::Stiffness as usize + 1] = 1, ErrorKind::Truncated);
+        check(|header| header[HeaderItem::Equations as usize] = 5, ErrorKind::Malformed);
+        check(|header| header[HeaderItem::Equations as usize] = -5, ErrorKind::Malformed);
         let mut packed = file(|_| ());
         packed[HEADER * 4 + 7] = 0xa0;
         assert_eq!(read_bytes(&packed, None, None).map_err(|e| e.kind), Err(ErrorKind::Unsupported));

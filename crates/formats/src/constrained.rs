@@ -19,7 +19,8 @@ pub(crate) const CONSTRAINED_DIAGONAL: f64 = 1e36;
 /// let named = |names: &[&str], value| {
 ///     let diagonal = (0..names.len()).map(|row| (row, row, value));
 ///     let names = names.iter().map(|name| name.to_string()).collect();
-///     Matrix::new(diagonal.len(), diagonal.len(), Symmetry::Symmetric, diagonal)?.with_names(names)
+///     Matrix::new(diagonal.len(), diagonal.len(), Symmetry::Symmetric, diagonal)?
+///         .with_names(names)
 /// };
 /// let (stiffness, mass) = (named(&["1.x", "1.y"], 5.0)?, named(&["1.y"], 2.0)?);
 /// let mass = align_rows(mass, &stiffness)?;

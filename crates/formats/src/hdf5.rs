@@ -29,28 +29,13 @@ pub(crate) const FORMAT: Format = Format {
 
 const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Maximum depth of nested groups.
-const DEPTH: usize = 8;
-
-/// Count of numbers that any dataset may have, stored or not, and any chunk.
-/// Chunks of h5py are not larger.
-const MIN_NUMBER_LIMIT: u64 = 1 << 17;
-
-/// Maximum number of bytes that deflate packs into one.
-const DEFLATE: u64 = 1032;
-
-/// Maximum number of listed members of a file.
-const MEMBERS: usize = 10_000;
-
-/// Maximum number of groups visited, because links may form cycles.
-const GROUPS: usize = 1000;
-
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let file = catching_panics(Location::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
     let root = Rc::new(file.root());
     Traversal { limit: DecompressionLimit::for_file(bytes.len()), groups: 0, items: &mut items }
-        .visit_group(&root, "", DEPTH)?;
+        // Maximum depth of nested groups.
+        .visit_group(&root, "", 8)?;
     Ok(items)
 }
 
@@ -81,20 +66,24 @@ struct Traversal<'w, 'a> {
 impl Traversal<'_, '_> {
     /// Adds the contents of a group and of its subgroups.
     fn visit_group(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
+        // Maximum number of listed members of a file.
+        let members = 10_000;
+        // Maximum number of groups visited, because links may form cycles.
+        let groups = 1000;
         self.groups += 1;
         let here = || Location::Variable(path.to_string());
         // MATLAB stores the parts of cells and objects in the groups `#refs#` and `#subsystem#`.
         let own = |name: &String| !name.starts_with('#');
         let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
         for name in catching_panics(here(), || group.datasets())?.into_iter().filter(own) {
-            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
+            if self.items.len() >= members || self.groups >= groups {
                 return Ok(());
             }
             let dataset = catching_panics(Location::Variable(full(&name)), || group.dataset(&name))?;
             self.items.push(dense_item(dataset, full(&name), self.limit)?);
         }
         for name in catching_panics(here(), || group.groups())?.into_iter().filter(own) {
-            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
+            if self.items.len() >= members || self.groups >= groups {
                 return Ok(());
             }
             let location = || Location::Variable(full(&name));
@@ -202,6 +191,9 @@ fn numbers<T>(
     name: &str,
     read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
 ) -> Result<Vec<T>, Error> {
+    // Count of numbers that any dataset may have, stored or not, and any chunk. Chunks of h5py
+    // are not larger.
+    let min_number_limit = 1 << 17;
     let location = Location::Variable(name.to_string());
     // A chunk is decompressed as a whole, even if the dataset ends within it.
     let chunk = catching_panics(location.clone(), || dataset.chunk_shape())?.unwrap_or_default();
@@ -214,12 +206,11 @@ fn numbers<T>(
             .ok()
             .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
     };
-    let room = stored
-        .map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE))
-        .max(MIN_NUMBER_LIMIT)
-        .min(limit.numbers());
+    // Maximum number of bytes that deflate packs into one.
+    let room =
+        stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(1032)).max(min_number_limit).min(limit.numbers());
     let count = product(&shape).filter(|&count| count <= room);
-    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(MIN_NUMBER_LIMIT))) {
+    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(min_number_limit))) {
         return Err(too_large(location));
     }
     catching_panics(location, || read(dataset))

@@ -5,7 +5,8 @@
 //! use stickslip_formats::{Matrix, Symmetry, list, read, write};
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("stiffness.mtx");
-//! let stiffness = Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5), (1, 1, 1e5)])?;
+//! let stiffness =
+//!     Matrix::new(2, 2, Symmetry::Symmetric, [(0, 0, 2e5), (1, 0, -1e5), (1, 1, 1e5)])?;
 //! write(&path, &stiffness)?;
 //!
 //! // The content determines the format; a file with several matrices needs a name.
@@ -227,20 +228,13 @@ fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) ->
     }
 }
 
-/// Number of rows or columns that is always accepted. Larger numbers must
-/// satisfy [`ROWS_PER_BYTE`].
-const MIN_ROW_LIMIT: usize = 1 << 20;
-
-/// Maximum number of rows or columns per byte of a file.
-///
-/// A row with an entry takes a line of text, or about two bytes if it belongs to a compressed
-/// diagonal. Only small files have this many empty rows.
-const ROWS_PER_BYTE: usize = 1;
-
 /// Rejects sizes that a file of this length cannot fill, because users allocate
 /// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
-    let most = MIN_ROW_LIMIT.max(length.saturating_mul(ROWS_PER_BYTE));
+    // As many rows or columns as the file has bytes, and at least 2²⁰. A row with an entry takes
+    // a line of text, or about two bytes if it belongs to a compressed diagonal. Only small
+    // files have more empty rows.
+    let most = length.max(1 << 20);
     if rows.max(columns) <= most {
         return Ok(());
     }

@@ -24,12 +24,6 @@ pub(crate) const FORMAT: Format = Format {
 /// Size of the file header in bytes: a text, an offset, a version and the byte order.
 const HEADER: usize = 128;
 
-/// Number of bytes of a compressed variable that certainly contain its class, size and name.
-const BEGINNING: usize = 4096;
-
-/// Maximum depth of nested structures.
-const DEPTH: usize = 8;
-
 /// Types of elements.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
@@ -104,7 +98,9 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let found = match kind {
             MATRIX => variable(VariableBytes { data: Cow::Borrowed(data), packed: None, order, location }),
             COMPRESSED => {
-                let start = beginning(data, Container::Zlib, BEGINNING);
+                // Number of bytes of a compressed variable that certainly contain its class,
+                // size and name.
+                let start = beginning(data, Container::Zlib, 4096);
                 variable(VariableBytes { data: start.into(), packed: Some((data, limit)), order, location })
             }
             _ => continue,
@@ -189,7 +185,8 @@ fn variable(mut source: VariableBytes) -> Result<Vec<Item>, Error> {
     }
     let head = head(&mut ByteCursor::new(&source.data, source.order)).map_err(|error| error_in(error, &source))?;
     if head.class == STRUCTURE {
-        return structure(&source, &head.name, DEPTH);
+        // Maximum depth of nested structures.
+        return structure(&source, &head.name, 8);
     }
     Ok(vec![item(source, head)])
 }

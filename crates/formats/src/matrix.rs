@@ -234,7 +234,8 @@ impl Matrix {
     /// use stickslip_formats::{Matrix, Symmetry};
     ///
     /// let name = |name: &str| name.to_string();
-    /// let mass = Matrix::new(1, 1, Symmetry::Symmetric, [(0, 0, 3.0)])?.with_names(vec![name("7.x")])?;
+    /// let mass =
+    ///     Matrix::new(1, 1, Symmetry::Symmetric, [(0, 0, 3.0)])?.with_names(vec![name("7.x")])?;
     /// let mass = mass.reordered(&[name("5.x"), name("7.x")])?;
     /// assert_eq!((mass.rows(), mass.get(1, 1)), (2, 3.0));
     /// # Ok::<(), stickslip_formats::Error>(())

@@ -20,10 +20,6 @@ pub(crate) const FORMAT: Format = Format {
 
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Maximum length of a header. A longer one is damaged, because a plain array
-/// has one type and few dimensions.
-const LONGEST_HEADER: usize = 4096;
-
 /// The type of the elements of an array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum ElementType {
@@ -53,6 +49,9 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 
 impl<'a> NpyArray<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        // Maximum length of a header. A longer one is damaged, because a plain array has one
+        // type and few dimensions.
+        let longest_header: usize = 4096;
         let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         if data.take(MAGIC.len())? != MAGIC {
             return Err(data.malformed("the magic of NumPy", "something else"));
@@ -64,8 +63,8 @@ impl<'a> NpyArray<'a> {
             2 | 3 => data.u32()? as usize,
             other => return Err(data.malformed("version 1, 2 or 3", other)),
         };
-        if length > LONGEST_HEADER {
-            return Err(data.malformed(&format!("a header of at most {LONGEST_HEADER} bytes"), length));
+        if length > longest_header {
+            return Err(data.malformed(&format!("a header of at most {longest_header} bytes"), length));
         }
         let at = data.clone();
         let header = data.take(length)?;

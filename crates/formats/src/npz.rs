@@ -21,9 +21,6 @@ pub(crate) const FORMAT: Format = Format {
     open,
 };
 
-/// Number of bytes of a member that certainly contain the header of an array.
-const HEADER: usize = 8192;
-
 /// The supported layouts of SciPy.
 const LAYOUTS: &str = "csc, csr or coo";
 
@@ -150,9 +147,11 @@ impl<'a> Member<'a> {
     }
 
     fn beginning(&self) -> Cow<'a, [u8]> {
+        // Number of bytes of a member that certainly contain the header of an array.
+        let header = 8192;
         match self.deflated {
-            true => Cow::Owned(beginning(self.packed, Container::Bare, HEADER)),
-            false => Cow::Borrowed(&self.packed[..self.packed.len().min(HEADER)]),
+            true => Cow::Owned(beginning(self.packed, Container::Bare, header)),
+            false => Cow::Borrowed(&self.packed[..self.packed.len().min(header)]),
         }
     }
 
@@ -171,12 +170,21 @@ impl<'a> Member<'a> {
     }
 }
 
-/// Signatures of the records of a zip.
-const LOCAL: u32 = 0x0403_4b50;
-const CENTRAL: u32 = 0x0201_4b50;
-const END: u32 = 0x0605_4b50;
-const END_64: u32 = 0x0606_4b50;
-const LOCATOR_64: u32 = 0x0706_4b50;
+/// Records of a zip by their signatures.
+#[derive(Debug, Clone, Copy)]
+enum Record {
+    Local = 0x0403_4b50,
+    Central = 0x0201_4b50,
+    End = 0x0605_4b50,
+    End64 = 0x0606_4b50,
+    Locator64 = 0x0706_4b50,
+}
+
+impl Record {
+    fn signature(self) -> u32 {
+        self as u32
+    }
+}
 
 /// Value of a 32-bit field if the number is in the 64-bit extra field.
 const IN_EXTRA: usize = u32::MAX as usize;
@@ -187,7 +195,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
     zip.seek(directory(bytes)?)?;
     let limit = DecompressionLimit::for_file(bytes.len());
     let mut members = Vec::new();
-    while zip.clone().u32().is_ok_and(|mark| mark == CENTRAL) {
+    while zip.clone().u32().is_ok_and(|mark| mark == Record::Central.signature()) {
         zip.skip(8);
         let flags = zip.u16()?;
         let method = zip.u16()?;
@@ -210,7 +218,7 @@ fn members(bytes: &[u8]) -> Result<Vec<Member<'_>>, Error> {
         }
         let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         data.seek(local)?;
-        if data.u32()? != LOCAL {
+        if data.u32()? != Record::Local.signature() {
             return Err(data.malformed("the header of a member of a zip", "something else"));
         }
         data.skip(22);
@@ -241,7 +249,7 @@ fn sizes_64<const N: usize>(extra: &[u8], mut sizes: [usize; N]) -> Result<[usiz
 fn directory(bytes: &[u8]) -> Result<usize, Error> {
     // The end record has 22 bytes, followed by a comment of at most 65535 bytes.
     let from = bytes.len().saturating_sub(22 + 65535);
-    let mark = END.to_le_bytes();
+    let mark = Record::End.signature().to_le_bytes();
     let end = bytes[from..].windows(4).rposition(|four| four == mark).map(|at| from + at).ok_or_else(|| {
         let problem = "the zip has no central directory at its end".into();
         Error::new(
@@ -258,13 +266,13 @@ fn directory(bytes: &[u8]) -> Result<usize, Error> {
         return Ok(start);
     }
     zip.seek(end.saturating_sub(20))?;
-    if zip.u32()? != LOCATOR_64 {
+    if zip.u32()? != Record::Locator64.signature() {
         return Ok(start);
     }
     zip.skip(4);
     let record = NumberType::U64.index(&mut zip)?;
     zip.seek(record)?;
-    if zip.u32()? != END_64 {
+    if zip.u32()? != Record::End64.signature() {
         return Err(zip.malformed("the 64-bit end record of a zip", "something else"));
     }
     zip.skip(44);
@@ -319,11 +327,11 @@ fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
         common.extend([crc.sum().to_le_bytes(), size, size].concat());
         common.extend([name.len() as u8, 0, 0, 0]);
         let local = small(bytes.len())?;
-        bytes.extend(LOCAL.to_le_bytes());
+        bytes.extend(Record::Local.signature().to_le_bytes());
         bytes.extend(&common);
         bytes.extend(name.as_bytes());
         bytes.extend(contents);
-        directory.extend(CENTRAL.to_le_bytes());
+        directory.extend(Record::Central.signature().to_le_bytes());
         directory.extend([20, 0]);
         directory.extend(&common);
         directory.extend([0; 10]);
@@ -334,7 +342,7 @@ fn zip(parts: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Error> {
     let count = (parts.len() as u16).to_le_bytes();
     let length = small(directory.len())?.to_le_bytes();
     bytes.extend(directory);
-    bytes.extend(END.to_le_bytes());
+    bytes.extend(Record::End.signature().to_le_bytes());
     bytes.extend([0; 4]);
     bytes.extend([count, count].concat());
     bytes.extend([length, start].concat());

@@ -2,9 +2,6 @@
 
 use crate::error::{Error, ErrorKind, Location};
 
-/// Number of characters of a wrong field that a message shows.
-const SHOWN: usize = 40;
-
 /// The lines of a file, counted from one.
 #[derive(Clone)]
 pub(crate) struct Lines<'a> {
@@ -158,7 +155,8 @@ pub(crate) fn truncated(location: Location, what: &str) -> Error {
 /// Returns a field in the notation of a message.
 pub(crate) fn quoted(field: &[u8]) -> String {
     let text = String::from_utf8_lossy(field);
-    let mut short: String = text.chars().take(SHOWN).collect();
+    // Number of characters of a wrong field that a message shows.
+    let mut short: String = text.chars().take(40).collect();
     if short.len() < text.len() {
         short.push('…');
     }

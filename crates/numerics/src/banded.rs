@@ -12,10 +12,6 @@ use std::ops::Range;
 ///
 /// Measured: a ninth of the time with full bands of 255 and 511, a fifth with 96.
 const BLOCKED_FROM: usize = 64;
-/// Columns of a block.
-const BLOCK_COLUMNS: usize = 16;
-/// Runs of nonzero rows or columns are merged across gaps of at most this length.
-const MERGED_GAP: usize = 8;
 
 /// A square matrix with `half_bandwidth` diagonals on either side of the main diagonal.
 ///
@@ -74,7 +70,8 @@ impl BandedMatrix {
 
     /// Returns the number of columns factored at a time.
     fn block(half_bandwidth: usize) -> usize {
-        if half_bandwidth < BLOCKED_FROM { 1 } else { BLOCK_COLUMNS }
+        // Columns of a block.
+        if half_bandwidth < BLOCKED_FROM { 1 } else { 16 }
     }
 
     /// Returns the memory of a matrix of `n` rows, bytes.
@@ -253,7 +250,8 @@ fn runs(count: usize, taken: impl Fn(usize) -> bool, out: &mut Vec<Range<usize>>
     out.clear();
     for i in (0..count).filter(|i| taken(*i)) {
         match out.last_mut() {
-            Some(run) if i - run.end <= MERGED_GAP => run.end = i + 1,
+            // Runs of nonzero rows or columns are merged across gaps of at most this length.
+            Some(run) if i - run.end <= 8 => run.end = i + 1,
             _ => out.push(i..i + 1),
         }
     }

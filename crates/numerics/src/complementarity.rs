@@ -20,14 +20,9 @@ enum BoundState {
     High,
 }
 
-/// Block pivots without a decrease of the number of infeasible components,
-/// after which single pivots take over.
-const BLOCK_PIVOTS_WITHOUT_PROGRESS: usize = 3;
 /// A component is infeasible if it violates its condition by more than this fraction of the
 /// problem's scale. The value is the rounding of a small dense solve.
 const FEASIBILITY_TOLERANCE: f64 = 1e-13;
-/// Singular values of `D` below this fraction of the largest count as zero: redundant contacts.
-const RANK_TOLERANCE: f64 = 1e-12;
 
 /// Solves the problem. Returns `None` if the pivoting cycles, which an indefinite `D` can cause.
 ///
@@ -62,9 +57,12 @@ pub fn solve_into(
 
 /// Solves the problem by block pivoting.
 fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<f64>) -> Option<DVector<f64>> {
+    // Block pivots without a decrease of the number of infeasible components, after which single
+    // pivots take over.
+    let block_pivots_without_progress: usize = 3;
     let n = b.len();
     let mut side = vec![BoundState::Inside; n];
-    let (mut fewest, mut remaining_block_pivots) = (n + 1, BLOCK_PIVOTS_WITHOUT_PROGRESS);
+    let (mut fewest, mut remaining_block_pivots) = (n + 1, block_pivots_without_progress);
     for _ in 0..(100 + 20 * n * n) {
         let mut lambda = solve_inside(d, b, low, high, &side);
         let w = b - d * &lambda;
@@ -84,7 +82,7 @@ fn pivot(d: &DMatrix<f64>, b: &DVector<f64>, low: &DVector<f64>, high: &DVector<
             return Some(lambda);
         }
         if infeasible.len() < fewest {
-            (fewest, remaining_block_pivots) = (infeasible.len(), BLOCK_PIVOTS_WITHOUT_PROGRESS);
+            (fewest, remaining_block_pivots) = (infeasible.len(), block_pivots_without_progress);
         } else {
             remaining_block_pivots = remaining_block_pivots.saturating_sub(1);
         }
@@ -119,6 +117,9 @@ fn solve_inside(
     high: &DVector<f64>,
     side: &[BoundState],
 ) -> DVector<f64> {
+    // Singular values of `D` below this fraction of the largest count as zero: redundant
+    // contacts.
+    let rank_tolerance = 1e-12;
     let n = b.len();
     let mut lambda = DVector::from_fn(n, |i, _| match side[i] {
         BoundState::Inside => 0.0,
@@ -141,12 +142,12 @@ fn solve_inside(
     });
     let weighted_rhs = DVector::from_fn(inside.len(), |i, _| weight(inside[i]) * rhs[inside[i]]);
     let solution = match scaled.clone().cholesky() {
-        Some(factor) if factor.l_dirty().diagonal().iter().all(|p| p * p > RANK_TOLERANCE * scaled.amax()) => {
+        Some(factor) if factor.l_dirty().diagonal().iter().all(|p| p * p > rank_tolerance * scaled.amax()) => {
             factor.solve(&weighted_rhs)
         }
         _ => {
             let least = eigen::svd(scaled)
-                .and_then(|svd| svd.solve(&weighted_rhs, RANK_TOLERANCE * svd.singular_values.amax()).ok());
+                .and_then(|svd| svd.solve(&weighted_rhs, rank_tolerance * svd.singular_values.amax()).ok());
             least.unwrap_or_else(|| DVector::zeros(inside.len()))
         }
     };

@@ -75,18 +75,6 @@ pub enum BranchEnd {
     Stopped,
 }
 
-/// Maximum number of corrector iterations.
-///
-/// At kinks, Newton's method first has to find the right side of each kink. It then takes more
-/// than the usual three iterations without a risk of failure.
-const ITERATIONS: usize = 20;
-/// A step with at most this number of corrector iterations makes the next step
-/// longer. See [`ITERATIONS`].
-const EASY_ITERATIONS: usize = 10;
-/// A step below the largest step size divided by this number calls
-/// [`ParametricEquations::jump_kink`].
-const JUMP_DIVISOR: f64 = 32.0;
-
 /// Follows the branch from `(x, p)`, which solves the equations.
 ///
 /// `visit` receives every point and returns true to continue.
@@ -94,19 +82,39 @@ const JUMP_DIVISOR: f64 = 32.0;
 /// # Example
 /// A circle, past its turning points:
 /// ```
-/// use stickslip_numerics::continuation::{BranchEnd, ContinuationSettings, ParametricEquations, trace};
+/// use stickslip_numerics::continuation::{
+///     BranchEnd, ContinuationSettings, ParametricEquations, trace,
+/// };
 /// struct Circle;
 /// impl ParametricEquations for Circle {
-///     fn size(&self) -> usize { 1 }
-///     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
+///     fn size(&self) -> usize {
+///         1
+///     }
+///     fn evaluate(
+///         &mut self,
+///         x: &[f64],
+///         p: f64,
+///         f: &mut [f64],
+///         by_x: &mut [f64],
+///         by_p: &mut [f64],
+///     ) -> bool {
 ///         (f[0], by_x[0], by_p[0]) = (x[0] * x[0] + p * p - 1.0, 2.0 * x[0], 2.0 * p);
 ///         true
 ///     }
-///     fn tolerance(&self) -> f64 { 1e-12 }
+///     fn tolerance(&self) -> f64 {
+///         1e-12
+///     }
 /// }
-/// let steps = ContinuationSettings { unit: 1.0, points: 200, ..ContinuationSettings::between(-2.0, 2.0, 0.1) };
+/// let steps = ContinuationSettings {
+///     unit: 1.0,
+///     points: 200,
+///     ..ContinuationSettings::between(-2.0, 2.0, 0.1)
+/// };
 /// let mut lowest = 1.0f64;
-/// let end = trace(&mut Circle, &[1.0], 0.0, steps, &mut |_, x, _| { lowest = lowest.min(x[0]); true });
+/// let end = trace(&mut Circle, &[1.0], 0.0, steps, &mut |_, x, _| {
+///     lowest = lowest.min(x[0]);
+///     true
+/// });
 /// assert_eq!(end, BranchEnd::Points);
 /// assert!(lowest < -0.99);
 /// ```
@@ -117,6 +125,9 @@ pub fn trace<E: ParametricEquations>(
     steps: ContinuationSettings,
     visit: &mut dyn FnMut(&mut E, &[f64], f64) -> bool,
 ) -> BranchEnd {
+    // A step below the largest step size divided by this number calls
+    // `ParametricEquations::jump_kink`.
+    let jump_divisor = 32.0;
     let n = equations.size();
     let mut corrector = Corrector::new(n);
     let (mut x, mut p) = (x.to_vec(), p);
@@ -170,9 +181,9 @@ pub fn trace<E: ParametricEquations>(
         };
         let Some(iterations) = accepted else {
             step_size *= 0.5;
-            if step_size < longest / JUMP_DIVISOR {
+            if step_size < longest / jump_divisor {
                 // Let the equations jump over the kink, by a fraction of the largest step size.
-                let q = (p + (4.0 / JUMP_DIVISOR) * steps.largest_step * steps.unit * direction).clamp(low, high);
+                let q = (p + (4.0 / jump_divisor) * steps.largest_step * steps.unit * direction).clamp(low, high);
                 next.copy_from_slice(&x);
                 if q != p && equations.jump_kink(&mut next, q) {
                     let border = q == low || q == high;
@@ -201,7 +212,8 @@ pub fn trace<E: ParametricEquations>(
         if border.is_some() {
             return BranchEnd::Border;
         }
-        if iterations <= EASY_ITERATIONS {
+        // A step with at most this number of corrector iterations makes the next step longer.
+        if iterations <= 10 {
             step_size *= 1.5;
         }
     }
@@ -277,10 +289,14 @@ impl Corrector {
         unit: f64,
         across: Option<(&[f64], &Predicted)>,
     ) -> Option<usize> {
+        // Maximum number of corrector iterations. At kinks, Newton's method first has to find
+        // the right side of each kink. It then takes more than the usual three iterations
+        // without a risk of failure.
+        let most: usize = 20;
         let n = self.n;
         let mut fixed_parameter_row = vec![0.0; n + 1];
         fixed_parameter_row[n] = 1.0;
-        for iteration in 0..=ITERATIONS {
+        for iteration in 0..=most {
             if !equations.evaluate(x, *p, &mut self.f, &mut self.by_x, &mut self.by_p) {
                 return None;
             }
@@ -288,7 +304,7 @@ impl Corrector {
             if size <= equations.tolerance() {
                 return Some(iteration);
             }
-            if !size.is_finite() || iteration == ITERATIONS {
+            if !size.is_finite() || iteration == most {
                 return None;
             }
             self.right[..n].copy_from_slice(&self.f);

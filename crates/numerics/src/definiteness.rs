@@ -98,7 +98,10 @@ fn rank_scaled(matrix: &DMatrix<f64>) -> Option<usize> {
 /// ```
 /// use nalgebra::dmatrix;
 /// use stickslip_numerics::definiteness::is_semidefinite;
-/// assert!(is_semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0]) && !is_semidefinite(&dmatrix![1.0, 2.0; 2.0, 1.0]));
+/// assert!(
+///     is_semidefinite(&dmatrix![2.0, -2.0; -2.0, 2.0])
+///         && !is_semidefinite(&dmatrix![1.0, 2.0; 2.0, 1.0])
+/// );
 /// ```
 pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
     let n = matrix.nrows();
@@ -162,7 +165,12 @@ fn is_positive_definite(matrix: &DMatrix<f64>, shift: f64) -> bool {
 /// # Example
 /// ```
 /// use stickslip_numerics::{definiteness::sparse_definite, sparse::SparseMatrix};
-/// let spring = |ground: f64| SparseMatrix::from_triplets(2, [(0, 0, 2.0 + ground), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]);
+/// let spring = |ground: f64| {
+///     SparseMatrix::from_triplets(
+///         2,
+///         [(0, 0, 2.0 + ground), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)],
+///     )
+/// };
 /// let definite = [1.0, 0.0, -1.0].map(|ground| sparse_definite(&spring(ground).unwrap()));
 /// assert_eq!(definite, [Some(true), Some(false), None]);
 /// ```

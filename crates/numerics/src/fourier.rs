@@ -15,9 +15,10 @@ use std::sync::Arc;
 /// use stickslip_numerics::fourier::FourierPlan;
 /// let mut fourier = FourierPlan::new(16);
 /// let mut samples = vec![0.0; 16];
-/// fourier.synthesize(&[(0, Complex64::new(0.5, 0.0)), (3, Complex64::new(0.0, -2.0))], &mut samples);
+/// fourier
+///     .synthesize(&[(0, Complex64::new(0.5, 0.0)), (3, Complex64::new(0.0, -2.0))], &mut samples);
 /// assert!((samples[1] - (0.5 + 2.0 * (3.0 * std::f64::consts::TAU / 16.0).sin())).abs() < 1e-14);
-/// let sums = fourier.transform(&mut samples);       // Σ u_i e^{-jhθ_i}
+/// let sums = fourier.transform(&mut samples); // Σ u_i e^{-jhθ_i}
 /// assert!((sums[3] * (2.0 / 16.0) - Complex64::new(0.0, -2.0)).norm() < 1e-14);
 /// ```
 #[derive(Clone)]

@@ -45,10 +45,6 @@ pub struct Gmres {
     product: Vec<f64>,
 }
 
-/// A new vector shorter than this fraction of the product it comes from is
-/// rounding: the Krylov space is exhausted.
-const BREAKDOWN: f64 = 1e-14;
-
 impl Gmres {
     /// Solves `A x = b`.
     ///
@@ -110,7 +106,9 @@ impl Gmres {
             precondition(&mut self.sum);
             x.iter_mut().zip(&self.sum).for_each(|(x, sum)| *x += sum);
             let expected = self.rotated_rhs.last().map_or(left, |entry| entry.abs());
-            if limits.tolerance >= TRUSTED_TOLERANCE && expected <= limits.tolerance * size {
+            // Tolerance from which the residual of the recurrence is trusted. With few vectors
+            // it differs from the true residual by rounding only.
+            if limits.tolerance >= 1e-4 && expected <= limits.tolerance * size {
                 outcome.residual = expected / size;
                 return outcome;
             }
@@ -122,7 +120,9 @@ impl Gmres {
             outcome.residual = left / size;
             // SLACK: rounding of the product may make the true residual larger
             // than that of the recurrence.
-            outcome.solved = left <= SLACK * limits.tolerance * size;
+            // Factor on the tolerance by which the true residual may exceed that of the
+            // recurrence, because of rounding in the products.
+            outcome.solved = left <= 2.0 * limits.tolerance * size;
             if outcome.solved || outcome.products >= limits.products || left.is_nan() || left >= before {
                 return outcome;
             }
@@ -183,7 +183,9 @@ impl Gmres {
             self.rotated_rhs[count] = c * left;
             self.rotated_rhs.push(-s * left);
             count += 1;
-            if (s * left).abs() <= tolerance || next <= BREAKDOWN * whole {
+            // A new vector shorter than this fraction of the product it comes from is rounding:
+            // the Krylov space is exhausted.
+            if (s * left).abs() <= tolerance || next <= 1e-14 * whole {
                 break;
             }
             self.basis.extend(self.product.iter().map(|p| p / next));
@@ -196,13 +198,6 @@ impl Gmres {
         weights
     }
 }
-
-/// Tolerance from which the residual of the recurrence is trusted. With few
-/// vectors it differs from the true residual by rounding only.
-const TRUSTED_TOLERANCE: f64 = 1e-4;
-/// Factor on the tolerance by which the true residual may exceed that of the
-/// recurrence, because of rounding in the products.
-const SLACK: f64 = 2.0;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four partial sums, always in the same order.

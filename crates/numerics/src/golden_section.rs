@@ -24,7 +24,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// ```
 /// use stickslip_numerics::golden_section::golden_section;
 /// let converged = |a: f64, b: f64| (b - a).abs() < 1e-6;
-/// let (at, height) = golden_section((0.0, 3.0), converged, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
+/// let (at, height) =
+///     golden_section((0.0, 3.0), converged, |x| Ok::<_, ()>(1.0 - (x - 2.0).abs())).unwrap();
 /// assert!((at - 2.0).abs() < 1e-6 && (height - 1.0).abs() < 1e-6);
 /// ```
 pub fn golden_section<E>(

@@ -24,3 +24,4 @@ pub mod small_lu;
 pub mod small_matvec;
 pub mod sparse;
 pub mod tie_break;
+pub mod vector;

@@ -11,20 +11,13 @@
 //! (2003), Ch. 3 (Moore-Penrose inverse).
 
 use crate::dense::DenseLu;
-
-/// Change of the equations by a step of one along a null direction, both
-/// relative, at most. Rounding leaves 1e-13. Friction of only 1e-4 of the
-/// forces separates the mixtures of two modes by 1e-6.
-const NULL_TOLERANCE: f64 = 1e-9;
-/// Maximum number of null directions: all mixtures of two equal modes.
-const MOST: usize = 2;
-/// Steps of inverse iteration. Null directions are separated from the others by
-/// a factor of more than a thousand.
-const STEPS: usize = 3;
+use crate::vector::dot;
 
 /// Returns the null directions of a matrix (row-major, n × n). A matrix that
 /// has no factor, such as one with NaN, returns none.
 pub fn null_directions(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
+    // Maximum number of null directions: all mixtures of two equal modes.
+    let most = 2;
     let size = |column: usize| (0..n).map(|row| matrix[row * n + column].powi(2)).sum::<f64>().sqrt();
     let sizes: Vec<f64> = (0..n).map(|column| size(column).max(f64::MIN_POSITIVE)).collect();
     let scaled: Vec<f64> = matrix[..n * n].iter().enumerate().map(|(at, value)| value / sizes[at % n]).collect();
@@ -32,8 +25,10 @@ pub fn null_directions(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
     let Ok(factor) = DenseLu::new(scaled.clone(), n) else { return Vec::new() };
     // pseudo-random columns
     let mut found: Vec<Vec<f64>> =
-        (0..MOST.min(n)).map(|j| (0..n).map(|i| (1.0 + 7.0 * (i * MOST + j) as f64).sin()).collect()).collect();
-    for _ in 0..STEPS {
+        (0..most.min(n)).map(|j| (0..n).map(|i| (1.0 + 7.0 * (i * most + j) as f64).sin()).collect()).collect();
+    // Steps of inverse iteration. Null directions are separated from the others by a factor of
+    // more than a thousand.
+    for _ in 0..3 {
         found.iter_mut().for_each(|z| factor.solve(z));
         orthonormal(&mut found, &|a, b| dot(a, b));
         found.iter_mut().for_each(|z| factor.solve_adjoint(z));
@@ -41,7 +36,10 @@ pub fn null_directions(matrix: &[f64], n: usize) -> Vec<Vec<f64>> {
     }
     found.retain(|z| {
         let change = |row: &[f64]| dot(row, z).powi(2);
-        scaled.chunks_exact(n).map(change).sum::<f64>().sqrt() <= NULL_TOLERANCE
+        // Change of the equations by a step of one along a null direction, both relative, at
+        // most. Rounding leaves 1e-13. Friction of only 1e-4 of the forces separates the
+        // mixtures of two modes by 1e-6.
+        scaled.chunks_exact(n).map(change).sum::<f64>().sqrt() <= 1e-9
     });
     for z in &mut found {
         z.iter_mut().zip(&sizes).for_each(|(z, size)| *z /= size);
@@ -77,10 +75,6 @@ fn orthonormal(columns: &mut Vec<Vec<f64>>, inner: &dyn Fn(&[f64], &[f64]) -> f6
         }
     }
     *columns = made;
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

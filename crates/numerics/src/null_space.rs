@@ -14,15 +14,6 @@ use num_complex::Complex64;
 
 /// Rows from which the iteration takes less time than the singular value decomposition.
 const ITERATED_FROM: usize = 8;
-/// Maximum number of steps. Each step divides the error by the square of the ratio of the
-/// singular values, which is at least 10⁶ where the iteration is useful.
-const STEPS: usize = 6;
-/// The iteration stops when a step changes the directions by less than this: a
-/// few times the rounding of a solution.
-const CONVERGED: f64 = 1e-13;
-/// If the factorization finds no pivot, this fraction of the largest entry is added to the
-/// diagonal. It is within the rounding of the matrix.
-const DIAGONAL_SHIFT: f64 = f64::EPSILON;
 
 /// Returns an orthonormal basis, by columns, of the `dimension` directions with
 /// the smallest singular values.
@@ -53,7 +44,9 @@ fn by_inverse_iteration(matrix: &DMatrix<Complex64>, dimension: usize) -> Option
     let r = matrix.nrows();
     let factor = ComplexLu::new(matrix.as_slice().to_vec(), r).or_else(|_| {
         let size = matrix.iter().map(|z| z.norm()).fold(0.0, f64::max);
-        let shifted = matrix + DMatrix::from_diagonal_element(r, r, Complex64::new(DIAGONAL_SHIFT * size, 0.0));
+        // If the factorization finds no pivot, this fraction of the largest entry is added to
+        // the diagonal. It is within the rounding of the matrix.
+        let shifted = matrix + DMatrix::from_diagonal_element(r, r, Complex64::new(f64::EPSILON * size, 0.0));
         ComplexLu::new(shifted.as_slice().to_vec(), r)
     });
     let factor = factor.ok()?;
@@ -64,7 +57,9 @@ fn by_inverse_iteration(matrix: &DMatrix<Complex64>, dimension: usize) -> Option
         Complex64::new((1.0 + 7.0 * at).sin(), (2.0 + 11.0 * at).sin())
     });
     found = orthonormal(found)?;
-    for _ in 0..STEPS {
+    // Maximum number of steps. Each step divides the error by the square of the ratio of the
+    // singular values, which is at least 10⁶ where the iteration is useful.
+    for _ in 0..6 {
         let mut next = found.clone();
         factor.solve_adjoint(next.as_mut_slice());
         next = orthonormal(next)?;
@@ -72,7 +67,9 @@ fn by_inverse_iteration(matrix: &DMatrix<Complex64>, dimension: usize) -> Option
         next = orthonormal(next)?;
         let change = &next - &found * (found.adjoint() * &next);
         found = next;
-        if change.iter().all(|z| z.norm() <= CONVERGED) {
+        // The iteration stops when a step changes the directions by less than this: a few times
+        // the rounding of a solution.
+        if change.iter().all(|z| z.norm() <= 1e-13) {
             return Some(found);
         }
     }

@@ -47,19 +47,6 @@ pub struct DefectiveModes {
 /// Eigenvalues of `K` below this fraction of the largest are zero: rounding of
 /// the symmetric eigenvalue problem.
 const RIGID: f64 = 1e-13;
-/// Damping couples two undamped modes if its entry exceeds this fraction of the largest.
-const COUPLED: f64 = 1e-14;
-/// Eigenvalues closer than this fraction of the largest form a cluster. It is the square root
-/// of the rounding error of a non-symmetric eigenvalue, the error of a nearly defective pair.
-const CLUSTER: f64 = 1e-7;
-/// A mode is defective if `|θ|` is below this fraction of `2|λ| + |C|`: half of
-/// the digits are then lost.
-const DEFECTIVE: f64 = 1e-7;
-/// A damping matrix is not symmetric if mirrored entries differ by more than
-/// this fraction of the largest entry.
-const UNSYMMETRIC: f64 = 1e-12;
-/// Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
-const SCHUR_STEPS: usize = 40;
 
 impl QuadraticModes {
     /// Computes the modes of `q'' + C q' + K q`. Both matrices are m × m; K is
@@ -102,6 +89,13 @@ impl QuadraticModes {
 
     /// Adds the modes of a coupled group of coordinates. The columns of `part` span the group.
     fn add_group(&mut self, part: &DMatrix<f64>, c: &DMatrix<f64>, k: &DMatrix<f64>) -> Result<(), DefectiveModes> {
+        // Eigenvalues closer than this fraction of the largest form a cluster. It is the square
+        // root of the rounding error of a non-symmetric eigenvalue, the error of a nearly
+        // defective pair.
+        let cluster = 1e-7;
+        // A mode is defective if `|θ|` is below this fraction of `2|λ| + |C|`: half of the
+        // digits are then lost.
+        let defective = 1e-7;
         let r = c.nrows();
         let out_of_range = DefectiveModes { lambda: Complex64::new(f64::NAN, 0.0) };
         let eigenvalues = if r == 1 { Some(quadratic_roots(c[0], k[0])) } else { companion_eigenvalues(c, k) };
@@ -115,12 +109,12 @@ impl QuadraticModes {
         for i in 0..eigenvalues.len() {
             // Keep the eigenvalue above the real axis of each pair. An
             // eigenvalue within rounding of the axis is real.
-            let real = eigenvalues[i].im.abs() <= CLUSTER * scale;
+            let real = eigenvalues[i].im.abs() <= cluster * scale;
             if done[i] || (!real && eigenvalues[i].im < 0.0) {
                 continue;
             }
             let members: Vec<usize> = (i..eigenvalues.len())
-                .filter(|&j| !done[j] && (eigenvalues[j] - eigenvalues[i]).norm() <= CLUSTER * scale)
+                .filter(|&j| !done[j] && (eigenvalues[j] - eigenvalues[i]).norm() <= cluster * scale)
                 .collect();
             members.iter().for_each(|&j| done[j] = true);
             let mut lambda = members.iter().map(|&j| eigenvalues[j]).sum::<Complex64>() / members.len() as f64;
@@ -141,7 +135,7 @@ impl QuadraticModes {
             let (mut phi, mut psi) = vectors(lambda).ok_or(out_of_range)?;
             let two_lambda_c = |lambda: Complex64| DMatrix::from_diagonal_element(r, r, 2.0 * lambda) + &cc;
             let mut theta = psi.transpose() * two_lambda_c(lambda) * &phi;
-            if members.len() == 1 && theta[0].norm() > DEFECTIVE * scale {
+            if members.len() == 1 && theta[0].norm() > defective * scale {
                 // One Newton step on ψᵀQ(λ)φ = 0 removes the rounding of the
                 // unsymmetric eigenvalue problem.
                 let correction = (psi.transpose() * quadratic(&cc, k, lambda) * &phi)[0] / theta[0];
@@ -156,7 +150,7 @@ impl QuadraticModes {
             }
             let size = (2.0 * lambda.norm() + c.norm()).max(f64::MIN_POSITIVE);
             let values = eigen::svd(theta.clone()).ok_or(out_of_range)?.singular_values;
-            let singular = values.min() <= DEFECTIVE * size;
+            let singular = values.min() <= defective * size;
             let inverse = if singular { None } else { theta.try_inverse() };
             let Some(inverse) = inverse else { return Err(DefectiveModes { lambda }) };
             let left = inverse * psi.transpose();
@@ -221,13 +215,16 @@ fn split_free(
 
 /// Returns true if a damping matrix is not symmetric.
 fn is_unsymmetric(damping: &DMatrix<f64>) -> bool {
-    (damping - damping.transpose()).amax() > UNSYMMETRIC * damping.amax()
+    // A damping matrix is not symmetric if mirrored entries differ by more than this fraction of
+    // the largest entry.
+    (damping - damping.transpose()).amax() > 1e-12 * damping.amax()
 }
 
 /// Returns the groups of coordinates that damping or stiffness couples.
 fn coupled_groups(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let r = c.nrows();
-    let (c_scale, k_scale) = (COUPLED * c.amax(), 10.0 * RIGID * k.amax());
+    // Damping couples two undamped modes if its entry exceeds this fraction of the largest.
+    let (c_scale, k_scale) = (1e-14 * c.amax(), 10.0 * RIGID * k.amax());
     let one_way = |i: usize, j: usize| c[(i, j)].abs() > c_scale || k[(i, j)].abs() > k_scale;
     let coupled = |i: usize, j: usize| one_way(i, j) || one_way(j, i);
     let mut left: Vec<usize> = (0..r).collect();
@@ -272,7 +269,8 @@ fn companion_eigenvalues(c: &DMatrix<f64>, k: &DMatrix<f64>) -> Option<Vec<Compl
             companion[(r + i, r + j)] = -c[(i, j)];
         }
     }
-    let steps = SCHUR_STEPS * (2 * r + 1);
+    // Maximum number of QR steps per eigenvalue; 2 to 4 are usual.
+    let steps = 40 * (2 * r + 1);
     let finite = companion.iter().all(|x| x.is_finite());
     let schur = finite.then(|| Schur::try_new(companion.clone(), f64::EPSILON, steps))?;
     // The real iteration gives exact pairs. If it does not converge, the complex iteration does.

@@ -21,26 +21,68 @@ pub struct Stream {
     seed: u64,
 }
 
-/// Increment of SplitMix64: the fractional part of the golden ratio.
-const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
+/// The generator SplitMix64: a state that grows by a constant, and a function that mixes it.
+///
+/// # Example
+/// ```
+/// use stickslip_numerics::random::SplitMix64;
+/// let mut numbers = SplitMix64::new(0);
+/// assert_eq!(numbers.next_u64(), 0xe220_a839_7b1d_cdaf); // as published
+/// let mut later = SplitMix64::new(0).skip(1);
+/// assert_eq!(numbers.next_u64(), later.next_u64());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SplitMix64 {
+    state: u64,
+}
 
-fn splitmix64(mut z: u64) -> u64 {
+impl SplitMix64 {
+    /// Increment of the state, odd: 2⁶⁴ divided by the golden ratio.
+    pub const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+
+    /// Creates a generator.
+    pub fn new(state: u64) -> Self {
+        SplitMix64 { state }
+    }
+
+    /// Returns the generator after `count` more numbers.
+    pub fn skip(self, count: u64) -> Self {
+        SplitMix64 { state: self.state.wrapping_add(count.wrapping_mul(Self::INCREMENT)) }
+    }
+
+    /// Returns the next 64 bits.
+    pub fn next_u64(&mut self) -> u64 {
+        self.state = self.state.wrapping_add(Self::INCREMENT);
+        mix64(self.state)
+    }
+
+    /// Returns the next number in [0, 1), a multiple of 2⁻⁵³.
+    pub fn next_unit(&mut self) -> f64 {
+        (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Mixes 64 bits: every bit of the result depends on every bit of `z`.
+pub fn mix64(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
 }
 
+/// Returns the middle of one of 2⁵³ equal parts of the interval from 0 to 1, so never an end.
+pub fn open_unit(bits: u64) -> f64 {
+    ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+}
+
 impl Stream {
     /// Creates the stream of a seed. Streams of consecutive seeds are not correlated.
     pub fn new(seed: u64) -> Self {
-        Stream { seed: splitmix64(seed.wrapping_add(GOLDEN_GAMMA)) }
+        Stream { seed: SplitMix64::new(seed).next_u64() }
     }
 
     /// Returns number `index`, uniform in the open interval (0, 1).
     pub fn uniform(self, index: u64) -> f64 {
-        let bits = splitmix64(self.seed.wrapping_add(index.wrapping_add(1).wrapping_mul(GOLDEN_GAMMA)));
-        // The middle of one of 2⁵³ intervals.
-        ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+        open_unit(SplitMix64::new(self.seed).skip(index).next_u64())
     }
 
     /// Returns number `index` of the normal distribution with mean 0 and standard deviation 1.
@@ -68,16 +110,26 @@ fn logarithm(x: f64) -> f64 {
 
 /// Returns the quantile of the standard normal distribution at probability `p`, 0 < p < 1.
 pub fn normal_quantile(p: f64) -> f64 {
+    let q = p - 0.5;
+    let tail = || (-logarithm(if q < 0.0 { p } else { 1.0 - p })).sqrt();
+    normal_quantile_from(q, 0.180_625 - q * q, tail)
+}
+
+/// Returns the quantile of the standard normal distribution at probability `0.5 + q`.
+///
+/// The caller computes the arguments of the rational approximations, because their last digits
+/// decide the last digits of the result: `center = 0.425² - q²`, and `tail` returns
+/// `√(-ln min(p, 1 - p))`.
+pub fn normal_quantile_from(q: f64, center: f64, tail: impl FnOnce() -> f64) -> f64 {
     let ratio = |x: f64, up: [f64; 8], down: [f64; 7]| {
         let top = up.iter().rev().fold(0.0, |sum, c| sum * x + c);
         let bottom = down.iter().rev().fold(0.0, |sum, c| (sum + c) * x);
         top / (bottom + 1.0)
     };
-    let q = p - 0.5;
     if q.abs() <= 0.425 {
-        return q * ratio(0.180_625 - q * q, CENTER.0, CENTER.1);
+        return q * ratio(center, CENTER.0, CENTER.1);
     }
-    let r = (-logarithm(if q < 0.0 { p } else { 1.0 - p })).sqrt();
+    let r = tail();
     let value = if r <= 5.0 { ratio(r - 1.6, TAIL.0, TAIL.1) } else { ratio(r - 5.0, FAR_TAIL.0, FAR_TAIL.1) };
     if q < 0.0 { -value } else { value }
 }
@@ -184,8 +236,8 @@ mod tests {
     /// The first numbers of SplitMix64's mixing are fixed: studies with seeds must not change.
     #[test]
     fn seeds_are_stable() {
-        // Stafford's variant 13: splitmix64(1) computed by hand from the published code.
-        assert_eq!(splitmix64(1), 0x5692_161d_100b_05e5);
+        // Stafford's variant 13: mix64(1) computed by hand from the published code.
+        assert_eq!(mix64(1), 0x5692_161d_100b_05e5);
         let stream = Stream::new(7);
         let mut numbers: Vec<u64> = (0..1000).map(|i| stream.uniform(i).to_bits()).collect();
         numbers.sort_unstable();

@@ -76,16 +76,6 @@ pub enum InitialSign {
     Zero,
 }
 
-/// Maximum number of steps of a search. A period of an orbit takes 10 to 100.
-const MARCH_STEPS: usize = 100_000;
-
-/// Shortest step as a fraction of the interval: about the rounding of the time.
-const TIME_RESOLUTION: f64 = 4e-16;
-
-/// A derivative of a signal counts as zero at the start if it is below this fraction of its
-/// bound. The solution that leads to it has rounding errors of about 1e-13.
-const ZERO_TOLERANCE: f64 = 1e-9;
-
 impl ExponentialBasis {
     /// Returns the number of coefficients of a signal.
     pub fn len(&self) -> usize {
@@ -280,8 +270,10 @@ impl ExponentialBasis {
             };
         }
         let mut time = 0.0;
-        let resolution = TIME_RESOLUTION * end;
-        for _ in 0..MARCH_STEPS {
+        // Shortest step as a fraction of the interval: about the rounding of the time.
+        let resolution = 4e-16 * end;
+        // Maximum number of steps of a search. A period of an orbit takes 10 to 100.
+        for _ in 0..100_000 {
             self.evaluate_and(time, values, |b, size| {
                 if self.exponents[b].re < 0.0 {
                     magnitudes[b] = size; // it decays from here on
@@ -353,7 +345,9 @@ impl ExponentialBasis {
             }
             let value = self.initial_value(current);
             let size: f64 = current[..=self.constant()].iter().map(magnitude).sum();
-            if value.abs() > ZERO_TOLERANCE * size {
+            // A derivative of a signal counts as zero at the start if it is below this fraction
+            // of its bound. The solution that leads to it has rounding errors of about 1e-13.
+            if value.abs() > 1e-9 * size {
                 if value < 0.0 {
                     return None;
                 }
@@ -485,9 +479,6 @@ impl FourierIntegrals {
 
 /// Quadrature nodes and weights of a panel.
 const NODES: [(f64, f64); 8] = quadrature::from_center(quadrature::GAUSS_8);
-/// Maximum phase of the fastest exponential in a panel of the quadrature, up to
-/// which the 8-point rule is exact to rounding.
-const PANEL_PHASE: f64 = 1.0;
 
 /// A signal with its basis.
 #[derive(Clone, Copy)]
@@ -499,7 +490,9 @@ struct Signal<'a> {
 /// Returns `∫ g h dτ` over `[0, length]` by Gauss-Legendre quadrature in panels.
 fn quadrature(g: Signal, h: Signal, length: f64) -> f64 {
     let fastest = g.basis.exponents.iter().chain(&h.basis.exponents).map(|s| s.norm()).fold(0.0, f64::max);
-    let panels = (2.0 * fastest * length / PANEL_PHASE).ceil().clamp(1.0, 1e5) as usize;
+    // A panel has a phase of at most one of the fastest exponential: the 8-point rule is then
+    // exact to rounding.
+    let panels = (2.0 * fastest * length).ceil().clamp(1.0, 1e5) as usize;
     let width = length / panels as f64;
     let zero = Complex64::new(0.0, 0.0);
     let (mut gv, mut hv) = (vec![zero; g.basis.len()], vec![zero; h.basis.len()]);

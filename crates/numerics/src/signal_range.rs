@@ -9,21 +9,6 @@
 use crate::signal::{ExponentialBasis, magnitude, magnitude_bound, real_dot};
 use num_complex::Complex64;
 
-/// A mode below this fraction of a signal is rounding. It does not change an
-/// extreme, but a very fast one turns millions of times.
-const NEGLIGIBLE: f64 = 64.0 * f64::EPSILON;
-/// Accuracy of an extreme, relative to the sum of the sizes of the terms of the
-/// signal: the rounding of its values.
-const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// Maximum number of subdivisions of one signal, after which it counts as too fast.
-///
-/// A turning point takes about three. A mode that vibrates undamped at a hundred times the
-/// excitation frequency has two hundred turning points in a period.
-const MAX_SUBDIVISIONS: usize = 20_000;
-/// Maximum number of steps towards one turning point. They converge cubically
-/// in value; bisection is the fallback.
-const STEPS: usize = 60;
-
 /// The range of the values that signals are known to take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ValueRange {
@@ -121,7 +106,9 @@ impl RangeScratch {
         let size = magnitude_bound(weights, magnitudes);
         kept.copy_from_slice(signal);
         for ((kept, weight), exponent) in kept.iter_mut().zip(&*weights).zip(&basis.exponents) {
-            if exponent.re <= 0.0 && *weight <= NEGLIGIBLE * size {
+            // A mode below this fraction of a signal is rounding. It does not change an extreme,
+            // but a very fast one turns millions of times.
+            if exponent.re <= 0.0 && *weight <= (64.0 * f64::EPSILON) * size {
                 *kept = Complex64::new(0.0, 0.0);
             }
         }
@@ -162,7 +149,9 @@ impl RangeScratch {
         let (mut from, mut to) = (left.time, right.time);
         let mut time = from + (to - from) * first_guess(&left, &right);
         let mut value = left.value;
-        for _ in 0..STEPS {
+        // Maximum number of steps towards one turning point. They converge cubically in value;
+        // bisection is the fallback.
+        for _ in 0..60 {
             let sample = self.sample(basis, signal, time);
             let step = -sample.slope / sample.curvature;
             value = sample.value + 0.5 * sample.slope * step;
@@ -224,7 +213,9 @@ impl ExponentialBasis {
         memory: &mut RangeScratch,
     ) -> Result<(), TooFast> {
         let SignalSegment { coefficients: signal, at_end, length } = segment;
-        let rounding = ROUNDING * memory.differentiate(self, signal, length);
+        // Accuracy of an extreme, relative to the sum of the sizes of the terms of the signal:
+        // the rounding of its values.
+        let rounding = (2.0 * f64::EPSILON) * memory.differentiate(self, signal, length);
         let begin = memory.sample(self, signal, 0.0);
         let [_, first, second] = &memory.slopes;
         let end = SignalSample {
@@ -265,7 +256,10 @@ impl ExponentialBasis {
                 continue; // no number lies in between
             }
             times += 1;
-            if times > MAX_SUBDIVISIONS {
+            // Maximum number of subdivisions of one signal, after which it counts as too fast. A
+            // turning point takes about three. A mode that vibrates undamped at a hundred times
+            // the excitation frequency has two hundred turning points in a period.
+            if times > 20_000 {
                 return Err(TooFast);
             }
             let between = memory.sample(self, signal, time);

@@ -32,7 +32,13 @@ pub fn add_matvec(matrix: &[f64], x: &[f64], out: &mut [f64]) {
 /// ```
 /// let mut out = [0.0; 4];
 /// // twice the identity matrix, and rows of two columns
-/// stickslip_numerics::small_matvec::add_matmul_row_major(&[2.0, 0.0, 0.0, 2.0], 2, &[1.0, 2.0, 3.0, 4.0], &mut out, 2);
+/// stickslip_numerics::small_matvec::add_matmul_row_major(
+///     &[2.0, 0.0, 0.0, 2.0],
+///     2,
+///     &[1.0, 2.0, 3.0, 4.0],
+///     &mut out,
+///     2,
+/// );
 /// assert_eq!(out, [2.0, 4.0, 6.0, 8.0]);
 /// ```
 pub fn add_matmul_row_major(matrix: &[f64], rows: usize, x: &[f64], out: &mut [f64], columns: usize) {

@@ -12,9 +12,6 @@ use stickslip_study::dataset::{Figure, Panel};
 /// Slip limit of the elements in N.
 const LIMIT: f64 = 1e-3;
 
-/// Smallest turn of the force that counts, relative to Ft.
-const TURN: f64 = 0.01;
-
 /// Merges the panels of several figures. Each panel title has the number of its figure.
 fn merged(results: &Results, title: &str, figures: &[(&str, &str)]) -> Option<Figure> {
     let mut panels = Vec::new();
@@ -259,7 +256,8 @@ pub fn coulomb(results: &Results) -> Option<ReportPart> {
     let loops = results.loops(&["fig04a_coulomb", "fig04b_coulomb"])?;
     let arctan = results.loops(&["fig04a", "fig04b"])?;
     let overshoot = |loops: &[Loop]| largest(loops.iter().map(Loop::highest)) / LIMIT - 1.0;
-    let turns = |loops: &[Loop]| -> Vec<usize> { loops.iter().map(|l| l.turns(TURN * LIMIT)).collect() };
+    // Smallest turn of the force that counts, relative to Ft.
+    let turns = |loops: &[Loop]| -> Vec<usize> { loops.iter().map(|l| l.turns(0.01 * LIMIT)).collect() };
     let (rung, smooth) = (turns(&loops), turns(&arctan));
     let findings = vec![finding(
         "Fig. 4 shows true Coulomb friction",

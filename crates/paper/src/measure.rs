@@ -120,12 +120,6 @@ impl Curve {
     }
 }
 
-/// Smallest change of slope that counts as a corner, relative to the steepest slope.
-///
-/// Rounding of the samples is a million times smaller. A corner of the exact loop changes the
-/// slope by its full value.
-const CORNER: f64 = 0.01;
-
 impl Loop {
     /// Returns the slopes of the straight pieces in order. Adjacent slopes differ, also
     /// cyclically.
@@ -133,7 +127,10 @@ impl Loop {
         let largest = self.displacement.iter().fold(0.0f64, |a, u| a.max(u.abs()));
         let mut slopes: Vec<f64> = Vec::new();
         let steepest = std::cell::Cell::new(0.0f64);
-        let new = |last: f64, slope: f64| (slope - last).abs() > CORNER * steepest.get().max(slope.abs());
+        // Smallest change of slope that counts as a corner, relative to the steepest slope.
+        // Rounding of the samples is a million times smaller. A corner of the exact loop changes
+        // the slope by its full value.
+        let new = |last: f64, slope: f64| (slope - last).abs() > 0.01 * steepest.get().max(slope.abs());
         for (u, f) in self.displacement.windows(2).zip(self.force.windows(2)) {
             // Near its turning points the imposed motion is too small for a slope.
             if (u[1] - u[0]).abs() < 1e-6 * largest {

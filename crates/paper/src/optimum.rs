@@ -5,10 +5,6 @@ use stickslip_study::dataset::{Axis, Figure, Panel, Series, Style};
 use stickslip_study::kinds::performance;
 use stickslip_study::run::{Context, run};
 
-/// Relative excess of the peak at the highest limit over the lowest peak, above which the
-/// minimum lies inside the range. The value excludes rounding errors.
-const MIN_RISE: f64 = 1e-3;
-
 /// The peak of the excited blade over the slip limit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Optimum {
@@ -34,7 +30,9 @@ impl Optimum {
         let best = (0..peaks.len()).min_by(|a, b| peaks[*a].total_cmp(&peaks[*b]))?;
         let refined = curve.optimum.map(|optimum| (optimum.value, optimum.amplitude));
         let lowest = refined.unwrap_or((limits[best], peaks[best]));
-        let interior = peaks.last().is_some_and(|last| *last > (1.0 + MIN_RISE) * lowest.1) && best > 0;
+        // Relative excess of the peak at the highest limit over the lowest peak, above which the
+        // minimum lies inside the range. The value excludes rounding errors.
+        let interior = peaks.last().is_some_and(|last| *last > (1.0 + 1e-3) * lowest.1) && best > 0;
         Some(Optimum { limits, peaks, lowest, interior })
     }
 

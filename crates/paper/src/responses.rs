@@ -371,10 +371,6 @@ fn scaled_difference(results: &Results, large: &str, small: &str) -> Option<f64>
     (large.len() == small.len()).then(|| largest(large.iter().zip(&small).map(|(a, b)| a.difference(b, 10.0))))
 }
 
-/// Relative difference below which two curves are similar: smooth orbits have an error of about
-/// 1e-7.
-const SIMILARITY_TOLERANCE: f64 = 1e-6;
-
 /// Fig. 8.
 pub fn figure8(results: &Results) -> Option<ReportPart> {
     let exact = scaled_difference(results, "fig06", "fig08")?;
@@ -397,7 +393,9 @@ pub fn figure8(results: &Results) -> Option<ReportPart> {
                  relative to the highest peak of its panel: {kept:.1e} with α = 25 s/mm, {scaled:.1e} with α = \
                  250 s/mm."
             ),
-            small(kept, SIMILARITY_TOLERANCE, SIMILAR),
+            // Relative difference below which two curves are similar: smooth orbits have an
+            // error of about 1e-7.
+            small(kept, 1e-6, SIMILAR),
         ));
     }
     let section = section(
@@ -409,16 +407,14 @@ pub fn figure8(results: &Results) -> Option<ReportPart> {
     Some(ReportPart { section, findings })
 }
 
-/// Tolerance in Hz for equal peak frequencies: about 1/20 of the half-power width (0.17 Hz).
-const SAME_FREQUENCY: f64 = 0.01;
-
 /// Fig. 10.
 pub fn figure10(results: &Results) -> Option<ReportPart> {
     let symmetric = results.curves("fig10")?;
     let couple = results.curves("fig06")?;
     let at = limits(&symmetric);
     let (here, before) = (shifts(&symmetric, BLADE1, BLADE4), shifts(&couple, BLADE1, BLADE3));
-    let removed: Vec<bool> = here.iter().map(|shift| shift.abs() <= SAME_FREQUENCY).collect();
+    // Tolerance in Hz for equal peak frequencies: about 1/20 of the half-power width (0.17 Hz).
+    let removed: Vec<bool> = here.iter().map(|shift| shift.abs() <= 0.01).collect();
     let first =
         |curves: &[Curve], mass: usize| curves.first().map_or(f64::NAN, |curve| 100.0 * curve.peak[mass].amplitude);
     let excited = first(&symmetric, BLADE1) / first(&couple, BLADE1) - 1.0;

@@ -40,8 +40,6 @@ pub const OPTIMA: &[(&str, &str)] = files!["fig06_optimum", "fig07_optimum", "fi
 const POINTS: &str = "points = 241";
 /// Number of points in [`OPTIMA`]: a third is enough to find the peak before its refinement.
 const COARSE_POINTS: &str = "points = 81";
-/// Ratio of the two numbers of points.
-const COARSE: usize = 3;
 
 /// Reads an embedded study.
 ///
@@ -49,7 +47,8 @@ const COARSE: usize = 3;
 pub fn read(name: &str, points: Option<usize>, set: &[(&str, &str)]) -> Result<Study, StudyError> {
     let text = FILES.iter().chain(OPTIMA).find(|file| file.0 == name).map_or("", |file| file.1);
     let text = points.map_or(text.to_owned(), |points| {
-        let coarse = format!("points = {}", points / COARSE + 1);
+        // Ratio of the two numbers of points.
+        let coarse = format!("points = {}", points / 3 + 1);
         text.replace(POINTS, &format!("points = {points}")).replace(COARSE_POINTS, &coarse)
     });
     let set: Vec<(String, String)> = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();

@@ -16,8 +16,6 @@ use stickslip_study::run::Context;
 
 /// Interval between progress reports, and between checks for Ctrl-C.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
-/// Maximum number of threads in a request.
-const MOST_THREADS: usize = 1024;
 
 /// Supervision of a call.
 pub struct Supervision {
@@ -112,6 +110,8 @@ impl Drop for PoolLease {
 
 /// Returns threads for one call: the requested number, or that of the machine.
 fn lease_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<PoolLease> {
+    // Maximum number of threads in a request.
+    let most_threads: usize = 1024;
     let process = std::process::id();
     if *PROCESS.get_or_init(|| process) != process {
         let message = "this process was forked after Stickslip started its threads, which a fork does not \
@@ -119,8 +119,8 @@ fn lease_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<PoolLease> {
         return Err(error::exception(py, "StickslipError", message.to_owned()));
     }
     let number = threads.unwrap_or(0);
-    if threads == Some(0) || number > MOST_THREADS {
-        let message = format!("threads must be a whole number from 1 to {MOST_THREADS}, found {number}");
+    if threads == Some(0) || number > most_threads {
+        let message = format!("threads must be a whole number from 1 to {most_threads}, found {number}");
         return Err(error::exception(py, "StickslipError", message));
     }
     let idle = POOLS.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&number).and_then(Vec::pop);

@@ -13,7 +13,8 @@
 //! # Example
 //! ```no_run
 //! use stickslip_report::{Outputs, write_dataset};
-//! # fn example(dataset: &stickslip_study::dataset::Dataset) -> Result<(), stickslip_report::ReportError> {
+//! # use stickslip_study::dataset::Dataset;
+//! # fn example(dataset: &Dataset) -> Result<(), stickslip_report::ReportError> {
 //! let files = write_dataset(dataset, std::path::Path::new("results"), &Outputs::all())?;
 //! println!("{} files", files.len());
 //! # Ok(())
@@ -29,7 +30,8 @@
 //! use stickslip_study::{read_study, run::{Context, check, figure_of_tables}};
 //!
 //! let text = stickslip_study::templates::find("blade-couple").unwrap().study;
-//! let checked = check(&read_study("couple.toml", text, &[("kt".into(), "12 N/mm".into())]).unwrap()).unwrap();
+//! let study = read_study("couple.toml", text, &[("kt".into(), "12 N/mm".into())]).unwrap();
+//! let checked = check(&study).unwrap();
 //! let points = Arc::new(AtomicUsize::new(0));
 //! let counter = points.clone();
 //! let finished = Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed));
@@ -39,8 +41,8 @@
 //! block.append(checked.block(2..checked.units(), &context).unwrap());
 //! assert_eq!(points.load(Ordering::Relaxed), 964);
 //! let curve = &block.tables[0];
-//! let units: Vec<_> = curve.columns.iter().take(3).map(|column| (column.name.as_str(), column.unit())).collect();
-//! assert_eq!(units[2], ("blade1_amplitude_m", Some("m".to_owned())));
+//! let unit = |column: usize| (curve.columns[column].name.as_str(), curve.columns[column].unit());
+//! assert_eq!(unit(2), ("blade1_amplitude_m", Some("m".to_owned())));
 //! let figure = figure_of_tables(checked.study(), &block.tables);
 //! assert!(stickslip_report::svg::to_svg(&figure).starts_with("<svg"));
 //! assert!(stickslip_report::html::to_html(&figure, "plotly.js").contains("plotly.js"));

@@ -8,7 +8,7 @@
 
 #![allow(clippy::print_stdout)] // a bench prints its result
 
-#[path = "../tests/reduction/brick.rs"]
+#[path = "../tests/it/reduction/brick.rs"]
 mod brick;
 
 use brick::Brick;

@@ -7,7 +7,7 @@
 
 #![allow(clippy::print_stdout)]
 
-#[path = "../tests/reduction/brick.rs"]
+#[path = "../tests/it/reduction/brick.rs"]
 mod brick;
 mod python;
 

@@ -13,7 +13,11 @@
 //! use stickslip::law::Coulomb;
 //! use stickslip::{Force, GROUND, Joint, Mass, Method, Model, Spring, method};
 //!
-//! let spring = |blade: &str| Spring { between: [blade.into(), GROUND.into()], stiffness: 105_103.0, damping: 0.2 };
+//! let spring = |blade: &str| Spring {
+//!     between: [blade.into(), GROUND.into()],
+//!     stiffness: 105_103.0,
+//!     damping: 0.2,
+//! };
 //! let model = Model {
 //!     masses: vec![Mass::new("a", 0.182), Mass::new("b", 0.182)],
 //!     springs: vec![spring("a"), spring("b")],
@@ -29,7 +33,11 @@
 //! let mut solver = method::auto::Auto.solver(&system)?;
 //! let orbit = solver.orbit(TAU * 121.0)?;
 //!
-//! println!("{:.2} mm, {:.1} mJ a period", 1e3 * orbit.places[0].amplitude(), 1e3 * orbit.joints[0].dissipation);
+//! println!(
+//!     "{:.2} mm, {:.1} mJ a period",
+//!     1e3 * orbit.places[0].amplitude(),
+//!     1e3 * orbit.joints[0].dissipation
+//! );
 //! assert!(orbit.evidence.energy_gap < 1e-9 && orbit.evidence.residual < 1e-11);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -91,11 +91,6 @@ fn step(step: &dyn StepView, motion: Motion<'_>, times: &[f64]) -> Vec<[f64; MAX
         .collect()
 }
 
-/// Newton iterations for the stages of a step.
-const ITERATIONS: usize = 30;
-/// Largest change of a stage per iteration, because some states are logarithms of physical
-/// quantities.
-const STRIDE: f64 = 2.0;
 /// Nodes and matrix of the two-stage Radau IIA method, of order 3. It damps processes that are
 /// too fast for a step, without oscillation.
 pub const NODES: [f64; 2] = [1.0 / 3.0, 1.0];
@@ -114,10 +109,14 @@ pub fn radau_step(
     motion: &[RelativeMotion<f64>; 2],
     z: &[f64],
 ) -> Vec<f64> {
+    // Largest change of a stage per iteration, because some states are logarithms of physical
+    // quantities.
+    let stride = 2.0;
     let n = law.states();
     let mut point = RatePoint::new(directions, n);
     let mut stages = DVector::from_fn(2 * n, |i, _| z[i % n]);
-    for _ in 0..if n == 0 || h == 0.0 { 0 } else { ITERATIONS } {
+    // Newton iterations for the stages of a step.
+    for _ in 0..if n == 0 || h == 0.0 { 0 } else { 30 } {
         let mut rates = vec![0.0; 2 * n];
         let mut slopes = DMatrix::zeros(2 * n, n);
         for s in 0..2 {
@@ -137,8 +136,8 @@ pub fn radau_step(
         });
         let mut change = jacobian.lu().solve(&residual).expect("a regular step");
         let longest = change.amax();
-        if longest > STRIDE {
-            change *= STRIDE / longest;
+        if longest > stride {
+            change *= stride / longest;
         }
         stages -= &change;
         if longest < 1e-14 * (1.0 + stages.amax()) {

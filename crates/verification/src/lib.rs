@@ -12,12 +12,15 @@ pub mod single_mass;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::sync::Arc;
 use stickslip::law::{Coulomb, Jenkins, LawInfo, Parameter, Range, SharedLaw, TABLE};
 use stickslip::method::{Method, event_driven::EventDriven};
 use stickslip::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::{Orbit, Sample};
 use stickslip::structure::{Structure, StructureError};
+use stickslip_numerics::golden_section::golden_section;
+use stickslip_numerics::random::SplitMix64;
 use stickslip_study::templates;
 
 /// Compiles and runs the Rust examples of the book.
@@ -30,24 +33,17 @@ mod book {
 }
 
 /// A small generator of uniform random numbers, so that a seed identifies each model of a test.
-///
-/// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators" (2014),
-/// SplitMix64.
 #[derive(Debug, Clone)]
-pub struct Random(u64);
+pub struct Random(SplitMix64);
 
 impl Random {
     /// Makes a generator from a seed.
     pub fn new(seed: u64) -> Self {
-        Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+        Random(SplitMix64::new(0).skip(seed))
     }
     /// Returns a number uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        self.0.next_unit()
     }
     /// Returns a number uniform in `[low, high)`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -315,29 +311,11 @@ pub fn maximum(mut function: impl FnMut(f64) -> f64, [low, high]: [f64; 2], poin
     tops.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
     tops.truncate(3);
     let refined = tops.iter().map(|&i| {
-        let (x, value) = golden(&mut function, [at(i.saturating_sub(1)), at((i + 1).min(points))], width);
+        let ends = (at(i.saturating_sub(1)), at((i + 1).min(points)));
+        let Ok((x, value)) = golden_section(ends, |a, b| b - a <= width, |x| Ok::<_, Infallible>(function(x)));
         if value > values[i] { (x, value) } else { (at(i), values[i]) }
     });
     refined.max_by(|x, y| x.1.total_cmp(&y.1)).expect("a scan has a maximum")
-}
-
-/// Golden-section search. Source: Kiefer (1953).
-fn golden(mut function: impl FnMut(f64) -> f64, [mut a, mut b]: [f64; 2], width: f64) -> (f64, f64) {
-    let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
-    let (mut fc, mut fd) = (function(c), function(d));
-    while b - a > width {
-        if fc > fd {
-            (b, d, fd) = (d, c, fc);
-            c = b - golden * (b - a);
-            fc = function(c);
-        } else {
-            (a, c, fc) = (c, d, fd);
-            d = a + golden * (b - a);
-            fd = function(d);
-        }
-    }
-    if fc > fd { (c, fc) } else { (d, fd) }
 }
 
 /// Returns the zero of `function` in `[low, high]` by bisection to the last bit. The function
@@ -358,6 +336,7 @@ pub fn zero(mut function: impl FnMut(f64) -> f64, [mut low, mut high]: [f64; 2])
 /// Returns the integral of `function(t)` over `[0, end]`, with a function that is smooth
 /// between the `breaks`. Uses the Gauss rule with eight points on 16 parts of each piece.
 pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) -> f64 {
+    let parts: usize = 16;
     // abscissas and weights: Abramowitz and Stegun (1964), Table 25.4
     const POINTS: [(f64, f64); 4] = [
         (0.183_434_642_495_649_8, 0.362_683_783_378_362),
@@ -365,15 +344,14 @@ pub fn integral(mut function: impl FnMut(f64) -> f64, end: f64, breaks: &[f64]) 
         (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
         (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
     ];
-    const PARTS: usize = 16;
     let mut ends = vec![0.0];
     ends.extend(breaks.iter().copied().filter(|t| *t > 0.0 && *t < end));
     ends.push(end);
     ends.sort_by(f64::total_cmp);
     let mut sum = 0.0;
     for pair in ends.windows(2) {
-        let half = 0.5 * (pair[1] - pair[0]) / PARTS as f64;
-        for part in 0..PARTS {
+        let half = 0.5 * (pair[1] - pair[0]) / parts as f64;
+        for part in 0..parts {
             let centre = pair[0] + half * (2 * part + 1) as f64;
             for (x, weight) in POINTS {
                 sum += half * weight * (function(centre - half * x) + function(centre + half * x));

@@ -14,18 +14,6 @@ use stickslip::law::FrictionContact;
 use stickslip::model::{Axis, System};
 use stickslip::structure::Structure;
 
-/// Steps in which the constant load grows, and steps in which the damper then comes to rest.
-const LOAD_STEPS: usize = 20_000;
-/// Length of these steps, in periods of a blade.
-const LOAD_STEP: f64 = 1e-3;
-/// Tolerance for the damper in tolerances of the blades. The contacts do not damp the ringing
-/// of the damper.
-const LOOSER: f64 = 300.0;
-/// Instants of a period at which slip limits are checked.
-const INSTANTS: usize = 256;
-/// Periods between two compared amplitudes.
-const WINDOW: usize = 40;
-
 /// Settings of the integration.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
@@ -310,15 +298,19 @@ impl LooseDamper {
     /// Returns displacements and friction forces in static equilibrium. The constant load grows
     /// slowly, and every motion is critically damped.
     fn static_equilibrium(&self) -> Option<(DVector<f64>, [f64; 2])> {
+        // Steps in which the constant load grows, and steps in which the damper then comes to
+        // rest.
+        let load_steps: usize = 20_000;
         let n = self.load.len();
         let [m, _, k] = &self.matrices;
         let held = self.stuck_stiffness();
         let damping = |i: usize| 2.0 * (m[(i, i)] * if i < self.blades { k[(i, i)] } else { held[(i, i)] }).sqrt();
         let damping = DMatrix::from_diagonal(&DVector::from_fn(n, |i, _| damping(i)));
         let rate = (k[(0, 0)] / m[(0, 0)]).sqrt();
-        let mut motion = Motion::new(self, &damping, LOAD_STEP * TAU / rate)?;
-        for step in 1..=2 * LOAD_STEPS {
-            motion.advance(&self.load * (step as f64 / LOAD_STEPS as f64).min(1.0))?;
+        // Length of these steps, in periods of a blade.
+        let mut motion = Motion::new(self, &damping, 1e-3 * TAU / rate)?;
+        for step in 1..=2 * load_steps {
+            motion.advance(&self.load * (step as f64 / load_steps as f64).min(1.0))?;
         }
         Some((motion.x, motion.friction))
     }
@@ -329,6 +321,8 @@ impl LooseDamper {
     /// Returns `None` if no constant friction force keeps both contacts within their slip limits
     /// at every instant.
     pub fn stuck(&self, omega: f64) -> Option<Vec<f64>> {
+        // Instants of a period at which slip limits are checked.
+        let instants: usize = 256;
         let [m, c, _] = &self.matrices;
         let dynamic = (self.stuck_stiffness() - m * (omega * omega)).map(|re| Complex64::new(re, 0.0))
             + c.map(|im| Complex64::new(0.0, omega * im));
@@ -337,8 +331,8 @@ impl LooseDamper {
         let sticks = self.faces.iter().zip(self.along(&still)).all(|(face, [_, depth])| {
             let force = |axis: usize| face[axis].map(|w| Complex64::new(w, 0.0)).dot(&x) * self.stiffness[axis];
             let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-            for instant in 0..INSTANTS {
-                let turn = Complex64::cis(TAU * instant as f64 / INSTANTS as f64);
+            for instant in 0..instants {
+                let turn = Complex64::cis(TAU * instant as f64 / instants as f64);
                 let [friction, normal] = [0, 1].map(|axis| (force(axis) * turn).re);
                 let limit = self.friction * (self.stiffness[1] * depth + normal);
                 low = low.max(-limit - friction);
@@ -354,6 +348,8 @@ impl LooseDamper {
     ///
     /// The excitation grows slowly. Returns `None` if the motion does not settle.
     pub fn settled(&self, omega: f64, course: Settings) -> Option<Vec<f64>> {
+        // Periods between two compared amplitudes.
+        let window = 40;
         let Settings { steps, growth, periods, settled } = course;
         let n = self.load.len();
         let mut motion = Motion::new(self, &self.matrices[1], TAU / (omega * steps as f64))?;
@@ -371,7 +367,7 @@ impl LooseDamper {
                     *range = (range.0.min(*x), range.1.max(*x));
                 }
             }
-            if (count + 1) % WINDOW == 0 || count + 1 == periods {
+            if (count + 1) % window == 0 || count + 1 == periods {
                 let now: Vec<f64> = ranges.iter().map(|(low, high)| 0.5 * (high - low)).collect();
                 let size = now.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
                 if let Some(before) = &before {
@@ -382,14 +378,16 @@ impl LooseDamper {
                         let ends = pairs.flat_map(|(a, b): (_, &(f64, f64))| [a.0 - b.0, a.1 - b.1]);
                         ends.map(|change: f64| change.abs() / size).fold(0.0, f64::max)
                     };
-                    let settles = change(self.blades) <= settled && change(n) <= LOOSER * settled;
-                    if settles && count > growth + 2 * WINDOW {
+                    // Tolerance for the damper in tolerances of the blades. The contacts do not
+                    // damp the ringing of the damper.
+                    let settles = change(self.blades) <= settled && change(n) <= 300.0 * settled;
+                    if settles && count > growth + 2 * window {
                         return Some(now);
                     }
                 }
                 before = Some(ranges.clone());
             }
-            if (count + 1) % WINDOW == WINDOW - 1 {
+            if (count + 1) % window == window - 1 {
                 // the last period before the amplitudes are compared
                 ranges.fill((f64::INFINITY, f64::NEG_INFINITY));
             }

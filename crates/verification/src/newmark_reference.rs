@@ -45,25 +45,12 @@ pub struct Reference<'a> {
     pub unsolved_steps: usize,
 }
 
-/// Velocity over which a law with only a resolvent is smoothed: a fraction of the velocity of
-/// the motion, times the steps per period. The steps can resolve it.
-const NARROW: f64 = 0.5;
-
 /// Returns a displacement of the size that the loads cause, m.
 fn travel(system: &System, omega: f64) -> f64 {
     let structure = system.structure();
     let hold = structure.stiffness().diagonal().max().max(omega * omega * structure.mass().diagonal().max());
     system.excitation(omega).iter().map(|(_, f)| f.norm()).sum::<f64>() / hold
 }
-
-/// Stiffness of the spring in series with a rigid slider, in masses over the square of a step.
-const RIGID: f64 = 100.0;
-/// Newton iterations of a step.
-const ITERATIONS: usize = 40;
-/// Residual, relative to the forces, at which a step is solved.
-const SOLVED: f64 = 1e-9;
-/// Relative increment of the differences.
-const INCREMENT: f64 = 1e-6;
 
 impl<'a> Reference<'a> {
     /// Starts from displacements and velocities, with `steps` steps per excitation period and
@@ -74,7 +61,9 @@ impl<'a> Reference<'a> {
             if law.step().is_none() && law.rate().is_none() && law.ideal_elements().is_none() {
                 // a set-valued law that is not a sum of sliders: smooth it over a velocity far
                 // below that of the motion
-                law = law.regularised(NARROW / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
+                // Velocity over which a law with only a resolvent is smoothed: a fraction of the
+                // velocity of the motion, times the steps per period. The steps can resolve it.
+                law = law.regularised(0.5 / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
             let pieces = if law.step().is_none() && law.rate().is_none() { law.ideal_elements() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));
@@ -166,9 +155,12 @@ impl<'a> Reference<'a> {
         let load = self.load(time);
         let scale = load.amax().max((m * &self.a).amax()).max((k * &self.x).amax()).max(f64::MIN_POSITIVE);
         let mut a = self.a.clone();
-        let stiff = RIGID * m.diagonal().max() / (h * h);
+        // Stiffness of the spring in series with a rigid slider, in masses over the square of a
+        // step.
+        let stiff = 100.0 * m.diagonal().max() / (h * h);
         let mut solved = false;
-        for _ in 0..ITERATIONS {
+        // Newton iterations of a step.
+        for _ in 0..40 {
             let x = &self.x + &self.v * h + (&self.a + &a) * (0.25 * h * h);
             let v = &self.v + (&self.a + &a) * (0.5 * h);
             let mut residual = m * &a + c * &v + k * &x - &load;
@@ -182,7 +174,8 @@ impl<'a> Reference<'a> {
                 }
                 for (q, other) in axes.iter().enumerate() {
                     // the final acceleration changes final velocity and displacement together
-                    let by = INCREMENT * (rate[q].abs() + (self.omega * u[q]).abs()).max(1e-9);
+                    // Relative increment of the differences.
+                    let by = 1e-6 * (rate[q].abs() + (self.omega * u[q]).abs()).max(1e-9);
                     let side = |sign: f64| {
                         let (mut moved, mut faster) = (u, rate);
                         moved[q] += sign * by * 0.5 * h;
@@ -198,7 +191,8 @@ impl<'a> Reference<'a> {
                     }
                 }
             }
-            if residual.amax() <= SOLVED * scale {
+            // Residual, relative to the forces, at which a step is solved.
+            if residual.amax() <= 1e-9 * scale {
                 solved = true;
                 break;
             }

@@ -15,7 +15,8 @@ use std::sync::Arc;
 /// ```
 /// use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 /// // three equal masses between walls, on four equal springs: ω² = 2 - √2, 2, 2 + √2
-/// let k = (0..3).flat_map(|i: usize| (0..3).map(move |l| (i, l, [2.0, -1.0, 0.0][i.abs_diff(l)])));
+/// let k =
+///     (0..3).flat_map(|i: usize| (0..3).map(move |l| (i, l, [2.0, -1.0, 0.0][i.abs_diff(l)])));
 /// let k = SparseMatrix::from_triplets(3, k).unwrap();
 /// let m = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0))).unwrap();
 /// let analysis = SymbolicAnalysis::new(&[&k, &m]);

@@ -18,10 +18,14 @@ impl LdlFactor {
     /// # Example
     /// ```
     /// use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
-    /// let springs = SparseMatrix::from_triplets(2, [(0, 0, 3.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)]).unwrap();
+    /// let springs =
+    ///     SparseMatrix::from_triplets(2, [(0, 0, 3.0), (0, 1, -1.0), (1, 0, -1.0), (1, 1, 1.0)])
+    ///         .unwrap();
     /// let factor = SymbolicAnalysis::new(&[&springs]).factor(&[(1.0, &springs)]).unwrap();
     /// let compliance = factor.compliance(&[vec![(1, 1.0)], vec![(0, 1.0), (1, -1.0)]]);
-    /// assert!((compliance[(0, 0)] - 1.5).abs() < 1e-15 && (compliance[(0, 1)] + 1.0).abs() < 1e-15);
+    /// assert!(
+    ///     (compliance[(0, 0)] - 1.5).abs() < 1e-15 && (compliance[(0, 1)] + 1.0).abs() < 1e-15
+    /// );
     /// ```
     pub fn compliance(&self, forces: &[Vec<(usize, f64)>]) -> DMatrix<f64> {
         let k = forces.len();

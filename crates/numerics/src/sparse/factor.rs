@@ -14,16 +14,6 @@ use faer::{Conj, MatMut, MatRef, Par, Side, Spec};
 use num_complex::Complex64;
 use std::sync::Arc;
 
-/// A pivot of a real factor below this fraction of the largest entry of its row
-/// is the rounding of entries that cancelled.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Largest error of a test solution, relative to matrix times solution, at which a factor
-/// without exchanges between supernodes is accurate; 1e-15 is usual.
-const ACCURATE: f64 = 1e-12;
-/// Addition to the diagonal of a singular matrix, relative to its largest
-/// entry, with which its null vector is computed.
-const DIAGONAL_SHIFT: f64 = 1e-9;
-
 /// Error: the matrix is singular to rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -92,7 +82,9 @@ impl LdlFactor {
         factor.ldl.pivots(symbolic, |row, pivot| {
             negative += usize::from(pivot < 0.0);
             // NaN is not a valid pivot.
-            if !(pivot.abs() > ROUNDING * largest[row] && pivot.is_finite()) && singular_row.is_none() {
+            // A pivot of a real factor below this fraction of the largest entry of its row is
+            // the rounding of entries that cancelled.
+            if !(pivot.abs() > (64.0 * f64::EPSILON) * largest[row] && pivot.is_finite()) && singular_row.is_none() {
                 singular_row = Some(row);
             }
         });
@@ -195,6 +187,9 @@ impl ComplexFactor {
     }
 
     pub(super) fn new(pattern: &Arc<Pattern>, values: Vec<Complex64>) -> Result<Self, Singular> {
+        // Largest error of a test solution, relative to matrix times solution, at which a factor
+        // without exchanges between supernodes is accurate; 1e-15 is usual.
+        let accurate = 1e-12;
         let make = |kind| ComplexFactor { pattern: pattern.clone(), kind };
         if pattern.n == 0 {
             return Ok(make(ComplexKind::Empty));
@@ -202,12 +197,12 @@ impl ComplexFactor {
         if pattern.is_symmetric(&values) {
             let factor =
                 make(ComplexKind::Symmetric(LdlValues::new(pattern.complex(), &pattern.doubled(&values), vec![])));
-            if factor.error(&values) <= ACCURATE {
+            if factor.error(&values) <= accurate {
                 return Ok(factor);
             }
         }
         let factor = make(ComplexKind::Exchanged(factor_with_exchanges(pattern, &values)));
-        if factor.error(&values) <= ACCURATE {
+        if factor.error(&values) <= accurate {
             return Ok(factor);
         }
         Err(Singular { row: factor.unsupported_row(values) })
@@ -277,7 +272,9 @@ impl ComplexFactor {
         let largest = values.iter().fold(0.0f64, |m, v| m.max(v.norm()));
         for column in 0..pattern.n {
             for at in pattern.column(column).filter(|at| pattern.rows[*at] as usize == column) {
-                values[at] += Complex64::new(1.0, 1.0) * (DIAGONAL_SHIFT * largest.max(f64::MIN_POSITIVE));
+                // Addition to the diagonal of a singular matrix, relative to its largest entry,
+                // with which its null vector is computed.
+                values[at] += Complex64::new(1.0, 1.0) * (1e-9 * largest.max(f64::MIN_POSITIVE));
             }
         }
         let shifted = ComplexFactor {

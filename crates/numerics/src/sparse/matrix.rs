@@ -15,7 +15,11 @@ const MAX_SIZE: usize = i32::MAX as usize;
 /// ```
 /// use stickslip_numerics::sparse::SparseMatrix;
 /// // a spring between two masses, as its contributions to either mass
-/// let k = SparseMatrix::from_triplets(2, [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)]).unwrap();
+/// let k = SparseMatrix::from_triplets(
+///     2,
+///     [(0, 0, 5.0), (1, 1, 5.0), (0, 1, -5.0), (1, 0, -5.0), (0, 0, 1.0)],
+/// )
+/// .unwrap();
 /// assert_eq!((k.get(0, 0), k.get(0, 1), k.entries().count()), (6.0, -5.0, 4));
 /// assert_eq!(k.multiply(&[1.0, 1.0]), [1.0, 0.0]);
 /// assert!(k.asymmetry(0.0).is_none());

@@ -67,7 +67,8 @@ impl PyLaw {
     /// and 0.9 ``state_scale``.
     ///
     /// >>> import stickslip
-    /// >>> law = stickslip.rate_law(lambda u, v, z: 1e9 * u**3, derivatives=lambda u, v, z: [[2e9 * u**2, 0 * v]])
+    /// >>> slopes = lambda u, v, z: [[2e9 * u**2, 0 * v]]
+    /// >>> law = stickslip.rate_law(lambda u, v, z: 1e9 * u**3, derivatives=slopes)
     /// >>> law.check_derivatives()  # doctest: +ELLIPSIS
     /// Traceback (most recent call last):
     ///     ...

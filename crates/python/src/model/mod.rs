@@ -93,10 +93,6 @@ fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Sol
     Ok(unsafe { std::mem::transmute::<Box<dyn Solver + Send + '_>, Box<dyn Solver + Send + 'static>>(solver) })
 }
 
-/// Largest number of degrees of freedom for which all natural frequencies are computed: one
-/// second.
-const MOST_SURVEYED: usize = 600;
-
 impl PyModel {
     /// Wraps a model.
     pub fn from_model(model: Model) -> Self {
@@ -461,7 +457,8 @@ impl PyModel {
     /// >>> sector = stickslip.Model()
     /// >>> sector.mass("blade", "300 g")
     /// >>> sector.spring("blade", "ground", stiffness="150 N/mm", damping="0.3 kg/s")
-    /// >>> sector.joint("shroud", "blade", "next.blade", stickslip.law("jenkins", stiffness="10 N/mm", limit="3 N"))
+    /// >>> law = stickslip.law("jenkins", stiffness="10 N/mm", limit="3 N")
+    /// >>> sector.joint("shroud", "blade", "next.blade", law)
     /// >>> sector.force("blade", "1 N", engine_order=4)
     /// >>> ring = sector.disk(24)
     /// >>> orbit = ring.orbit("115 Hz")
@@ -559,7 +556,9 @@ impl PyModel {
         out.set_item("places", request.system.places())?;
         out.set_item("joints", self.joints())?;
         out.set_item("method", choice.to_string())?;
-        if request.system.dofs() <= MOST_SURVEYED {
+        // Largest number of degrees of freedom for which all natural frequencies are computed:
+        // one second.
+        if request.system.dofs() <= 600 {
             let survey = run_here(py, || self.model.survey())?.map_err(|cause| model_error(py, &cause, &self.model))?;
             let hertz = |modes: &stickslip::model::LinearModes| {
                 modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>()

@@ -117,10 +117,11 @@ impl PyOrbit {
 
     /// Error measures of the orbit.
     ///
-    /// ``residual``, ``energy_gap``, ``truncation`` and ``return_defect`` are dimensionless,
-    /// and ``None`` if the method does not compute them. The other keys are ``status``,
-    /// ``found_by`` (the algorithm), ``iterations``, ``switches``, and two lists of joints. ``stuck``: permanently stuck
-    /// joints. ``history``: joints whose mean force depends on the history of the motion.
+    /// ``residual``, ``energy_gap``, ``truncation`` and ``return_defect`` are dimensionless, and
+    /// ``None`` if the method does not compute them. The other keys are ``status``, ``found_by``
+    /// (the algorithm), ``iterations``, ``switches``, and two lists of joints. ``stuck``:
+    /// permanently stuck joints. ``history``: joints whose mean force depends on the history of
+    /// the motion.
     #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = &self.orbit.evidence;
@@ -274,15 +275,14 @@ fn rows<'py>(py: Python<'py>, values: Vec<f64>, rows: usize, columns: usize) -> 
     PyArray1::from_vec(py, values).reshape([rows, columns])
 }
 
-/// Maximum number of times of a sampled motion: a few hundred megabytes.
-const MOST_INSTANTS: usize = 10_000_000;
-
 /// Checks a number of times.
 pub fn instants(py: Python<'_>, points: usize) -> PyResult<usize> {
-    if (1..=MOST_INSTANTS).contains(&points) {
+    // Maximum number of times of a sampled motion: a few hundred megabytes.
+    let most_instants: usize = 10_000_000;
+    if (1..=most_instants).contains(&points) {
         return Ok(points);
     }
-    Err(error::model(py, format!("`points` must be a whole number from 1 to {MOST_INSTANTS}, found {points}")))
+    Err(error::model(py, format!("`points` must be a whole number from 1 to {most_instants}, found {points}")))
 }
 
 impl PyOrbit {

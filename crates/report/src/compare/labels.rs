@@ -12,10 +12,6 @@ pub(super) fn folder_name(folder: &Path) -> String {
     whole.file_name().map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().trim_matches('.').to_owned())
 }
 
-/// Maximum number of parameters in a label. Runs that differ in more have folder names as
-/// labels.
-const MOST_PARAMETERS: usize = 3;
-
 /// Returns a label for each run: differing parameters, methods and options, otherwise the
 /// folder.
 pub(super) fn labels(runs: &[Stored]) -> Vec<String> {
@@ -38,7 +34,7 @@ pub(super) fn labels(runs: &[Stored]) -> Vec<String> {
 
 /// Returns the parameters that differ between runs, without varied ones, for each run.
 ///
-/// The lists are empty if more than [`MOST_PARAMETERS`] differ.
+/// The lists are empty if more than three differ.
 fn parameters(cases: &[&Value]) -> Vec<Vec<String>> {
     let mut parts: Vec<Vec<String>> = vec![Vec::new(); cases.len()];
     let mut known = keys(cases, |case| &case["parameters"]);
@@ -46,7 +42,9 @@ fn parameters(cases: &[&Value]) -> Vec<Vec<String>> {
         known.remove(&varied);
     }
     let reads = |case: &Value, key: &str| case["parameters"][key]["reads"].as_str().map(str::to_owned);
-    if add_differing(&mut parts, cases, &known, reads) > MOST_PARAMETERS {
+    // Maximum number of parameters in a label. Runs that differ in more have folder names as
+    // labels.
+    if add_differing(&mut parts, cases, &known, reads) > 3 {
         parts.iter_mut().for_each(Vec::clear);
     }
     parts

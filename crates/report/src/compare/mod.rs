@@ -132,14 +132,13 @@ pub fn write(comparison: &Dataset, out: &Path, outputs: &Outputs) -> Result<Vec<
     }
 }
 
-/// Maximum number of run names in the name of a comparison. Further runs are counted.
-const MOST_NAMES: usize = 2;
-
 /// Joins the names of the folders.
 fn name(runs: &[Stored]) -> String {
-    let mut names: Vec<String> = runs.iter().take(MOST_NAMES).map(|run| folder_name(&run.folder)).collect();
-    if runs.len() > MOST_NAMES {
-        names.push(format!("{} more", runs.len() - MOST_NAMES));
+    // Maximum number of run names in the name of a comparison. Further runs are counted.
+    let most_names = 2;
+    let mut names: Vec<String> = runs.iter().take(most_names).map(|run| folder_name(&run.folder)).collect();
+    if runs.len() > most_names {
+        names.push(format!("{} more", runs.len() - most_names));
     }
     names.join("+")
 }

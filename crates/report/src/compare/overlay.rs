@@ -5,8 +5,6 @@ use stickslip_study::units;
 
 /// Line styles of successive runs: a dashed curve does not hide a curve below it.
 const STYLES: [Style; 3] = [Style::Solid, Style::Dashed, Style::Dotted];
-/// Number of colours of the palette.
-const COLOURS: usize = crate::figure::colour::PALETTE.len();
 
 /// Combines figures. Panels with the same title and quantities become one.
 ///
@@ -118,6 +116,8 @@ impl OverlaidRun<'_> {
     /// A figure with one curve name has one colour per run. Runs beyond the number of line
     /// styles also have other colours. Marks have the colour of their curve.
     fn colour(&self, series: &Series, panel: &Panel) -> usize {
+        // Number of colours of the palette.
+        let colours = crate::figure::colour::PALETTE.len();
         let owner = if is_curve(series) {
             Some(series)
         } else {
@@ -125,7 +125,7 @@ impl OverlaidRun<'_> {
             panel.series.iter().find(same)
         };
         let place = owner.and_then(|owner| self.names.iter().position(|name| *name == owner.label)).unwrap_or(0);
-        let shift = if self.names.len().is_multiple_of(COLOURS) { COLOURS / 2 } else { self.names.len() };
+        let shift = if self.names.len().is_multiple_of(colours) { colours / 2 } else { self.names.len() };
         let again = if self.names.len() > 1 { self.index / STYLES.len() } else { self.index };
         place + again * shift
     }
@@ -148,12 +148,10 @@ impl OverlaidRun<'_> {
     }
 }
 
-/// Relative difference up to which two references count as one line.
-const ONE_LINE: f64 = 1e-6;
-
 /// Returns `true` if two references look the same.
 fn is_same_line(a: &Series, b: &Series) -> bool {
-    let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= ONE_LINE * a.abs().max(b.abs());
+    // Relative difference up to which two references count as one line.
+    let near = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= 1e-6 * a.abs().max(b.abs());
     let all = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(near);
     let look = |s: &Series| (s.emphasis, s.style, s.colour);
     look(a) == look(b) && all(&a.x, &b.x) && all(&a.y, &b.y)

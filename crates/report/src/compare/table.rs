@@ -57,14 +57,12 @@ fn shown_differences(table: &mut Table) -> Vec<String> {
     names
 }
 
-/// Digits of abscissa and parameter values; the table file has all digits.
-const PLACE_DIGITS: usize = 7;
-
 /// Rounds the numbers in a text.
 fn rounded(text: &str) -> String {
     let word = |word: &str| match word.trim_end_matches(',').parse::<f64>() {
         Ok(value) => {
-            let short: f64 = format!("{value:.*e}", PLACE_DIGITS - 1).parse().unwrap_or(value);
+            // Seven digits of abscissa and parameter values; the table file has all digits.
+            let short: f64 = format!("{value:.*e}", 6).parse().unwrap_or(value);
             let comma = if word.ends_with(',') { "," } else { "" };
             format!("{short}{comma}")
         }

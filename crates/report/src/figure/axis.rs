@@ -12,14 +12,8 @@ pub(crate) struct AxisRange {
 
 /// Larger values are drawn at the edge, so that the difference of two values stays finite.
 const LARGEST: f64 = 1e307;
-/// A range narrower than this, relative to its values, is drawn as a constant. Tick labels
-/// could not distinguish its ends.
-const NARROWEST: f64 = 1e-12;
 /// Margin around the data, relative to the range.
 pub(crate) const MARGIN: f64 = 0.05;
-/// Maximum length of an automatic logarithmic axis, in decades below the largest value. Smaller
-/// values are rounding errors.
-const DECADES: f64 = 16.0;
 
 impl AxisRange {
     /// Returns the default range of an axis without data.
@@ -53,7 +47,9 @@ impl AxisRange {
         )?;
         Some(match scale {
             Scale::Linear => range,
-            Scale::Log => AxisRange { from: range.from.max(range.to * power_of_ten(-DECADES as i32)), ..range },
+            // Maximum length of an automatic logarithmic axis, in decades below the largest
+            // value. Smaller values are rounding errors.
+            Scale::Log => AxisRange { from: range.from.max(range.to * power_of_ten(-16)), ..range },
         })
     }
 
@@ -98,8 +94,11 @@ impl AxisRange {
 
     /// Extends both ends by `margin` times the span. A constant gets a range around it.
     pub(crate) fn widened(self, margin: f64) -> AxisRange {
+        // A range narrower than this, relative to its values, is drawn as a constant. Tick
+        // labels could not distinguish its ends.
+        let narrowest = 1e-12;
         if self.scale == Scale::Log {
-            let pad = if self.span() <= NARROWEST { 0.5 } else { margin * self.span() };
+            let pad = if self.span() <= narrowest { 0.5 } else { margin * self.span() };
             let factor = exp10(pad);
             let least = f64::MIN_POSITIVE;
             return AxisRange {
@@ -110,7 +109,7 @@ impl AxisRange {
         }
         let pad = match self.size() {
             size if size < 1.0 / LARGEST => 1.0,
-            size if self.span() <= NARROWEST * size => 0.1 * size,
+            size if self.span() <= narrowest * size => 0.1 * size,
             _ => margin * self.span(),
         };
         AxisRange { from: self.from - pad, to: self.to + pad, ..self }
@@ -173,16 +172,12 @@ pub(crate) struct Ticks {
     pub power: i32,
 }
 
-/// A logarithmic axis with fewer decades has the ticks of a linear axis, because it may contain
-/// no power of ten.
-const MIN_LOG_DECADES: f64 = 0.7;
-/// Up to this number of decades, minor ticks are at 2 to 9 times each power of ten.
-const MAX_FINE_DECADES: f64 = 9.0;
-
 /// Returns about `count` ticks at round values inside the range.
 pub(crate) fn ticks(range: AxisRange, count: f64) -> Ticks {
     match range.scale {
-        Scale::Log if range.span() >= MIN_LOG_DECADES => logarithmic(range, count),
+        // A logarithmic axis with fewer decades has the ticks of a linear axis, because it may
+        // contain no power of ten.
+        Scale::Log if range.span() >= 0.7 => logarithmic(range, count),
         _ => linear(range, count),
     }
 }
@@ -207,14 +202,12 @@ fn whole(range: AxisRange, count: f64) -> Ticks {
     Ticks { positions: at, labels, minor: vec![], power: 0 }
 }
 
-/// Number of names per numeric tick: names may stand closer together.
-const NAMES: f64 = 2.0;
-
 /// Shows all names, or every second, fifth, tenth and so on.
 fn named(names: &[String], range: AxisRange, count: f64) -> Ticks {
     let inside: Vec<usize> = (0..names.len()).filter(|i| range.contains(*i as f64)).collect();
     let steps = (0..6).flat_map(|power| [1, 2, 5].map(|digit| digit * 10usize.pow(power)));
-    let fits = |step: &usize| inside.len().div_ceil(*step) as f64 <= NAMES * count;
+    // Number of names per numeric tick: names may stand closer together.
+    let fits = |step: &usize| inside.len().div_ceil(*step) as f64 <= 2.0 * count;
     let step = steps.into_iter().find(fits).unwrap_or(usize::MAX);
     let shown: Vec<usize> = inside.into_iter().filter(|i| i.is_multiple_of(step)).collect();
     let labels = shown.iter().map(|i| names[*i].clone()).collect();
@@ -252,6 +245,8 @@ fn linear(range: AxisRange, count: f64) -> Ticks {
 /// Ticks are at 1, 2 and 5 times the powers of ten, at 1 and 3 times, at the powers, or at
 /// every n-th power.
 fn logarithmic(range: AxisRange, count: f64) -> Ticks {
+    // Up to this number of decades, minor ticks are at 2 to 9 times each power of ten.
+    let max_fine_decades = 9.0;
     let decades = range.span();
     let (first, last) = (log10(range.from).floor() as i32, log10(range.to).ceil() as i32);
     let inside = |v: &f64| *v >= range.from * (1.0 - 1e-9) && *v <= range.to * (1.0 + 1e-9) && *v > 0.0;
@@ -266,8 +261,8 @@ fn logarithmic(range: AxisRange, count: f64) -> Ticks {
         .find(|at| at.len() as f64 <= count + 1.0)
         .unwrap_or_else(|| every((decades / count).ceil() as i32, &[1.0]));
     let minor = match decades {
-        d if d <= MAX_FINE_DECADES => every(1, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
-        d if d <= 10.0 * MAX_FINE_DECADES => every(1, &[1.0]),
+        d if d <= max_fine_decades => every(1, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
+        d if d <= 10.0 * max_fine_decades => every(1, &[1.0]),
         _ => vec![],
     };
     let minor = minor.into_iter().filter(|m| !at.iter().any(|v| (v - m).abs() <= 1e-9 * m)).collect();

@@ -13,17 +13,15 @@ pub(crate) struct ClipRect {
     pub bottom: f64,
 }
 
-/// Tolerance of the rectangle in px, so that rounding does not remove a mark from the edge.
-const EDGE: f64 = 0.01;
 /// Flatness tolerance in px: 1/40 of the line width. A point this close to the line is removed.
 const FLATNESS: f64 = 0.04;
-/// A line with more points than this is first reduced column by column, because flattening is
-/// slow.
-const DENSE: usize = 4000;
 
 impl ClipRect {
     pub(crate) fn contains(&self, (x, y): Point) -> bool {
-        x >= self.left - EDGE && x <= self.right + EDGE && y >= self.top - EDGE && y <= self.bottom + EDGE
+        // Tolerance of the rectangle in px, so that rounding does not remove a mark from the
+        // edge.
+        let edge = 0.01;
+        x >= self.left - edge && x <= self.right + edge && y >= self.top - edge && y <= self.bottom + edge
     }
 
     /// Returns the pieces of a line inside the rectangle.
@@ -103,7 +101,9 @@ pub(crate) fn simplified(points: Vec<Point>) -> Vec<Point> {
 
 /// Keeps the first, last, highest and lowest point of a dense line in every quarter of a pixel.
 fn thinned(points: Vec<Point>) -> Vec<Point> {
-    if points.len() <= DENSE {
+    // A line with more points than this is first reduced column by column, because flattening is
+    // slow.
+    if points.len() <= 4000 {
         return points;
     }
     let column = |p: &Point| (p.0 * 4.0).floor();

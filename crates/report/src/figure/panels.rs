@@ -40,13 +40,13 @@ pub(crate) fn points<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Ite
 }
 
 /// Returns `true` if a point can be drawn.
-pub(crate) fn drawable((x, y): (f64, f64)) -> bool {
+pub(crate) fn drawable(x: f64, y: f64) -> bool {
     x.is_finite() && y.is_finite()
 }
 
 /// Returns the points that can be drawn.
 pub(crate) fn drawn<'a>(panel: &Panel, series: &'a Series) -> impl Iterator<Item = (f64, f64)> + 'a {
-    points(panel, series).filter(|p| drawable(*p))
+    points(panel, series).filter(|p| drawable(p.0, p.1))
 }
 
 /// Returns the lower edge of a band or the foot of a bar at a point.
@@ -91,9 +91,6 @@ pub(crate) struct ColourScheme {
     pub bar: Option<(Axis, AxisRange)>,
 }
 
-/// Up to this number of values, the palette and the legend distinguish the series.
-const MAX_NAMED_VALUES: usize = 7;
-
 impl ColourScheme {
     pub(crate) fn of(figure: &Figure) -> ColourScheme {
         ColourScheme { bar: ColourScheme::bar(figure) }
@@ -116,7 +113,8 @@ impl ColourScheme {
         let axis = Axis { scale: if positive { axis.scale } else { Scale::Linear }, ..axis.clone() };
         let all = values.iter().chain(&shaded).copied();
         let range = AxisRange::fixed(&axis).or_else(|| AxisRange::around(all, axis.scale))?.widened(0.0);
-        (values.len() > MAX_NAMED_VALUES || !shaded.is_empty()).then_some((axis, range))
+        // Up to this number of values, the palette and the legend distinguish the series.
+        (values.len() > 7 || !shaded.is_empty()).then_some((axis, range))
     }
 
     /// Returns the value of a series as text if its colour shows it: `kt = 8 N/mm`.
@@ -150,12 +148,14 @@ pub(crate) struct StripeCell {
 /// Each point occupies the interval up to half the distance to the adjacent points. Adjacent
 /// points with the same colour share a cell.
 pub(crate) fn cells(series: &Series, x: AxisRange, scheme: &ColourScheme) -> Vec<StripeCell> {
+    // Number of colour steps; with this number the scale looks continuous.
+    let colour_steps = 100.0;
     let Some((_, range)) = &scheme.bar else { return Vec::new() };
     let count = series.x.len().min(series.shades.len());
     let edges = edges(&series.x[..count], x);
     let mut cells: Vec<StripeCell> = Vec::new();
     for (i, value) in series.shades[..count].iter().enumerate().filter(|(_, value)| value.is_finite()) {
-        let step = (range.fraction(*value).clamp(0.0, 1.0) * COLOUR_STEPS).round() / COLOUR_STEPS;
+        let step = (range.fraction(*value).clamp(0.0, 1.0) * colour_steps).round() / colour_steps;
         let colour = Colour::sequential(step);
         match cells.last_mut() {
             Some(cell) if cell.colour == colour && cell.to == edges[i] => cell.to = edges[i + 1],
@@ -164,9 +164,6 @@ pub(crate) fn cells(series: &Series, x: AxisRange, scheme: &ColourScheme) -> Vec
     }
     cells
 }
-
-/// Number of colour steps; with this number the scale looks continuous.
-const COLOUR_STEPS: f64 = 100.0;
 
 /// Returns the borders of the cells of ascending points.
 ///
@@ -264,21 +261,12 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<LegendEntry>, usize) {
     (entries, more)
 }
 
-/// Panels of one quantity share their range if each of them uses at least this part of it.
-const MIN_USED_FRACTION: f64 = 0.2;
-/// References extend the vertical range to at most this multiple of the results.
-///
-/// A resonance without friction would otherwise flatten the curves of interest.
-const REFERENCE_REACH: f64 = 2.0;
-
 /// Returns `true` if the number of results requires thin lines and small marks.
 pub(crate) fn crowded(panel: &Panel) -> bool {
     let results = panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal && s.style != Style::Missing);
-    results.count() > CROWDED_ABOVE
+    // A panel with more results than this is crowded.
+    results.count() > 40
 }
-
-/// A panel with more results than this is crowded.
-const CROWDED_ABOVE: usize = 40;
 
 /// Opacity of pale curves and of areas.
 pub(crate) const PALE: f64 = 0.4;
@@ -347,7 +335,7 @@ fn extent(panel: &Panel) -> Option<(AxisRange, AxisRange)> {
             let area = matches!(series.style, Style::Band | Style::Bars);
             points(panel, series)
                 .enumerate()
-                .filter(|(_, p)| drawable(*p))
+                .filter(|(_, p)| drawable(p.0, p.1))
                 .filter(move |(_, p)| inside(p))
                 .flat_map(move |(i, (_, y))| [Some(y), base(panel, series, i).filter(|_| area)].into_iter().flatten())
         })
@@ -362,7 +350,9 @@ fn extent(panel: &Panel) -> Option<(AxisRange, AxisRange)> {
     let references = AxisRange::around(values(true), panel.y.scale);
     let y = match (results, references) {
         (Some(results), Some(references)) if results.scale == Scale::Linear => {
-            let reach = REFERENCE_REACH * results.from.abs().max(results.to.abs());
+            // References extend the vertical range to at most this multiple of the results. A
+            // resonance without friction would otherwise flatten the curves of interest.
+            let reach = 2.0 * results.from.abs().max(results.to.abs());
             let cut = |v: f64| if reach > 0.0 { v.clamp(-reach, reach) } else { v };
             results.union(AxisRange { from: cut(references.from), to: cut(references.to), ..references })
         }
@@ -402,13 +392,11 @@ pub(crate) fn bar_slot(panel: &Panel, x: AxisRange) -> f64 {
         }
 }
 
-/// Distance between rows of crosses, and from the first row to the lower edge, relative to the
-/// panel height.
-const CROSSES: f64 = 0.03;
-
 /// Returns the vertical position of a row of crosses, relative to the panel height.
 pub(crate) fn row_of_crosses(series: &Series) -> f64 {
-    CROSSES * series.y.first().copied().unwrap_or(1.0)
+    // Distance between rows of crosses, and from the first row to the lower edge, relative to
+    // the panel height.
+    0.03 * series.y.first().copied().unwrap_or(1.0)
 }
 
 /// Returns `true` if x never decreases. Marks are always accepted.
@@ -440,7 +428,9 @@ fn shared(
             let Some(union) = members.iter().copied().reduce(AxisRange::union) else {
                 return AxisRange::unit(own.scale);
             };
-            let legible = || members.iter().all(|r| r.span() >= MIN_USED_FRACTION * union.span());
+            // Panels of one quantity share their range if each of them uses at least this part
+            // of it.
+            let legible = || members.iter().all(|r| r.span() >= 0.2 * union.span());
             match (&raw[i], figure.sharing) {
                 (None, _) | (_, Sharing::Always) => union,
                 (Some(_), Sharing::WhereLegible) if legible() => union,

@@ -21,9 +21,6 @@ pub const OUTPUT: Output = Output {
 
 const SINK: Sink = Sink { extension: "csv", begin };
 
-/// Number of rows that one thread converts to text at a time.
-const ROWS: usize = 1024;
-
 /// Returns a table as CSV (RFC 4180, line feed, header first).
 /// # Errors
 /// [`ReportError::Uneven`] if the columns differ in length.
@@ -43,9 +40,11 @@ fn begin<'a>(table: &Table, mut writer: Box<dyn Write + 'a>) -> Result<Box<dyn T
 
 impl TableWriter for CsvWriter<'_> {
     fn rows(&mut self, table: &Table) -> Result<(), ReportError> {
+        // Number of rows that one thread converts to text at a time.
+        let rows = 1024;
         check_equal_lengths(table)?;
         let stretches: Vec<Range<usize>> =
-            (0..table.rows()).step_by(ROWS).map(|from| from..(from + ROWS).min(table.rows())).collect();
+            (0..table.rows()).step_by(rows).map(|from| from..(from + rows).min(table.rows())).collect();
         let texts: Vec<Result<Vec<u8>, ReportError>> =
             stretches.into_par_iter().map(|rows| lines(table, |text| cells(table, rows, text))).collect();
         for text in texts {

@@ -33,8 +33,6 @@ const SINK: Sink = Sink { extension: "parquet", begin };
 
 /// Number of rows in a group; one column of a group has a megabyte.
 const ROWS_PER_GROUP: usize = 131_072;
-/// A dictionary is used if each value occurs at least this often on average.
-const MIN_REPETITIONS: usize = 4;
 const MAGIC: &[u8; 4] = b"PAR1";
 
 // Enumeration values of the format.
@@ -308,7 +306,8 @@ fn dictionary_encoded<T, K: Hash + Eq>(
             plain(value, &mut dictionary);
         }
         numbers.push(number);
-        if known.len() * MIN_REPETITIONS > values.len() {
+        // A dictionary is used if each value occurs at least this often on average.
+        if known.len() * 4 > values.len() {
             return None;
         }
     }

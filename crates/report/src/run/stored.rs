@@ -100,9 +100,6 @@ fn list_folders(inside: &[PathBuf]) -> String {
     }
 }
 
-/// Maximum number of subfolders with results that an error message names.
-const MOST_INSIDE: usize = 5;
-
 /// Reads the results in `folder`.
 ///
 /// # Errors
@@ -115,7 +112,8 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
             .map(|entries| entries.flatten().map(|entry| entry.path()).filter(|p| p.join(RECORD).is_file()).collect())
             .unwrap_or_default();
         inside.sort();
-        inside.truncate(MOST_INSIDE);
+        // Maximum number of subfolders with results that an error message names.
+        inside.truncate(5);
         return Err(StoredError::NoRecord { folder: folder.to_owned(), inside });
     }
     let wrong = |reason: String| StoredError::Record { path: path.clone(), reason };

@@ -21,21 +21,20 @@ pub struct Shard {
     total: usize,
 }
 
-/// Maximum number of shards of a study.
-const MAX_SHARDS: usize = 1_000_000;
-
 impl FromStr for Shard {
     type Err = String;
 
     /// Parses a shard such as `3/16`.
     fn from_str(text: &str) -> Result<Shard, String> {
+        // Maximum number of shards of a study.
+        let max_shards: usize = 1_000_000;
         let parts = text.split_once('/').and_then(|(number, total)| Some((number.parse().ok()?, total.parse().ok()?)));
         match parts {
-            Some((number, total)) if (1..=total).contains(&number) && total <= MAX_SHARDS => {
+            Some((number, total)) if (1..=total).contains(&number) && total <= max_shards => {
                 Ok(Shard { number, total })
             }
             _ => Err(format!(
-                "expected a shard such as 3/16 (number/total, at most {MAX_SHARDS} shards), found `{text}`"
+                "expected a shard such as 3/16 (number/total, at most {max_shards} shards), found `{text}`"
             )),
         }
     }
@@ -79,9 +78,6 @@ pub enum StartMode {
     /// Resumes an unfinished run. Starts at the first unit if there is none.
     Resume,
 }
-
-/// An unfinished run of at least this many seconds is discarded only on request.
-const LONG_RUN_SECONDS: f64 = 60.0;
 
 /// Reason why a run cannot start, or why it ends.
 #[derive(Debug, thiserror::Error)]
@@ -158,7 +154,8 @@ pub fn begin(
         }
         (Err(error), _) => return Err(error.into()),
     };
-    let long = journal.time() >= LONG_RUN_SECONDS;
+    // An unfinished run of at least this many seconds is discarded only on request.
+    let long = journal.time() >= 60.0;
     if start == StartMode::First {
         if long {
             let (done, range) = (journal.units(), &journal.head().range);

@@ -32,8 +32,6 @@ const NARROWEST: usize = 40;
 /// Columns that a wide table loses first. `record.json` and the table's file keep these error
 /// measures.
 const ERROR_COLUMNS: [&str; 4] = ["residual", "energy_gap", "iterations", "truncation"];
-/// Maximum number of printed notes. Only the number of further notes is printed.
-const NOTES: usize = 8;
 /// Headings and texts longer than this lose their middle in a wide table. All names that
 /// Stickslip defines are shorter.
 const MAX_NAME_LENGTH: usize = 28;
@@ -43,6 +41,8 @@ const FAILURES: usize = 5;
 impl Terminal {
     /// Returns the text with a final line feed. `files` are the paths of the written files.
     pub fn text(self, dataset: &Dataset, files: &[PathBuf]) -> String {
+        // Maximum number of printed notes. Only the number of further notes is printed.
+        let most_notes = 8;
         let mut out = String::new();
         for line in self.wrapped(&clean(&dataset.title), "") {
             let _ = writeln!(out, "{}", self.paint("1", &line));
@@ -85,12 +85,12 @@ impl Terminal {
         }
         // Warnings were already printed on standard error.
         let notes: Vec<&String> = dataset.notes.iter().filter(|note| !note.starts_with("warning")).collect();
-        for note in notes.iter().take(NOTES) {
+        for note in notes.iter().take(most_notes) {
             for line in self.wrapped(&format!("note: {}", clean(note)), "      ") {
                 let _ = writeln!(out, "{line}");
             }
         }
-        if let Some(more @ 1..) = notes.len().checked_sub(NOTES) {
+        if let Some(more @ 1..) = notes.len().checked_sub(most_notes) {
             let _ = writeln!(out, "note: {more} more note{}; all are in record.json", plural(more));
         }
         let failures = dataset.failures_by_reason();
@@ -245,14 +245,10 @@ fn rounded(value: f64) -> f64 {
 /// Formats one value of a column with its unit, rounded.
 pub(crate) fn quantity(name: &str, value: f64) -> String {
     let (_, unit, power, prefix) = unit_of(name, value.abs());
-    let number = engineering(&[value / 10f64.powi(power)], DIFFERENCE_DIGITS).remove(0);
+    // Digits of a difference.
+    let number = engineering(&[value / 10f64.powi(power)], 3).remove(0);
     format!("{number} {prefix}{unit}").trim_end().to_owned()
 }
-
-/// Digits of a quantity in the study's unit, as frequencies require.
-const WRITTEN_DIGITS: i32 = 7;
-/// Digits of a difference.
-const DIFFERENCE_DIGITS: i32 = 3;
 
 /// Returns heading and formatted cells of a column.
 fn column(name: &str, values: &CellValues, written: Option<&str>) -> (String, Vec<String>) {
@@ -264,7 +260,8 @@ fn column(name: &str, values: &CellValues, written: Option<&str>) -> (String, Ve
     };
     if let Some(unit) = written {
         let (quantity, ..) = unit_of(name, 0.0);
-        return (format!("{} ({unit})", quantity.replace('_', " ")), engineering(numbers, WRITTEN_DIGITS));
+        // Digits of a quantity in the study's unit, as frequencies require.
+        return (format!("{} ({unit})", quantity.replace('_', " ")), engineering(numbers, 7));
     }
     let largest = numbers.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()));
     let (quantity, unit, power, prefix) = unit_of(name, largest);

@@ -2,10 +2,6 @@
 
 use stickslip_study::dataset::{CellValues, Column, Table};
 
-/// Relative difference up to which the peaks of two sectors are equal: the accuracy of peak
-/// refinement.
-const EQUAL_PEAKS: f64 = 1e-4;
-
 /// A peak of a case.
 struct PeakRow {
     row: usize,
@@ -33,7 +29,9 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
         let first = shown.len();
         for row in order {
             let (frequency, amplitude) = (frequency[row], amplitude[row]);
-            let near = |a: f64, b: f64| (a - b).abs() <= EQUAL_PEAKS * a.abs();
+            // Relative difference up to which the peaks of two sectors are equal: the accuracy
+            // of peak refinement.
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * a.abs();
             let place = without_sector_number(&names[row]);
             let alike = |peak: &&mut PeakRow| {
                 place.as_ref() == Some(&peak.place)

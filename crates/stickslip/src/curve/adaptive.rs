@@ -25,9 +25,6 @@ pub struct AdaptiveCurve {
 
 /// Number of initial intervals.
 pub const INITIAL_INTERVALS: usize = 64;
-/// Number of bisections of an initial interval. The resulting width, 1/4096 of it, is below the
-/// width of any peak that the initial grid can indicate.
-const LEVELS: usize = 12;
 /// No interval is bisected beyond this number of points.
 pub const MAX_POINTS: usize = 20_000;
 
@@ -49,7 +46,13 @@ impl AdaptiveCurve {
     /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
     /// let range = (std::f64::consts::TAU * 110.0, std::f64::consts::TAU * 130.0);
     /// let curve = AdaptiveCurve { range, tolerance: 0.01 }
-    ///     .curve(&EventDriven, &system, &|orbit| vec![orbit.places[0].amplitude()], &|_| (), &|| false)
+    ///     .curve(
+    ///         &EventDriven,
+    ///         &system,
+    ///         &|orbit| vec![orbit.places[0].amplitude()],
+    ///         &|_| (),
+    ///         &|| false,
+    ///     )
     ///     .unwrap();
     /// // the resonance at 121.25 Hz is 0.2 Hz wide; a uniform grid takes 1000 points
     /// assert!(curve.len() < 200);
@@ -65,7 +68,8 @@ impl AdaptiveCurve {
         // If the laws allow several orbits at a frequency, a search without initial guess can
         // find another orbit than the branch of the previous points. All points are then solved
         // in sequence.
-        let chunk = if system.has_passive_joints() { CHUNK } else { MAX_POINTS };
+        // Points per solver.
+        let chunk = if system.has_passive_joints() { 16 } else { MAX_POINTS };
         let solve = |omegas: &[(f64, Option<&Seed>)]| -> Result<Vec<KeptPoint<R>>, MethodError> {
             // One solver per chunk, because its stored data save work. The chunks are identical
             // for any number of threads.
@@ -109,7 +113,9 @@ impl AdaptiveCurve {
                 .collect();
         let mut points = solve(&grid)?;
         let mut open: Vec<bool> = vec![true; points.len().saturating_sub(1)];
-        for _ in 0..LEVELS {
+        // Number of bisections of an initial interval. The resulting width, 1/4096 of it, is
+        // below the width of any peak that the initial grid can indicate.
+        for _ in 0..12 {
             if stop() || points.len() + open.iter().filter(|open| **open).count() > MAX_POINTS {
                 break;
             }
@@ -176,9 +182,6 @@ impl AdaptiveCurve {
         (joined, still)
     }
 }
-
-/// Points per solver.
-const CHUNK: usize = 16;
 
 #[cfg(test)]
 mod tests {

@@ -9,13 +9,6 @@ use crate::model::System;
 use crate::orbit::Orbit;
 use std::sync::atomic::AtomicBool;
 
-/// Two orbits differ if their amplitudes differ by more than `DIFFERENCE` times the largest
-/// amplitude, and by more than `ERRORS` times the estimated error.
-const DIFFERENCE: f64 = 1e-2;
-const ERRORS: f64 = 3.0;
-/// Amplitudes below this fraction of a mean are rounding.
-const ROUNDING: f64 = 1e-10;
-
 /// The points of a curve, as the forward sweep found them.
 ///
 /// # Example
@@ -30,14 +23,19 @@ const ROUNDING: f64 = 1e-10;
 /// let system = Model {
 ///     masses: vec![Mass::new("m", 1.0)],
 ///     springs: vec![Spring { between: on_ground(), stiffness: 1e4, damping: 2.0 }],
-///     joints: vec![Joint { name: "j".into(), between: on_ground(), law: Arc::new(stickslip::law::Cubic { stiffness: -1e9 }) }],
+///     joints: vec![Joint {
+///         name: "j".into(),
+///         between: on_ground(),
+///         law: Arc::new(stickslip::law::Cubic { stiffness: -1e9 }),
+///     }],
 ///     forces: vec![Force { on: "m".into(), amplitude: 0.3, phase: 0.0, harmonic: 1 }],
 ///     ..Model::default()
 /// }
 /// .assemble()
 /// .unwrap();
 /// let method = HarmonicBalance::default();
-/// let (mut sweep, mut solver) = (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap());
+/// let (mut sweep, mut solver) =
+///     (BidirectionalSweep::for_system(&system).unwrap(), method.solver(&system).unwrap());
 /// let mut seed = None;
 /// for i in 0..41 {
 ///     let orbit = solver.orbit_near(88.0 + 0.4 * f64::from(i), seed.as_ref()).unwrap();
@@ -148,10 +146,13 @@ fn amplitude_ratio(point: &CurvePoint, orbit: &Orbit, held: f64) -> Option<f64> 
         return None;
     }
     let found = amplitudes(orbit);
-    let held = orbit.places.iter().map(|place| ROUNDING * place.mean.abs()).fold(held, f64::max);
+    // Amplitudes below this fraction of a mean are rounding.
+    let held = orbit.places.iter().map(|place| 1e-10 * place.mean.abs()).fold(held, f64::max);
     let largest = |values: &[f64]| values.iter().copied().fold(held.max(f64::MIN_POSITIVE), f64::max);
     let (here, there) = (largest(&point.values), largest(&found));
-    let enough = (DIFFERENCE.max(ERRORS * point.error) * here.max(there)).max(held);
+    // Two orbits differ if their amplitudes differ by more than a hundredth of the largest
+    // amplitude, and by more than three times the estimated error.
+    let enough = (1e-2f64.max(3.0 * point.error) * here.max(there)).max(held);
     let differs = point.values.iter().zip(&found).any(|(a, b)| (a - b).abs() > enough);
     differs.then(|| (there / here).clamp(f64::MIN_POSITIVE, f64::MAX))
 }

@@ -14,23 +14,14 @@ use crate::orbit::{Orbit, Seed};
 /// Largest difference between two consecutive orbits of a branch, relative to the largest
 /// amplitude. It applies to amplitudes and to first harmonics, which include the phase.
 const MAX_CHANGE: f64 = 0.2;
-/// A step below this fraction of the interval is not halved again: the branch ends or turns
-/// there.
-const MIN_STEP: f64 = 1.0 / 512.0;
-/// Maximum number of steps in an interval.
-const MAX_STEPS: usize = 80;
-/// Work limit of all steps in an interval, as a fraction of the work limit of a point. After it
-/// is exceeded, no interval is repeated in smaller steps.
-const WORK_LIMIT: f64 = 0.3;
-/// Largest number of degrees of freedom plus joint directions for branch following and the
-/// reverse sweep, which takes as much time as the curve.
-const MAX_SIZE: usize = 24;
 
 /// Tells whether curves of a system use branch following and the reverse sweep: the system is
 /// small, and several orbits may exist at a frequency.
 pub fn is_followed(system: &System) -> bool {
     let directions: usize = system.joints().iter().map(|joint| joint.law().directions()).sum();
-    system.dofs() + directions <= MAX_SIZE && !system.is_incrementally_stable()
+    // Largest number of degrees of freedom plus joint directions for branch following and the
+    // reverse sweep, which takes as much time as the curve.
+    system.dofs() + directions <= 24 && !system.is_incrementally_stable()
 }
 
 /// Returns a solver with branch following for systems that use it; otherwise the method's own
@@ -84,12 +75,15 @@ impl BranchFollower<'_> {
         let (from, omega, mut last) = (last.omega, request.omega, last.clone());
         let (mut at, mut step) = (0.0, 0.5);
         let mut beyond;
-        for _ in 0..MAX_STEPS {
+        // Maximum number of steps in an interval.
+        for _ in 0..80 {
             let share: f64 = at + step;
             let arrives = share >= 1.0;
             let target = if arrives { omega } else { from + share * (omega - from) };
             let estimate = if arrives { request.estimate } else { ErrorEstimate::Skipped };
             let found = self.solver.solve(&Request { omega: target, seed: Some(&last), estimate }, budget);
+            // Work limit of all steps in an interval, as a fraction of the work limit of a
+            // point. After it is exceeded, no interval is repeated in smaller steps.
             self.work_limit_reached =
                 budget.is_used_up() || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
             let next = found.ok().map(|orbit| (orbit.seed(), orbit));
@@ -100,7 +94,9 @@ impl BranchFollower<'_> {
                 None => (step, beyond) = (0.5 * step, target),
             }
             step = step.min(1.0 - at);
-            if step < MIN_STEP {
+            // A step below this fraction of the interval is not halved again: the branch ends or
+            // turns there.
+            if step < (1.0 / 512.0) {
                 self.end = Some(BranchEnd { last, beyond });
                 return None;
             }
@@ -118,7 +114,8 @@ impl Solver for BranchFollower<'_> {
             && !is_near(last, &orbit.seed())
             && self.end.as_ref().is_none_or(|end| !end.lies_between(last, request.omega))
         {
-            let mut steps = budget.part(WORK_LIMIT);
+            // no interval takes more, and none is repeated after one that did
+            let mut steps = budget.part(0.3);
             let followed = self.followed(request, last, &mut steps);
             budget.charge(steps.used());
             return followed.map_or(found, Ok);

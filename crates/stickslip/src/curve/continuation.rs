@@ -82,15 +82,6 @@ pub enum TraceError {
     Start(#[from] OrbitError),
 }
 
-/// Maxima below this fraction of the largest one are rounding, in a motion that a joint blocks.
-const ROUNDING: f64 = 1e-9;
-/// Relative width at which the search for a peak ends. The height of a smooth peak is then
-/// accurate to rounding, that of a kink to about this fraction.
-const PEAK_TOLERANCE: f64 = 1e-9;
-/// Two points at the same parameter are equal if their unknowns differ by less than this
-/// fraction.
-const EQUAL_POINTS: f64 = 1e-6;
-
 /// A point, with its unknowns and its parameter.
 type PathPoint = (TracePoint, (Vec<f64>, f64));
 
@@ -159,7 +150,9 @@ impl CurvePart {
     fn contains(&self, (x, value): &(Vec<f64>, f64)) -> bool {
         let distance = |other: &[f64]| x.iter().zip(other).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
         let size = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        self.points.iter().any(|(_, (other, at))| at == value && distance(other) <= EQUAL_POINTS * size)
+        // Two points at the same parameter are equal if their unknowns differ by less than this
+        // fraction.
+        self.points.iter().any(|(_, (other, at))| at == value && distance(other) <= 1e-6 * size)
     }
 }
 
@@ -222,7 +215,9 @@ impl BranchContinuation<'_> {
     fn with_peaks_and_turns(&self, equations: &mut BranchEquations<'_>, part: CurvePart, end: BranchEnd) -> Branch {
         let (points, arc): (Vec<TracePoint>, Vec<(Vec<f64>, f64)>) = part.points.into_iter().unzip();
         let heights: Vec<f64> = points.iter().map(|point| (self.quantity)(&point.orbit)).collect();
-        let rounding = ROUNDING * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
+        // Maxima below this fraction of the largest one are rounding, in a motion that a joint
+        // blocks.
+        let rounding = 1e-9 * heights.iter().fold(0.0f64, |largest, height| largest.max(height.abs()));
         let mut peaks = Vec::new();
         let mut turns = Vec::new();
         for i in 1..points.len().saturating_sub(1) {
@@ -249,7 +244,9 @@ impl BranchContinuation<'_> {
             let orbit = equations.orbit_near(&arc[1].0, value);
             orbit.map_or(f64::NEG_INFINITY, |orbit| (self.quantity)(&orbit))
         };
-        let close = |a: f64, b: f64| (b - a).abs() <= PEAK_TOLERANCE * (a.abs() + b.abs());
+        // Relative width at which the search for a peak ends. The height of a smooth peak is
+        // then accurate to rounding, that of a kink to about this fraction.
+        let close = |a: f64, b: f64| (b - a).abs() <= 1e-9 * (a.abs() + b.abs());
         let Ok(found) = golden_section((a, b), close, |value| Ok::<_, Infallible>(height(value)));
         if found.1 > best.1 { found } else { best }
     }

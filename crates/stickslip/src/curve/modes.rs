@@ -59,8 +59,18 @@ impl ModePoint {
     /// use num_complex::Complex64;
     /// use stickslip::curve::modes::ModePoint;
     /// let places = vec![Complex64::new(0.0, 1.0), Complex64::new(0.0, -2.0)];
-    /// let point = ModePoint { amplitude: 1.0, omega: 1.0, damping: 0.0, viscous: 0.0, places, amplitudes: vec![1.0, 2.0] };
-    /// assert_eq!(point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(), [std::f64::consts::PI, 0.0]);
+    /// let point = ModePoint {
+    ///     amplitude: 1.0,
+    ///     omega: 1.0,
+    ///     damping: 0.0,
+    ///     viscous: 0.0,
+    ///     places,
+    ///     amplitudes: vec![1.0, 2.0],
+    /// };
+    /// assert_eq!(
+    ///     point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(),
+    ///     [std::f64::consts::PI, 0.0]
+    /// );
     /// ```
     pub fn phases(&self) -> Vec<f64> {
         let leading =
@@ -104,9 +114,6 @@ pub struct ModeRequest {
     pub samples: usize,
 }
 
-/// Displacements of places below this fraction of a mode's largest coordinate are rounding.
-const PLACE_ROUNDING: f64 = 1e-12;
-
 /// Checks that a system can have nonlinear modes.
 ///
 /// # Errors
@@ -132,7 +139,8 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 /// use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
 /// // friction affects only the mode in which the blades move in antiphase
-/// let request = ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
+/// let request =
+///     ModeRequest { mode: 1, range: (1e-6, 1.0), points: 25, harmonics: 5, samples: 512 };
 /// let mode = nonlinear_mode(&system, request).unwrap();
 /// assert!(mode.ended.is_none());
 /// let stuck = ((105_103.0 + 2.0 * 1e4) / 0.182f64).sqrt();
@@ -181,16 +189,16 @@ impl ModeBranches {
         // A single mode has the same number at both ends. For a law with memory, large motions
         // are expensive, so the branch from small amplitudes is tried first.
         let rising = match equations.is_single_dof_with_memory() {
-            true => ModeCurve::from_small_amplitude(equations, request.mode, request.range),
+            true => ModeCurve::from_small_amplitude(equations, request.mode, request.range.0, request.range.1),
             false => None,
         };
         if rising.as_ref().is_some_and(|rising| rising.largest_amplitude() >= high) {
             return ModeBranches { falling: None, rising };
         }
-        let falling = ModeCurve::follow(equations, request.mode, request.range);
+        let falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
         let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
-        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, (low, end)) } else { None };
+        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, low, end) } else { None };
         ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
 
@@ -234,7 +242,9 @@ pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, Meth
     Ok(equations.linear_modes().get(index).and_then(|linear| {
         let shape = linear.shape.as_slice();
         let largest = size(&displacements(equations.at_places(shape)));
-        (largest > PLACE_ROUNDING * size(shape)).then(|| 1.0 / largest)
+        // Displacements of places below this fraction of a mode's largest coordinate are
+        // rounding.
+        (largest > 1e-12 * size(shape)).then(|| 1.0 / largest)
     }))
 }
 
@@ -245,7 +255,7 @@ pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, Meth
 /// See [`nonlinear_mode`].
 pub fn self_excited(system: &System, request: ModeRequest) -> Result<Vec<ModePoint>, MethodError> {
     let mut equations = equations(system, request.harmonics, request.samples)?;
-    let path = ModeCurve::follow(&mut equations, request.mode, request.range);
+    let path = ModeCurve::follow(&mut equations, request.mode, request.range.0, request.range.1);
     let mut orbits = Vec::new();
     for pair in path.states_within(&mut equations, request.range).windows(2) {
         let [(i, above, upper), (k, below, lower)] = pair else { continue };
@@ -474,7 +484,7 @@ mod tests {
         let mut equations = ModeEquations::new(&system, 31, 1024).unwrap();
         let mut slipping = 0;
         for index in [0, 1] {
-            let path = ModeCurve::follow(&mut equations, index, (1e-4, 2e-2));
+            let path = ModeCurve::follow(&mut equations, index, 1e-4, 2e-2);
             for amplitude in [2e-2, 8e-3, 1e-3, 3.5e-4] {
                 let state = path.state_at(&mut equations, amplitude).unwrap();
                 let n = system.dofs();

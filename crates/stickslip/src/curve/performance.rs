@@ -61,10 +61,6 @@ pub struct PerformanceCurve {
     pub optimum: Option<PerformanceRow>,
 }
 
-/// Peaks that differ by less than this fraction of the highest are equal. Orbits are accurate to
-/// about 1e-10, and smaller differences do not matter to a design.
-const EQUAL_PEAKS: f64 = 1e-9;
-
 /// Returns the height of a row; infinity without a peak.
 fn height(row: &PerformanceRow) -> f64 {
     row.peak.map_or(f64::INFINITY, |peak| peak.value)
@@ -74,10 +70,9 @@ fn height(row: &PerformanceRow) -> f64 {
 fn lowest(rows: &[PerformanceRow]) -> Vec<usize> {
     let heights = || rows.iter().map(height).filter(|height| height.is_finite());
     let (least, most) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));
-    (0..rows.len())
-        .filter(|row| height(&rows[*row]) <= least + EQUAL_PEAKS * most)
-        .filter(|_| least.is_finite())
-        .collect()
+    // Peaks that differ by less than this fraction of the highest are equal. Orbits are accurate
+    // to about 1e-10, and smaller differences do not matter to a design.
+    (0..rows.len()).filter(|row| height(&rows[*row]) <= least + 1e-9 * most).filter(|_| least.is_finite()).collect()
 }
 
 impl PerformanceCurve {
@@ -103,10 +98,6 @@ pub enum PerformanceError<E> {
     #[error(transparent)]
     Method(MethodError),
 }
-
-/// Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10, and the
-/// curve is flat to second order or kinked at the optimum.
-const OPTIMUM_TOLERANCE: f64 = 1e-7;
 
 impl<E: Send> Performance<'_, E> {
     /// Computes the peak at one value of the parameter.
@@ -198,7 +189,9 @@ impl<E: Send> Performance<'_, E> {
     /// between two branches.
     fn refine(&self, low: f64, middle: PerformanceRow, high: f64) -> Result<PerformanceRow, PerformanceError<E>> {
         let mut best = middle;
-        let close = |a: f64, b: f64| b - a <= OPTIMUM_TOLERANCE * (a.abs() + b.abs());
+        // Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10,
+        // and the curve is flat to second order or kinked at the optimum.
+        let close = |a: f64, b: f64| b - a <= 1e-7 * (a.abs() + b.abs());
         golden_section((low, high), close, |value| {
             let row = self.peak(value)?;
             if height(&row) < height(&best) {

@@ -18,11 +18,6 @@ use stickslip_numerics::dual::Real;
 /// Key of the exponent, to which the dimensions of beta and gamma are raised.
 const EXPONENT: &str = "exponent";
 
-/// The highest exponent, because units are written up to the 9th power. At the corner of the
-/// bilinear loop (the limit of high exponents) the force is then 0.930 of its bound. For a
-/// sharper knee, use `jenkins`.
-const MAX_EXPONENT: f64 = 9.0;
-
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "bouc-wen",
@@ -38,8 +33,9 @@ pub(super) static INFO: LawInfo = LawInfo {
             "shape of the hysteresis loop; beta + gamma must be more than zero",
         )
         .with_power_of(EXPONENT),
-        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, MAX_EXPONENT), "sharpness of the knee")
-            .with_default(1.0),
+        // Units are written up to the 9th power. At the corner of the bilinear loop (the limit of
+        // high exponents) the force is then 0.930 of its bound. For a sharper knee, use `jenkins`.
+        Parameter::new(EXPONENT, Dimension::NONE, Range::Within(1.0, 9.0), "sharpness of the knee").with_default(1.0),
     ],
     sample: &[10_000.0, 1.5e7, 1e7, 2.0],
     build: |values| Arc::new(BoucWen { stiffness: values[0], beta: values[1], gamma: values[2], exponent: values[3] }),
@@ -53,7 +49,8 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// use stickslip::law::{BoucWen, Law};
 /// let law = BoucWen { stiffness: 1e4, beta: 3e3, gamma: 2e3, exponent: 1.0 };
 /// assert_eq!(law.force_scale(), 2.0); // stiffness / (beta + gamma)
-/// assert!(BoucWen { gamma: -4e3, ..law }.check_consistency().is_err()); // the force would be unbounded
+/// // the force would be unbounded
+/// assert!(BoucWen { gamma: -4e3, ..law }.check_consistency().is_err());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWen {

@@ -3,7 +3,7 @@
 //! `|f| <= limit` in stick, `f = limit u'/|u'|` in slip: the isotropic friction disk.
 //! Source: Coulomb (1785); as a set-valued law Moreau (1988).
 
-use super::kernels::planar_slip::radial;
+use super::kernels::planar_slip::{RadialForce, radial};
 use super::{Coulomb, Coulomb2dArctan, Law, LawInfo, Parameter, ProxView, SharedLaw};
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -69,7 +69,8 @@ impl ProxView for Coulomb2d {
     fn resolve(&self, y: &[f64], _penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let size = y[0].hypot(y[1]);
         let inside = size <= self.limit;
-        radial(y, size, if inside { (size, 1.0) } else { (self.limit, 0.0) }, force, slope);
+        let (value, rise) = if inside { (size, 1.0) } else { (self.limit, 0.0) };
+        radial(y, size, RadialForce { value, rise }, force, slope);
     }
 }
 

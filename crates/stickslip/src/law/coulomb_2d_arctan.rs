@@ -4,8 +4,7 @@
 //! `coulomb-arctan`.
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2), made isotropic in a plane.
 
-use super::kernels::planar_slip::dot;
-use super::kernels::planar_slip::radial;
+use super::kernels::planar_slip::{RadialForce, dot, radial};
 use super::{CoulombArctan, Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -80,16 +79,14 @@ impl Law for Coulomb2dArctan {
     }
 }
 
-/// Below this squared argument, `arctan x / x` is evaluated as a series. The sixth term is then
-/// below rounding.
-const SERIES_BELOW: f64 = 1e-3;
-
 impl RateLaw for Coulomb2dArctan {
     #[inline]
     fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
         let v = [motion.velocity[0] * self.alpha, motion.velocity[1] * self.alpha];
         let square = dot(v, v);
-        let share = if square.re() < SERIES_BELOW {
+        // Below this squared argument, `arctan x / x` is evaluated as a series. The sixth term
+        // is then below rounding.
+        let share = if square.re() < 1e-3 {
             (((square * (1.0 / 9.0) - 1.0 / 7.0) * square + 0.2) * square - 1.0 / 3.0) * square + 1.0
         } else {
             let size = square.sqrt();
@@ -105,6 +102,6 @@ impl ProxView for Coulomb2dArctan {
         let size = y[0].hypot(y[1]);
         let (mut value, mut rise) = ([0.0], [0.0]);
         self.along().resolve(&[size], penalty, &mut value, &mut rise);
-        radial(y, size, (value[0], rise[0]), force, slope);
+        radial(y, size, RadialForce { value: value[0], rise: rise[0] }, force, slope);
     }
 }

@@ -109,15 +109,13 @@ impl ProxView for CoulombArctan {
     }
 }
 
-/// Largest half-width of a sample, relative to the scale `1 + |y|` of the arctangent, at which
-/// the quadrature of [`SampleMeans::by_quadrature`] is exact to rounding.
-const QUADRATURE_BELOW: f64 = 0.2;
-
 /// Returns means of `arctan(y + eξ)` over `-1 < ξ < 1`, in closed form, or by quadrature if the
 /// closed form would lose digits to cancellation.
 fn mean_of_arctangent(y: f64, e: f64) -> SampleMeans {
     let reach = e.abs();
-    if reach < QUADRATURE_BELOW * (1.0 + y.abs()) {
+    // Largest half-width of a sample, relative to the scale `1 + |y|` of the arctangent, at
+    // which the quadrature of `SampleMeans::by_quadrature` is exact to rounding.
+    if reach < 0.2 * (1.0 + y.abs()) {
         return SampleMeans::by_quadrature(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x)));
     }
     let (low, high) = (y - reach, y + reach);
@@ -145,7 +143,8 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
     // The left side is increasing and concave in w, so Newton's method from below converges
     // monotonically.
     let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
-    for _ in 0..MAX_ITERATIONS {
+    // Upper bound on the iterations of `resolve`; they converge quadratically.
+    for _ in 0..60 {
         let left = w + FRAC_2_PI * (s * w).atan() - target;
         let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
         let step = left / slope;
@@ -158,6 +157,3 @@ fn resolve(y: f64, s: f64) -> (f64, f64) {
     let slope = FRAC_2_PI * s / (1.0 + s * s * w * w);
     ((target - w).copysign(y), slope / (1.0 + slope))
 }
-
-/// Upper bound on the iterations of [`resolve`]; they converge quadratically.
-const MAX_ITERATIONS: usize = 60;

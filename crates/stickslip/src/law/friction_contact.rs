@@ -66,7 +66,8 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// # Example
 /// ```
 /// use stickslip::law::{FrictionContact, StepLaw};
-/// let law = FrictionContact { tangential: 1.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 1 };
+/// let law =
+///     FrictionContact { tangential: 1.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 1 };
 /// let mut z = [0.0];
 /// // normal load 4 N + 2 N/m · 1 m, slip at half of it
 /// assert_eq!(law.advance(&[0.0; 3], &[9.0, 1.0, 0.0], &mut z)[..2], [3.0, 6.0]);

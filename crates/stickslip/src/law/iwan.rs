@@ -31,13 +31,6 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dual::Real;
 
-/// Largest number of sliders.
-const MAX_ELEMENTS: u32 = 1000;
-
-/// Ratio of successive bin edges is `exp(GRADING / √elements)`. More elements make both the bins
-/// and the first bin smaller.
-const GRADING: f64 = 1.5;
-
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "iwan",
@@ -60,7 +53,7 @@ pub(super) static INFO: LawInfo = LawInfo {
         Parameter::new(
             "elements",
             Dimension::NONE,
-            Range::UpTo(MAX_ELEMENTS),
+            Range::UpTo(1000),
             "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
         )
         .with_default(0.0),
@@ -165,7 +158,9 @@ impl Law for Iwan {
         let limit = stiffness * (chi + 1.0) / (chi + 2.0);
         let edge = |bin: u32| match bin {
             0 => 0.0,
-            bin => (-GRADING / f64::from(count).sqrt() * f64::from(count - bin)).exp(),
+            // Ratio of successive bin edges is `exp(1.5 / √elements)`. More elements make
+            // both the bins and the first bin smaller.
+            bin => (-1.5 / f64::from(count).sqrt() * f64::from(count - bin)).exp(),
         };
         let mut pieces: Vec<IdealElement> = (0..count)
             .map(|bin| {

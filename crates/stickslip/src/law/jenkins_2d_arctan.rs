@@ -85,9 +85,6 @@ impl Law for Jenkins2dArctan {
     }
 }
 
-/// Largest force that determines a state, relative to the limit.
-const MAX_FORCE_RATIO: f64 = 1.0 - 1e-12;
-
 /// Below this value of `|z|²`, functions of it are evaluated as series. Their next terms are
 /// then below rounding.
 const SERIES_BELOW: f64 = 1e-3;
@@ -127,7 +124,8 @@ impl RateLaw for Jenkins2dArctan {
     fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
         let size = force[0].hypot(force[1]);
         // Forces beyond the limit are replaced by values just below it.
-        let rho = ((size / self.limit).min(MAX_FORCE_RATIO) / FRAC_2_PI).tan().asinh();
+        // Largest force that determines a state, relative to the limit.
+        let rho = ((size / self.limit).min(1.0 - 1e-12) / FRAC_2_PI).tan().asinh();
         let share = if size > 0.0 { rho / size } else { 0.0 };
         z.iter_mut().zip(force).for_each(|(z, force)| *z = force * share);
         true

@@ -82,9 +82,6 @@ impl Law for JenkinsArctan {
     }
 }
 
-/// Largest force that determines a state, relative to the limit.
-const MAX_FORCE_RATIO: f64 = 1.0 - 1e-12;
-
 impl JenkinsArctan {
     /// Returns the slider without its spring.
     fn slider(&self) -> CoulombArctan {
@@ -113,8 +110,10 @@ impl RateLaw for JenkinsArctan {
         usize::from(self.limit > 0.0) // without a limit, the spring carries no force
     }
     fn state_from_force(&self, force: &[f64], z: &mut [f64]) -> bool {
+        // Largest force that determines a state, relative to the limit.
+        let max_force_ratio = 1.0 - 1e-12;
         // Forces beyond the limit are replaced by values just below it.
-        let share = (force[0] / self.limit).clamp(-MAX_FORCE_RATIO, MAX_FORCE_RATIO);
+        let share = (force[0] / self.limit).clamp(-max_force_ratio, max_force_ratio);
         z.fill((share / FRAC_2_PI).tan().asinh());
         true
     }

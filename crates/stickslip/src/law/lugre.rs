@@ -57,7 +57,14 @@ pub(super) static INFO: LawInfo = LawInfo {
 /// # Example
 /// ```
 /// use stickslip::law::{LuGre, RateLaw, RelativeMotion};
-/// let law = LuGre { stiffness: 1e4, damping: 10.0, viscous: 0.4, limit: 2.0, static_limit: 2.5, velocity: 0.01 };
+/// let law = LuGre {
+///     stiffness: 1e4,
+///     damping: 10.0,
+///     viscous: 0.4,
+///     limit: 2.0,
+///     static_limit: 2.5,
+///     velocity: 0.01,
+/// };
 /// // steady sliding at 1 m/s: the bristles carry `limit`, plus viscous friction
 /// let mut rate = [0.0_f64];
 /// let force = law.evaluate(&RelativeMotion::along(0.0, 1.0), &[2.0 / 2.5], &mut rate);

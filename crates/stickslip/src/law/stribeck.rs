@@ -137,10 +137,6 @@ impl SlidingView for Stribeck {
     }
 }
 
-/// Upper bound on the iterations for the velocity. Bisection alone needs one per bit of the
-/// result.
-const MAX_ITERATIONS: usize = 100;
-
 impl ProxView for Stribeck {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
         let target = y[0].abs();
@@ -154,7 +150,9 @@ impl ProxView for Stribeck {
         // rounding of the force, expressed as a velocity
         let rounding = f64::EPSILON * target / penalty;
         let mut v = high;
-        for _ in 0..MAX_ITERATIONS {
+        // Upper bound on the iterations for the velocity. Bisection alone needs one per bit of
+        // the result.
+        for _ in 0..100 {
             let (friction, fall) = self.friction(v);
             let excess = friction + penalty * v - target;
             if excess > 0.0 {

@@ -10,6 +10,7 @@ use crate::structure::reduction::Row;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use stickslip_numerics::eigen;
+use stickslip_numerics::vector::dot;
 
 /// Directions of displacement of a rigid body.
 pub const TRANSLATIONS: [&str; 3] = ["x", "y", "z"];
@@ -29,7 +30,8 @@ pub const ROTATIONS: [&str; 3] = ["rx", "ry", "rz"];
 /// let (mass, length, stiffness) = (3.0, 0.8, 1e4);
 /// let bar = Body::in_plane("bar", mass, mass * length * length / 12.0, ["x", "z"]);
 /// let end = |name: &str, x: f64| bar.point(name, [x, 0.0, 0.0]);
-/// let spring = |end: &str| Spring { between: [end.into(), GROUND.into()], stiffness, damping: 0.0 };
+/// let spring =
+///     |end: &str| Spring { between: [end.into(), GROUND.into()], stiffness, damping: 0.0 };
 /// let model = Model {
 ///     places: vec![end("left", -length / 2.0), end("right", length / 2.0)],
 ///     springs: vec![spring("left.z"), spring("right.z"), spring("bar.x")],
@@ -37,7 +39,12 @@ pub const ROTATIONS: [&str; 3] = ["rx", "ry", "rz"];
 ///     ..Model::default()
 /// };
 /// let survey = model.survey().unwrap();
-/// let found: Vec<f64> = survey.free().elastic.iter().map(|mode| mode.omega * mode.omega * mass / stiffness).collect();
+/// let found: Vec<f64> = survey
+///     .free()
+///     .elastic
+///     .iter()
+///     .map(|mode| mode.omega * mode.omega * mass / stiffness)
+///     .collect();
 /// assert!(found.iter().zip([1.0, 2.0, 6.0]).all(|(a, b)| (a - b).abs() < 1e-12 * b), "{found:?}");
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -98,7 +105,7 @@ impl Body {
             let find = |names: [&str; 3]| names.iter().position(|name| name == direction);
             match (find(TRANSLATIONS), find(ROTATIONS)) {
                 (Some(axis), _) => along[axis],
-                (None, Some(axis)) => dot(cross(unit(axis), offset), along),
+                (None, Some(axis)) => dot(&cross(unit(axis), offset), &along),
                 (None, None) => 0.0,
             }
         };
@@ -260,10 +267,6 @@ fn unit(axis: usize) -> [f64; 3] {
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]
@@ -429,7 +432,7 @@ mod tests {
             for r in &cloud {
                 for (i, row) in inertia.iter_mut().enumerate() {
                     for (k, entry) in row.iter_mut().enumerate() {
-                        let own = if i == k { dot(*r, *r) } else { 0.0 };
+                        let own = if i == k { dot(r, r) } else { 0.0 };
                         *entry += mass / 6.0 * (own - r[i] * r[k]);
                     }
                 }

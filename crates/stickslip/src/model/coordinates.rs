@@ -42,9 +42,6 @@ pub(super) struct Coordinates {
     pub reduced: Option<Arc<ReducedComponent>>,
 }
 
-/// Largest number of places for which [`MotionElimination::decouple`] decouples the moved
-/// displacements. The Gram matrix of more places would be large.
-const DECOUPLING_LIMIT: usize = 2000;
 /// Relative tolerance: a moved place whose free part is smaller depends on other places and is
 /// not a separate coordinate.
 const DEPENDENCE_TOLERANCE: f64 = 1e-10;
@@ -306,7 +303,9 @@ impl MotionElimination {
         let follows = |row: &Row| {
             row.iter().any(|(at, weight)| *at >= self.free && weight.abs() > DEPENDENCE_TOLERANCE * size(row))
         };
-        if others.len() > DECOUPLING_LIMIT || !others.iter().any(follows) {
+        // Largest number of places for which `MotionElimination::decouple` decouples the moved
+        // displacements. The Gram matrix of more places would be large.
+        if others.len() > 2000 || !others.iter().any(follows) {
             return;
         }
         let mut parts = DMatrix::zeros(others.len(), self.free + moved);

@@ -105,14 +105,19 @@ impl Disk {
     /// ```
     /// use stickslip::model::{Disk, SectorDistribution};
     /// use stickslip::{Force, GROUND, Mass, Model, Spring};
-    /// let spring = |other: &str, stiffness| Spring { between: ["blade".into(), other.into()], stiffness, damping: 0.1 };
+    /// let spring = |other: &str, stiffness| Spring {
+    ///     between: ["blade".into(), other.into()],
+    ///     stiffness,
+    ///     damping: 0.1,
+    /// };
     /// let sector = Model {
     ///     masses: vec![Mass::new("blade", 0.2)],
     ///     springs: vec![spring(GROUND, 1e5), spring("next.blade", 2e4)],
     ///     forces: vec![Force { on: "blade".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
     ///     ..Model::default()
     /// };
-    /// let disk = Disk { sectors: 24, forces: vec![SectorDistribution::EngineOrder(3)], motions: vec![] };
+    /// let disk =
+    ///     Disk { sectors: 24, forces: vec![SectorDistribution::EngineOrder(3)], motions: vec![] };
     /// let ring = disk.ring(|_| sector.clone()).unwrap();
     /// assert_eq!((ring.masses.len(), ring.masses[23].name.as_str()), (24, "blade_23"));
     /// assert_eq!(ring.springs[47].between, ["blade_23", "blade_0"]);
@@ -283,7 +288,11 @@ impl Disk {
 /// # Example
 /// ```
 /// assert_eq!(stickslip::model::deviation_error(&[0.02, -0.01]), None);
-/// assert!(stickslip::model::deviation_error(&[2.0, -1.0]).unwrap().contains("sector 1 deviates by -100.0 %: no stiffness or mass remains"));
+/// assert!(
+///     stickslip::model::deviation_error(&[2.0, -1.0])
+///         .unwrap()
+///         .contains("sector 1 deviates by -100.0 %: no stiffness or mass remains")
+/// );
 /// ```
 pub fn deviation_error(deviations: &[f64]) -> Option<String> {
     let first = |far: fn(f64) -> bool| deviations.iter().position(|deviation| far(*deviation));
@@ -328,7 +337,10 @@ impl MistunedProperty {
     /// ```
     /// use stickslip::model::{Mass, MistunedProperty, Model};
     /// let sector = Model { masses: vec![Mass::new("blade", 2.0)], ..Model::default() };
-    /// assert_eq!(MistunedProperty::Mass("blade".to_owned()).apply(&sector, 0.5).masses[0].mass, 3.0);
+    /// assert_eq!(
+    ///     MistunedProperty::Mass("blade".to_owned()).apply(&sector, 0.5).masses[0].mass,
+    ///     3.0
+    /// );
     /// ```
     #[must_use]
     pub fn apply(&self, sector: &Model, deviation: f64) -> Model {

@@ -9,15 +9,6 @@ use super::{Force, GROUND, Joint, Mass, Model, Spring};
 use crate::law::{Coulomb, Jenkins, SharedLaw};
 use std::sync::Arc;
 
-/// Mass of a blade, kg.
-const BLADE: f64 = 0.182;
-/// Mass of the part that deforms at the contact, kg.
-const CONTACT: f64 = 0.001_82;
-/// Tangential contact stiffness, N/m.
-const STIFFNESS: f64 = 1e4;
-/// Slip limit, N.
-const LIMIT: f64 = 2.0;
-
 /// Returns two blades with friction between the first blade and a small contact mass. A spring
 /// connects the contact mass to the second blade: Fig. 5b, Eqs. (3)-(4).
 ///
@@ -31,10 +22,11 @@ const LIMIT: f64 = 2.0;
 /// assert_eq!(model.assemble().unwrap().places(), ["blade1", "contact", "blade3"]);
 /// ```
 pub fn blade_couple() -> Model {
-    let mut model = blades(BLADE - CONTACT / 2.0); // m* of Eq. (3)
-    model.masses.insert(1, Mass::new("contact", CONTACT));
-    model.springs.push(Spring { between: between("contact", "blade3"), stiffness: STIFFNESS, damping: 0.0 });
-    model.joints.push(shroud("contact", Arc::new(Coulomb { limit: LIMIT })));
+    let contact = 0.001_82; // kg, the part that deforms at the contact
+    let mut model = blades(0.182 - contact / 2.0); // m* of Eq. (3)
+    model.masses.insert(1, Mass::new("contact", contact));
+    model.springs.push(Spring { between: between("contact", "blade3"), stiffness: 1e4, damping: 0.0 });
+    model.joints.push(shroud("contact", Arc::new(Coulomb { limit: 2.0 })));
     model
 }
 
@@ -47,8 +39,8 @@ pub fn blade_couple() -> Model {
 /// assert_eq!(system.places(), ["blade1", "blade3"]);
 /// ```
 pub fn blade_couple_massless() -> Model {
-    let mut model = blades(BLADE);
-    model.joints.push(shroud("blade3", Arc::new(Jenkins { stiffness: STIFFNESS, limit: LIMIT })));
+    let mut model = blades(0.182);
+    model.joints.push(shroud("blade3", Arc::new(Jenkins { stiffness: 1e4, limit: 2.0 })));
     model
 }
 

@@ -42,7 +42,13 @@ impl System {
     /// let old = system.structure();
     /// let mut damping = old.damping().clone();
     /// damping[(0, 0)] = -0.1;
-    /// let driven = Structure::new(old.places().to_vec(), old.mass().clone(), damping, old.stiffness().clone()).unwrap();
+    /// let driven = Structure::new(
+    ///     old.places().to_vec(),
+    ///     old.mass().clone(),
+    ///     damping,
+    ///     old.stiffness().clone(),
+    /// )
+    /// .unwrap();
     /// assert!(!system.with_structure(driven).unwrap().is_incrementally_stable());
     /// ```
     pub fn is_incrementally_stable(&self) -> bool {

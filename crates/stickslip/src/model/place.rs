@@ -5,6 +5,7 @@
 
 use crate::structure::reduction::Row;
 use serde::Serialize;
+use stickslip_numerics::vector::dot;
 
 /// Returns the names of the places of a node: the name itself, or one name per direction.
 pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
@@ -26,7 +27,9 @@ pub(super) fn places_of(name: &str, directions: &[String]) -> Vec<String> {
 /// // the contact plane is inclined by 30 degrees about x
 /// let (sin, cos) = (0.5, 0.75f64.sqrt());
 /// let frame = Frame::new([0.0, -sin, cos], Some([1.0, 0.0, 0.0])).unwrap();
-/// let node = Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec()).in_frame(frame);
+/// let node =
+///     Place::node("n188", &["t1", "t2", "n"], [6, 7, 8].map(|row| vec![(row, 1.0)]).to_vec())
+///         .in_frame(frame);
 /// let normal = &node.displacements(&node.rows)[2];
 /// assert_eq!(normal.len(), 2);
 /// assert!((normal[0].1 + sin).abs() < 1e-15 && (normal[1].1 - cos).abs() < 1e-15);
@@ -80,7 +83,12 @@ impl Place {
     /// use stickslip::{Mass, Model};
     /// let (sin, cos) = (0.5, 0.75f64.sqrt());
     /// let node = Mass { directions: vec!["x".into(), "z".into()], ..Mass::new("block", 2.0) };
-    /// let face = Place::node("face", &["t", "n"], vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]]).as_view_of("block");
+    /// let face = Place::node(
+    ///     "face",
+    ///     &["t", "n"],
+    ///     vec![vec![(0, cos), (1, sin)], vec![(0, -sin), (1, cos)]],
+    /// )
+    /// .as_view_of("block");
     /// let model = Model { masses: vec![node], places: vec![face], ..Model::default() };
     /// assert_eq!(model.assemble().unwrap().places(), ["block.x", "block.z", "face.t", "face.n"]);
     /// ```
@@ -150,9 +158,9 @@ impl Frame {
                 std::array::from_fn(|i| f64::from(u8::from(i == axis)))
             }
         };
-        let share = dot(along, normal);
+        let share = dot(&along, &normal);
         let across: [f64; 3] = std::array::from_fn(|i| along[i] - share * normal[i]);
-        let angle = dot(across, across).sqrt().atan2(share.abs()).to_degrees();
+        let angle = dot(&across, &across).sqrt().atan2(share.abs()).to_degrees();
         let first = unit(across).filter(|_| angle > MIN_TANGENT_ANGLE).ok_or(FrameError::Parallel { angle })?;
         let second = [
             normal[1] * first[2] - normal[2] * first[1],
@@ -168,10 +176,6 @@ impl Frame {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 /// Returns the unit vector of the same direction, or `None` if the vector is zero or not
 /// finite.
 fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
@@ -180,7 +184,7 @@ fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
         return None;
     }
     let scaled = vector.map(|v| v / largest);
-    let length = dot(scaled, scaled).sqrt();
+    let length = dot(&scaled, &scaled).sqrt();
     Some(scaled.map(|v| v / length))
 }
 
@@ -196,7 +200,7 @@ mod tests {
             let axes = *Frame::new(normal, tangent).unwrap().axes();
             for a in 0..3 {
                 for b in 0..3 {
-                    assert!((dot(axes[a], axes[b]) - f64::from(u8::from(a == b))).abs() < 1e-15);
+                    assert!((dot(&axes[a], &axes[b]) - f64::from(u8::from(a == b))).abs() < 1e-15);
                 }
             }
             let [t, s, n] = axes;

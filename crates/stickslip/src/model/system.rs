@@ -26,7 +26,13 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// use stickslip::structure::Structure;
 /// let places = vec!["a".to_owned(), "b".to_owned()];
 /// let damping = dmatrix![0.1, 0.0; 0.0, 0.1];
-/// let structure = Structure::new(places, dmatrix![1.0, 0.4; 0.4, 1.0], damping, dmatrix![2.0, -1.0; -1.0, 2.0]).unwrap();
+/// let structure = Structure::new(
+///     places,
+///     dmatrix![1.0, 0.4; 0.4, 1.0],
+///     damping,
+///     dmatrix![2.0, -1.0; -1.0, 2.0],
+/// )
+/// .unwrap();
 /// let system = System::builder(structure)
 ///     .joint("rub", Arc::new(Coulomb { limit: 0.2 }), vec![Axis::new(vec![(0, 1.0)])])
 ///     .force(0, 1, Complex64::new(1.0, 0.0))
@@ -453,10 +459,6 @@ impl SystemBuilder {
     }
 }
 
-/// Relative difference between loads of a sector and those of the first sector that counts as
-/// rounding of the phases. It is relative to the largest load.
-const SYMMETRY_TOLERANCE: f64 = 1e-12;
-
 impl System {
     /// Creates a builder for a system on a structure.
     pub fn builder(structure: Structure) -> SystemBuilder {
@@ -537,7 +539,9 @@ impl System {
         }
         let size = n / sectors;
         let near = |first: Complex64, harmonic: u32, sector: usize, z: Complex64, largest: f64| {
-            (first * cyclic.phase_factor(harmonic as usize, sector) - z).norm() <= SYMMETRY_TOLERANCE * largest
+            // Relative difference between loads of a sector and those of the first sector that
+            // counts as rounding of the phases. It is relative to the largest load.
+            (first * cyclic.phase_factor(harmonic as usize, sector) - z).norm() <= 1e-12 * largest
         };
         for load in &self.loads {
             for values in [&load.force, &load.by_velocity, &load.by_acceleration] {

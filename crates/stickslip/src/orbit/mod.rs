@@ -113,20 +113,6 @@ pub struct OrbitData {
     pub accuracy: Accuracy,
 }
 
-/// Permitted difference between the ends of a period, and between `initial_state` and the path.
-/// Displacements are relative to their size, velocities to their size times Ω. A series of a few
-/// harmonics is no more accurate.
-const CLOSURE: f64 = 1e-3;
-/// Two states are equal below this difference relative to the largest amplitude (velocities:
-/// times Ω). Time integration closes orbits to 1e-9, which stiff contacts degrade to 1e-7. The
-/// second constant is the number of instants that are compared.
-const EQUAL_STATES: f64 = 1e-6;
-const COMPARED_INSTANTS: usize = 8;
-/// Distance from the end of the period at which the path is evaluated, relative to the period.
-const END_OFFSET: f64 = 1e-9;
-/// Energy gap above which a motion is not an orbit of the system.
-const LARGEST_GAP: f64 = 0.1;
-
 impl Orbit {
     /// Creates an orbit from a path. All results are computed from samples of the path, so they
     /// are independent evidence.
@@ -145,26 +131,46 @@ impl Orbit {
     /// use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
     /// use stickslip::structure::Structure;
     ///
-    /// struct Harmonic { x: Complex64, omega: f64 }
+    /// struct Harmonic {
+    ///     x: Complex64,
+    ///     omega: f64,
+    /// }
     ///
     /// impl Path for Harmonic {
     ///     fn sample(&self, time: f64) -> Sample {
-    ///         let (x, s) = (self.x * Complex64::cis(self.omega * time), Complex64::new(0.0, self.omega));
-    ///         let [displacement, velocity, acceleration] = [x, s * x, s * s * x].map(|z| vec![z.re]);
-    ///         Sample { displacement, velocity, acceleration, joints: Vec::new(), imposed: Vec::new() }
+    ///         let (x, s) =
+    ///             (self.x * Complex64::cis(self.omega * time), Complex64::new(0.0, self.omega));
+    ///         let [displacement, velocity, acceleration] =
+    ///             [x, s * x, s * s * x].map(|z| vec![z.re]);
+    ///         Sample {
+    ///             displacement,
+    ///             velocity,
+    ///             acceleration,
+    ///             joints: Vec::new(),
+    ///             imposed: Vec::new(),
+    ///         }
     ///     }
     ///     fn transition_times(&self) -> Vec<f64> {
     ///         Vec::new()
     ///     }
     /// }
     ///
-    /// let structure = Structure::new(vec!["m".into()], dmatrix![1.0], dmatrix![0.1], dmatrix![4.0]).unwrap();
-    /// let system = System::builder(structure).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap();
+    /// let structure =
+    ///     Structure::new(vec!["m".into()], dmatrix![1.0], dmatrix![0.1], dmatrix![4.0]).unwrap();
+    /// let system =
+    ///     System::builder(structure).force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap();
     /// let omega = 1.5;
     /// let x = 1.0 / Complex64::new(4.0 - omega * omega, 0.1 * omega);
     /// let found = |x: Complex64| OrbitData {
-    ///     method: "by hand", omega, periods: 1, symmetry: Symmetry::HalfPeriod,
-    ///     initial_state: vec![x.re, -omega * x.im], residual: 0.0, iterations: 1, error_estimate: None, accuracy: Accuracy::Converged,
+    ///     method: "by hand",
+    ///     omega,
+    ///     periods: 1,
+    ///     symmetry: Symmetry::HalfPeriod,
+    ///     initial_state: vec![x.re, -omega * x.im],
+    ///     residual: 0.0,
+    ///     iterations: 1,
+    ///     error_estimate: None,
+    ///     accuracy: Accuracy::Converged,
     /// };
     /// let orbit = Orbit::new(&system, Arc::new(Harmonic { x, omega }), found(x)).unwrap();
     /// assert!((orbit.places[0].amplitude() - x.norm()).abs() < 1e-9);
@@ -202,8 +208,10 @@ impl Orbit {
         }
         let Ok(measured) = postprocess::results(system, &sampled, omega, (Symmetry::FullPeriod, period));
         let size = measured.places.iter().map(|place| place.maximum.abs().max(place.minimum.abs())).fold(0.0, f64::max);
-        let apart =
-            |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > CLOSURE * size);
+        // Permitted difference between the ends of a period, and between `initial_state` and the
+        // path. Displacements are relative to their size, velocities to their size times Ω. A
+        // series of a few harmonics is no more accurate.
+        let apart = |a: &[f64], sign: f64, b: &[f64]| a.iter().zip(b).any(|(a, b)| (a - sign * b).abs() > 1e-3 * size);
         let rated = |sample: Sample| -> Vec<f64> {
             sample.displacement.into_iter().chain(sample.velocity.into_iter().map(|v| v / omega)).collect()
         };
@@ -213,14 +221,17 @@ impl Orbit {
         if apart(&begin, 1.0, &stated) {
             return Err(wrong("does not begin at `initial_state`"));
         }
-        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - END_OFFSET)))) {
+        // Distance from the end of the period at which the path is evaluated, relative to the
+        // period.
+        if apart(&begin, 1.0, &rated(path.sample(period * (1.0 - 1e-9)))) {
             return Err(wrong("does not return to its initial state after one period"));
         }
         if symmetry == Symmetry::HalfPeriod && apart(&begin, -1.0, &rated(path.sample(0.5 * period))) {
             return Err(wrong("is not the mirrored initial state after half a period"));
         }
         let energy_gap = measured.energy_gap(0.0);
-        if energy_gap > LARGEST_GAP {
+        // Energy gap above which a motion is not an orbit of the system.
+        if energy_gap > 0.1 {
             return Err(OrbitError::Evidence { method, omega, energy_gap });
         }
         Ok(Orbit {
@@ -264,6 +275,7 @@ impl Orbit {
     /// search for motions of several periods also finds those of fewer. States that differ by
     /// less than 1e-6 count as equal.
     pub fn minimal_periods(&self) -> usize {
+        let compared_instants: usize = 8;
         let state = |time: f64| {
             let sample = self.sample(time);
             let velocities = sample.velocity.into_iter().map(|v| v / self.omega);
@@ -272,10 +284,14 @@ impl Orbit {
         let size = self.places.iter().map(|place| place.length_amplitude()).fold(0.0, f64::max);
         let drive = self.period() / self.periods as f64;
         let after = |periods: usize| {
-            (0..COMPARED_INSTANTS).all(|i| {
-                let time = self.period() * i as f64 / COMPARED_INSTANTS as f64;
+            (0..compared_instants).all(|i| {
+                let time = self.period() * i as f64 / compared_instants as f64;
                 let (now, later) = (state(time), state(time + periods as f64 * drive));
-                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= EQUAL_STATES * size)
+                // Two states are equal below this difference relative to the largest amplitude
+                // (velocities: times Ω). Time integration closes orbits to 1e-9, which stiff
+                // contacts degrade to 1e-7. The second constant is the number of instants that
+                // are compared.
+                now.iter().zip(&later).all(|(now, later)| (now - later).abs() <= 1e-6 * size)
             })
         };
         (1..self.periods)

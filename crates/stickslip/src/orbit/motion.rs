@@ -38,10 +38,6 @@ pub struct PlaceMotion {
     pub rotation_radius: Option<f64>,
 }
 
-/// A first harmonic below this fraction of the amplitude is rounding. Orbits are more accurate
-/// than this.
-const NO_PHASE: f64 = 1e-9;
-
 impl PlaceMotion {
     /// Returns half of the peak-to-peak value, m.
     pub fn amplitude(&self) -> f64 {
@@ -56,7 +52,9 @@ impl PlaceMotion {
     /// if the motion has no first harmonic.
     pub fn phase_deg(&self) -> f64 {
         let amplitude = self.amplitude();
-        if amplitude > 0.0 && self.first_harmonic.norm() <= NO_PHASE * amplitude {
+        // A first harmonic below this fraction of the amplitude is rounding. Orbits are more
+        // accurate than this.
+        if amplitude > 0.0 && self.first_harmonic.norm() <= 1e-9 * amplitude {
             return f64::NAN;
         }
         self.first_harmonic.arg().to_degrees()

@@ -72,16 +72,14 @@ pub(crate) struct ContactSummary {
     pub sticks_throughout: bool,
 }
 
-/// Number of samples in which a stuck joint may slip. At the edge of a continuum of orbits the
-/// force reaches its limit, and samples cannot resolve the excess.
-const EDGE_SAMPLES: usize = 1;
-
 /// Tells whether a joint with these states at the samples sticks during the whole return.
 pub(crate) fn sticks(mut contact: impl Iterator<Item = Contact>) -> bool {
     let mut slips = 0;
     contact.all(|contact| {
         slips += usize::from(contact != Contact::Stick);
-        slips <= EDGE_SAMPLES && !matches!(contact, Contact::Touch | Contact::Open)
+        // Number of samples in which a stuck joint may slip. At the edge of a continuum of
+        // orbits the force reaches its limit, and samples cannot resolve the excess.
+        slips <= 1 && !matches!(contact, Contact::Touch | Contact::Open)
     })
 }
 
@@ -269,9 +267,6 @@ fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S:
     ((work, viscous), possible)
 }
 
-/// Bisection of a turning point ends at this fraction of the interval.
-const BISECTION_WIDTH: f64 = 1e-12;
-
 /// Returns the smallest and the largest value of a signal over intervals. Each interval has its
 /// length, and value, slope and curvature at both ends; the signal is a quintic between them.
 pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -> (f64, f64) {
@@ -283,7 +278,8 @@ pub(crate) fn extremes(spans: impl Iterator<Item = (f64, [f64; 3], [f64; 3])>) -
         if from[1] * to[1] < 0.0 {
             // one turning point inside: bisection on the velocity
             let (mut left, mut right) = (0.0, 1.0);
-            while right - left > BISECTION_WIDTH {
+            // Bisection of a turning point ends at this fraction of the interval.
+            while right - left > 1e-12 {
                 let middle = 0.5 * (left + right);
                 if quintic(middle, length, from, to).1 * from[1] > 0.0 { left = middle } else { right = middle }
             }

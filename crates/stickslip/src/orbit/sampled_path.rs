@@ -7,10 +7,6 @@ use num_complex::Complex64;
 use std::convert::Infallible;
 use stickslip_numerics::quadrature;
 
-/// Intervals per period, with at least two between transitions. Harmonics up to the twentieth
-/// are then integrated to 1e-9.
-const INTERVALS: f64 = 512.0;
-
 /// A path at the nodes of a quadrature over its period.
 pub(super) struct Sampled<'a> {
     system: &'a System,
@@ -30,7 +26,9 @@ impl<'a> Sampled<'a> {
         cuts.sort_by(f64::total_cmp);
         let mut nodes = Vec::new();
         for pair in cuts.windows(2) {
-            let count = (INTERVALS * (pair[1] - pair[0]) / period).ceil().max(2.0);
+            // Intervals per period, with at least two between transitions. Harmonics up to the
+            // twentieth are then integrated to 1e-9.
+            let count = (512.0 * (pair[1] - pair[0]) / period).ceil().max(2.0);
             let length = (pair[1] - pair[0]) / count;
             for i in 0..count as usize {
                 let at = |(node, weight)| (pair[0] + (i as f64 + 0.5 + 0.5 * node) * length, 0.5 * weight * length);

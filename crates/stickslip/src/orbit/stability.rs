@@ -12,11 +12,6 @@ use num_complex::Complex64;
 use std::borrow::Cow;
 use stickslip_numerics::eigen;
 
-/// A multiplier that exceeds one by less than this counts as on the unit circle. Multipliers of
-/// stick offsets and of undamped systems equal one. The eigenvalues of a return map have a
-/// rounding error of about 1e-12, or its square root if two of them coincide.
-const NEUTRAL: f64 = 1e-6;
-
 /// Knowledge about the stability of an orbit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stability {
@@ -50,7 +45,11 @@ impl Orbit {
     pub fn is_stable(&self) -> Option<bool> {
         match self.stability() {
             Stability::Proven => Some(true),
-            Stability::Computed { largest } => Some(largest <= 1.0 + NEUTRAL),
+            // A multiplier that exceeds one by less than this counts as on the unit circle.
+            // Multipliers of stick offsets and of undamped systems equal one. The eigenvalues of
+            // a return map have a rounding error of about 1e-12, or its square root if two of
+            // them coincide.
+            Stability::Computed { largest } => Some(largest <= 1.0 + 1e-6),
             Stability::Unknown => None,
         }
     }

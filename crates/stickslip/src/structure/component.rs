@@ -29,7 +29,11 @@ use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, mult
 /// use stickslip_numerics::sparse::SparseMatrix;
 /// let n = 400;
 /// let stiffness = (0..n).flat_map(|i| {
-///     let linked = if i > 0 { vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)] } else { vec![] };
+///     let linked = if i > 0 {
+///         vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)]
+///     } else {
+///         vec![]
+///     };
 ///     linked.into_iter().chain([(i, i, 1e6)])
 /// });
 /// let stiffness = SparseMatrix::from_triplets(n, stiffness)?;
@@ -161,15 +165,6 @@ pub(crate) enum ReducedForm {
     Ring(Arc<RingModes>),
 }
 
-/// Number of mistuning patterns whose modes are stored. A case is assembled several times in
-/// succession, and a campaign has a million patterns. The modes of 240 blades with five places
-/// each use 40 MB.
-const CACHED_PATTERNS: usize = 16;
-
-/// Ratio of the highest retained frequency to the highest frequency of interest. The last modes
-/// only improve those below.
-const MODE_MARGIN: f64 = 1.5;
-
 impl Component {
     /// Creates a component from row names and symmetric sparse matrices.
     ///
@@ -276,7 +271,8 @@ impl Component {
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let diagonal = |value: f64| SparseMatrix::from_triplets(2, [(0, 0, value), (1, 1, value)]);
     /// let turning = SparseMatrix::from_triplets(2, [(0, 1, 6.0), (1, 0, -6.0)])?;
-    /// let shaft = Component::new(vec![String::new(); 2], diagonal(1.0)?, Some(turning), diagonal(16.0)?)?;
+    /// let shaft =
+    ///     Component::new(vec![String::new(); 2], diagonal(1.0)?, Some(turning), diagonal(16.0)?)?;
     /// let found = shaft.free_vibration(2)?.unwrap();
     /// assert!((found[0] - 2.0).abs() < 1e-12 && (found[1] - 8.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -303,8 +299,15 @@ impl Component {
     /// ```
     /// use stickslip::structure::Component;
     /// use stickslip_numerics::sparse::SparseMatrix;
-    /// let diagonal = |values: [f64; 3]| SparseMatrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)));
-    /// let three = Component::new(vec![String::new(); 3], diagonal([1.0; 3])?, None, diagonal([1.0, 4.0, 9.0])?)?;
+    /// let diagonal = |values: [f64; 3]| {
+    ///     SparseMatrix::from_triplets(3, values.into_iter().enumerate().map(|(i, v)| (i, i, v)))
+    /// };
+    /// let three = Component::new(
+    ///     vec![String::new(); 3],
+    ///     diagonal([1.0; 3])?,
+    ///     None,
+    ///     diagonal([1.0, 4.0, 9.0])?,
+    /// )?;
     /// assert_eq!(three.modes_below(2.5), Some(2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -342,7 +345,20 @@ impl Component {
     /// ```
     /// use stickslip::structure::{Component, Reduction, ReductionKind};
     /// use stickslip_numerics::sparse::SparseMatrix;
-    /// let rod = |k: f64| SparseMatrix::from_triplets(3, [(0, 0, 2.0 * k), (0, 1, -k), (1, 0, -k), (1, 1, 2.0 * k), (1, 2, -k), (2, 1, -k), (2, 2, k)]);
+    /// let rod = |k: f64| {
+    ///     SparseMatrix::from_triplets(
+    ///         3,
+    ///         [
+    ///             (0, 0, 2.0 * k),
+    ///             (0, 1, -k),
+    ///             (1, 0, -k),
+    ///             (1, 1, 2.0 * k),
+    ///             (1, 2, -k),
+    ///             (2, 1, -k),
+    ///             (2, 2, k),
+    ///         ],
+    ///     )
+    /// };
     /// let mass = SparseMatrix::from_triplets(3, (0..3).map(|i| (i, i, 1.0)))?;
     /// let rest = Component::new(vec![String::new(); 3], mass, None, rod(1e4)?)?;
     /// let how = Reduction::Modes { modes: 1, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 };
@@ -508,7 +524,10 @@ impl SectorCache {
         drop(known);
         let answer = self.best_mistuned(blade, deviations, seen, how)?;
         let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
-        if known.len() >= CACHED_PATTERNS {
+        // Number of mistuning patterns whose modes are stored. A case is assembled several times
+        // in succession, and a campaign has a million patterns. The modes of 240 blades with
+        // five places each use 40 MB.
+        if known.len() >= 16 {
             known.remove(0);
         }
         known.push((asked, answer.clone()));
@@ -623,7 +642,9 @@ fn reduce_whole(whole: &FullStructure, how: &Reduction) -> Result<ReductionResul
         }
         Reduction::Modes { modes: count, kind, orders, up_to } => {
             let modes = whole.lowest_modes(count)?;
-            let serves = natural(&modes).last().map_or(0.0, |last| last / MODE_MARGIN);
+            // Ratio of the highest retained frequency to the highest frequency of interest. The
+            // last modes only improve those below.
+            let serves = natural(&modes).last().map_or(0.0, |last| last / 1.5);
             let up_to = if up_to > 0.0 { up_to } else { serves };
             let reduced = match kind {
                 ReductionKind::Rubin => RubinBasis::new(whole, &modes, 0.0, orders)?.reduced(modes.count(), orders)?,

@@ -80,8 +80,6 @@ pub struct Matrices {
 pub const MAX_FULL_DOFS: usize = 2000;
 /// Number of degrees of freedom from which matrices are stored sparse.
 pub const MIN_SPARSE_DOFS: usize = 40;
-/// Fraction of nonzero entries above which matrices are stored full at any size.
-const FULL_FRACTION: f64 = 0.3;
 
 /// The reason why matrices do not form a valid structure.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -152,7 +150,9 @@ impl Structure {
     /// use nalgebra::dmatrix;
     /// use stickslip::structure::Structure;
     /// let (m, k) = (dmatrix![1.0, 0.4; 0.4, 1.0], dmatrix![2.0, -1.0; -1.0, 2.0]);
-    /// let structure = Structure::new(vec!["a".into(), "b".into()], m, dmatrix![0.1, 0.0; 0.0, 0.1], k).unwrap();
+    /// let structure =
+    ///     Structure::new(vec!["a".into(), "b".into()], m, dmatrix![0.1, 0.0; 0.0, 0.1], k)
+    ///         .unwrap();
     /// assert_eq!(structure.dofs(), 2);
     /// ```
     pub fn new(
@@ -197,8 +197,10 @@ impl Structure {
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let n = 50_000;
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
-    /// let diagonal = |value: f64| SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
-    /// let springs = (1..n).flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
+    /// let diagonal =
+    ///     |value: f64| SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, value))).unwrap();
+    /// let springs = (1..n)
+    ///     .flat_map(|i| [(i, i, 1.0), (i - 1, i - 1, 1.0), (i, i - 1, -1.0), (i - 1, i, -1.0)]);
     /// let stiffness = SparseMatrix::from_triplets(n, springs.chain([(0, 0, 1.0)])).unwrap();
     /// let chain = Structure::sparse(places, diagonal(1.0), diagonal(0.1), stiffness).unwrap();
     /// // pulled at its end, each of the springs carries the force
@@ -531,7 +533,8 @@ impl Matrices {
 /// Returns whether matrices with these numbers of entries are stored full.
 fn is_full(n: usize, entries: [usize; 3]) -> bool {
     let most = entries.into_iter().max().unwrap_or(0);
-    n < MIN_SPARSE_DOFS || most as f64 > FULL_FRACTION * (n as f64) * (n as f64)
+    // Fraction of nonzero entries above which matrices are stored full at any size.
+    n < MIN_SPARSE_DOFS || most as f64 > 0.3 * (n as f64) * (n as f64)
 }
 
 fn to_full(mass: &SparseMatrix, damping: &SparseMatrix, stiffness: &SparseMatrix) -> Matrices {

@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dense::ComplexLu;
 use stickslip_numerics::sparse::{ComplexFactor, Singular};
+use stickslip_numerics::vector::dot;
 
 /// Columns of U, one after the other, each as long as the structure.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,10 +62,6 @@ impl ModalDamping {
     pub fn power(&self, v: &[f64]) -> f64 {
         self.iter().map(|u| dot(u, v).powi(2)).sum()
     }
-}
-
-fn dot(u: &[f64], v: &[f64]) -> f64 {
-    u.iter().zip(v).map(|(u, v)| u * v).sum()
 }
 
 /// A factored dynamic stiffness with the damping of modes.

@@ -16,10 +16,6 @@ use stickslip_numerics::sparse::{Singular, SparseMatrix};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Difference between the matrices of a sector and those of the first one that counts as
-/// rounding of sums in another order. It is relative to the largest entry.
-const EQUAL: f64 = 1e-12;
-
 /// The rows of the first sector in the matrices of a ring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RingSector {
@@ -116,7 +112,9 @@ impl RingSector {
         let mut met = 0;
         for (row, column, values) in ring.entries() {
             let key = key(row, column);
-            let near = |first: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= EQUAL * largest[k]);
+            // Difference between the matrices of a sector and those of the first one that counts
+            // as rounding of sums in another order. It is relative to the largest entry.
+            let near = |first: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= 1e-12 * largest[k]);
             match entries.binary_search_by_key(&key, |entry| (entry.0, entry.1, entry.2)) {
                 Ok(at) if near(&entries[at].3) => met += 1,
                 _ => return None,
@@ -150,15 +148,19 @@ impl RingSector {
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let (n, d) = (12, 5);
     /// let entries = |own: f64, beside: f64| {
-    ///     let all = (0..n).flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
+    ///     let all = (0..n)
+    ///         .flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
     ///     SparseMatrix::from_triplets(n, all).unwrap()
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
-    /// let ring = Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5)).unwrap();
+    /// let ring =
+    ///     Structure::sparse(places, entries(1.0, 0.0), entries(0.1, 0.0), entries(3.0, -0.5))
+    ///         .unwrap();
     /// let wave = RingSector::from_ring(&ring, n).unwrap().wave(d).unwrap();
     /// let mut x = vec![Complex64::new(1.0, 0.0)];
     /// wave.dynamic_stiffness(Complex64::ZERO, 0.0).unwrap().solve(&mut x);
-    /// let stiffness = 2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
+    /// let stiffness =
+    ///     2.0 + 2.0 * 0.5 * (1.0 - (std::f64::consts::TAU * d as f64 / n as f64).cos());
     /// assert!((x[0] - 1.0 / stiffness).norm() < 1e-14);
     /// ```
     pub fn wave(&self, diameter: usize) -> Result<Wave, StructureError> {

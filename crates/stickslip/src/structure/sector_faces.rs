@@ -11,11 +11,6 @@ use std::f64::consts::TAU;
 /// A node and its coordinates, in any unit of length.
 pub type NodeCoordinates = (String, [f64; 3]);
 
-/// Tolerance for the distance between a node and its rotated counterpart, relative to the
-/// largest distance of a node from the axis. Meshes are written with six digits or more, and
-/// elements are larger.
-const COINCIDENT: f64 = 1e-4;
-
 /// The reason why pairs of nodes are not the two sides of a sector.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FacesError {
@@ -74,13 +69,21 @@ pub enum FacesError {
 /// A quarter of a disk: nodes 1 and 2 are its low side, 3 and 4 its high side.
 /// ```
 /// use stickslip::structure::{CoordinateAxis, SectorFaces};
-/// let nodes = [("1", [1.0, 0.0]), ("2", [2.0, 0.0]), ("3", [0.0, 1.0]), ("4", [0.0, 2.0]), ("5", [1.0, 1.0])];
+/// let nodes = [
+///     ("1", [1.0, 0.0]),
+///     ("2", [2.0, 0.0]),
+///     ("3", [0.0, 1.0]),
+///     ("4", [0.0, 2.0]),
+///     ("5", [1.0, 1.0]),
+/// ];
 /// let nodes = nodes.map(|(name, [x, y])| (name.to_owned(), [x, y, 0.0]));
 /// let faces = SectorFaces::new(&nodes, CoordinateAxis::Z, 4);
 /// let pairs = faces.pairs().unwrap();
 /// assert_eq!(pairs, [("1".into(), "3".into()), ("2".into(), "4".into())]);
 /// assert!(faces.check(&pairs).is_ok());
-/// assert!(faces.check(&[("3".into(), "1".into())]).unwrap_err().to_string().contains("exchanged"));
+/// assert!(
+///     faces.check(&[("3".into(), "1".into())]).unwrap_err().to_string().contains("exchanged")
+/// );
 /// ```
 #[derive(Debug, Clone)]
 pub struct SectorFaces<'a> {
@@ -105,7 +108,10 @@ impl<'a> SectorFaces<'a> {
     }
 
     fn tolerance(&self) -> f64 {
-        COINCIDENT * self.radius
+        // Tolerance for the distance between a node and its rotated counterpart, relative to the
+        // largest distance of a node from the axis. Meshes are written with six digits or more,
+        // and elements are larger.
+        1e-4 * self.radius
     }
 
     fn cell(&self, at: [f64; 3]) -> [i64; 3] {

@@ -9,15 +9,6 @@ use std::sync::Arc;
 use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::eigen;
 
-/// Damping between modes that counts as rounding: relative to the damping of the two modes, and
-/// to the largest of all.
-const UNCOUPLED: [f64; 2] = [1e-9, 1e-13];
-/// Shift for free motions, relative to the lowest ratio of stiffness to mass on the diagonals.
-const SHIFT: f64 = 1e-3;
-/// Largest number of degrees of freedom for which modes are computed; the decomposition then
-/// takes a minute.
-const MOST: usize = 4000;
-
 /// A structure in its own modes.
 #[derive(Debug)]
 pub(crate) struct UncoupledModes {
@@ -33,7 +24,9 @@ impl Structure {
     pub(crate) fn uncoupled(&self) -> Option<&Arc<UncoupledModes>> {
         let find = || match self.diagonals() {
             Some(own) => Some(UncoupledModes { own, shapes: None }),
-            None if self.is_sparse() || self.dofs() > MOST => None,
+            // Largest number of degrees of freedom for which modes are computed; the
+            // decomposition then takes a minute.
+            None if self.is_sparse() || self.dofs() > 4000 => None,
             None => {
                 let (own, shapes) = modes(self.full())?;
                 Some(UncoupledModes { own, shapes: Some(shapes) })
@@ -62,12 +55,17 @@ impl Structure {
 /// Computes modes `X` with `Xᵀ (K + σ M) X = 1` and `Xᵀ M X = θ`. Motions without mass have
 /// `θ = 0`: modal mass θ and stiffness `1 - σ θ`.
 fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
+    // Damping between modes that counts as rounding: relative to the damping of the two modes,
+    // and to the largest of all.
+    let uncoupled = [1e-9, 1e-13];
     let Matrices { mass, damping, stiffness } = matrices;
     let n = mass.nrows();
     let mut ratios: Vec<f64> =
         (0..n).map(|i| stiffness[(i, i)] / mass[(i, i)]).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
-    let shift = SHIFT * ratios.first().copied().unwrap_or(1.0);
+    // Shift for free motions, relative to the lowest ratio of stiffness to mass on the
+    // diagonals.
+    let shift = 1e-3 * ratios.first().copied().unwrap_or(1.0);
     let (values, shapes) = eigen::generalized_symmetric(mass, &(stiffness + mass * shift))?;
     let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
         let mut out = DMatrix::zeros(n, n);
@@ -85,7 +83,7 @@ fn modes(matrices: &Matrices) -> Option<(Vec<[f64; 3]>, DMatrix<f64>)> {
     for (i, k) in (0..n).flat_map(|k| (0..k).map(move |i| (i, k))) {
         let both = (modal[(i, i)] * modal[(k, k)]).abs().sqrt();
         let off_diagonal = modal[(i, k)].abs().max(modal[(k, i)].abs());
-        if off_diagonal > UNCOUPLED[0] * both + UNCOUPLED[1] * size {
+        if off_diagonal > uncoupled[0] * both + uncoupled[1] * size {
             return None;
         }
     }

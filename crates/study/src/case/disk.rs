@@ -27,9 +27,6 @@ enum MistunedQuantity {
 const BLADE_QUANTITIES: [(&str, MistunedProperty); 2] =
     [("blade.stiffness", MistunedProperty::BladeStiffness), ("blade.frequency", MistunedProperty::BladeFrequency)];
 
-/// Limit on the rows of all sectors of a disk without reduction: matrices of several GB.
-const MAX_ROWS: usize = 1_000_000;
-
 /// Evaluates the parameters with some of them changed: (index, value in SI).
 pub(crate) type Reevaluate<'a> = &'a dyn Fn(&[(usize, f64)]) -> Result<Vec<ExpressionValue>, Problem>;
 
@@ -41,6 +38,8 @@ pub(crate) fn ring_of(
     again: Reevaluate<'_>,
     problems: &mut Vec<Problem>,
 ) -> Model {
+    // Limit on the rows of all sectors of a disk without reduction: matrices of several GB.
+    let max_rows: usize = 1_000_000;
     let before = problems.len();
     let (mut first, forces, motions) = build_model(structure, environment, problems);
     let values = disk.table.values(environment, problems);
@@ -62,8 +61,8 @@ pub(crate) fn ring_of(
         }
         let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None { .. }));
         let rows = rows.map_or(0, |own| own.component.dofs());
-        if rows * sectors > MAX_ROWS {
-            let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {MAX_ROWS}");
+        if rows * sectors > max_rows {
+            let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {max_rows}");
             let problem = Problem::new(disk.table.location_of("sectors", None), "sectors", message);
             return Err(vec![
                 problem.help("remove `reduce = false` from [structure]: all sectors then share one reduced model"),

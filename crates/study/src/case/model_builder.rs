@@ -270,13 +270,11 @@ pub(crate) fn refuse_without_disk(table: &CompiledTable, problems: &mut Vec<Prob
     }
 }
 
-/// Largest absolute value that is accepted as a whole number.
-const MAX_WHOLE_NUMBER: f64 = 1e9;
-
 /// Returns the value of a key, which must be a whole number; `None` if the key is absent.
 pub(crate) fn whole_number(table: &CompiledTable, values: &Values, key: &'static str) -> Result<Option<i64>, Problem> {
     let Some(value) = values.quantity(key) else { return Ok(None) };
-    if value.fract() == 0.0 && value.abs() <= MAX_WHOLE_NUMBER {
+    // Largest absolute value that is accepted as a whole number.
+    if value.fract() == 0.0 && value.abs() <= 1e9 {
         return Ok(Some(value as i64));
     }
     let message = format!("must be a whole number, found {value}");

@@ -9,10 +9,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use stickslip::structure::{Component, StructureError};
 use stickslip_numerics::sparse::{MatrixError, SparseMatrix};
 
-/// Number of components that are kept, one per speed. Reductions belong to a component, and
-/// cases at the same speed share it.
-const CACHE_SIZE: usize = 16;
-
 /// Both exports of a study's structure.
 #[derive(Debug, Clone)]
 pub struct StiffnessExports {
@@ -60,7 +56,9 @@ impl StressStiffening {
         let stiffness =
             SparseMatrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
         let found = Component::new(component.rows().to_vec(), mass.clone(), damping.cloned(), stiffness)?;
-        if kept.len() == CACHE_SIZE {
+        // Number of components that are kept, one per speed. Reductions belong to a component,
+        // and cases at the same speed share it.
+        if kept.len() == 16 {
             kept.remove(0);
         }
         kept.push((bits, found.clone()));

@@ -217,10 +217,6 @@ pub(crate) fn varied_text(varied: &[VariedValue]) -> String {
     varied.iter().map(|varied| varied.text.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// Largest number of cases that [`Study::to_record`] lists. A run can be repeated from the text
-/// alone.
-const MAX_RESOLVED_CASES: usize = 1_000;
-
 /// Help for a draw with values that no model can have.
 const INVALID_DRAW_HELP: &str = "[sample] draws invalid values such as this one: bound the distribution with \
     `within = [least, most]`, or use a distribution without such values, such as `lognormal`";
@@ -509,7 +505,9 @@ impl Study {
     /// the file's text is included.
     pub fn to_record(&self) -> Json {
         let mut cases = Vec::new();
-        for index in 0..self.cases().min(MAX_RESOLVED_CASES) {
+        // Largest number of cases that `Study::to_record` lists. A run can be repeated from the
+        // text alone.
+        for index in 0..self.cases().min(1_000) {
             if let Ok(case) = self.case(index) {
                 let quantities = case.parameters.iter().map(|(name, (si, d))| (name.clone(), quantity_json(*si, *d)));
                 cases.push(json!({

@@ -13,30 +13,6 @@ use stickslip::structure::{Component, Reduction, ReductionKind};
 /// Default frequency range of a reduced model without joints, in multiples of the highest
 /// excitation frequency. The forces need one multiple; the rest is a margin.
 const RANGE_WITHOUT_JOINTS: u32 = 5;
-/// Default range with joints, in the same multiples. The harmonics of friction fall with the
-/// square of their order. A mode near one of them amplifies it again.
-///
-/// Measured on a chain of 60 masses, where a mode meets harmonic 7: ranges of 5, 9, 15 and 31
-/// harmonics left errors of 9e-3, 1e-3, 5e-5 and 5e-6.
-const RANGE_WITH_JOINTS: u32 = 15;
-/// Largest number of modes when the range is extended for joints. More modes make time
-/// integration slow, and the mesh rarely resolves the highest ones.
-const MAX_MODES_WITH_JOINTS: usize = 60;
-/// Largest structure, in rows, that is not reduced by default if it has joints.
-///
-/// A reduced model lacks modes that harmonics of friction meet: a chain of 80 masses with a
-/// stiff slider was wrong by 3 to 8 %. All rows are kept only if all laws are exact. Methods
-/// that integrate in time pay for every fast mode: 60 rows with `bouc-wen` took 4.3 s instead of
-/// 0.07 s.
-///
-/// Seconds per point, for chains of 60, 80, 100, 150 and 200 rows:
-/// - reduced, event-driven: 0.015; with ten joints 0.03 and up to 0.25;
-/// - all rows, event-driven: 0.19, 0.26, 0.26, 3.2, 4.2 with one joint; 0.02, 0.05, 0.1, 12 and
-///   more with ten;
-/// - all rows, `auto`: 0.02 to 0.1.
-const MAX_UNREDUCED_ROWS: usize = 100;
-/// Critical damping ratio: from here on a mode does not oscillate.
-const CRITICAL_DAMPING_RATIO: f64 = 1.0;
 /// Names of the directions of a node with a normal.
 const FRAME_DIRECTIONS: [&str; 3] = ["t1", "t2", "n"];
 /// Names of the rows of a node with a normal.
@@ -77,7 +53,8 @@ pub(crate) fn structure_from_table(
         problems.push(Problem::new(table.location_of("stiffened", None), "stiffened", error.to_string()));
         component.clone()
     });
-    if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= CRITICAL_DAMPING_RATIO) {
+    // Critical damping ratio: from here on a mode does not oscillate.
+    if let Some(ratio) = values.quantity("modal_damping").filter(|ratio| *ratio >= 1.0) {
         let message = format!("a damping ratio of {ratio}: from 1 on a mode does not oscillate");
         let problem = Problem::new(table.location_of("modal_damping", None), "modal_damping", message);
         problems.push(problem.help("write it in percent, as in modal_damping = \"0.1 %\""));
@@ -182,15 +159,29 @@ pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &V
 /// Returns whether the structure is small and has a definite mass matrix, so that every method
 /// accepts all its rows.
 fn is_unreduced(component: &Component) -> bool {
-    component.dofs() <= MAX_UNREDUCED_ROWS && component.has_definite_mass()
+    // Largest structure, in rows, that is not reduced by default if it has joints. A reduced
+    // model lacks modes that harmonics of friction meet: a chain of 80 masses with a stiff
+    // slider was wrong by 3 to 8 %. All rows are kept only if all laws are exact. Methods that
+    // integrate in time pay for every fast mode: 60 rows with `bouc-wen` took 4.3 s instead of
+    // 0.07 s. Seconds per point, for chains of 60, 80, 100, 150 and 200 rows:
+    // - reduced, event-driven: 0.015; with ten joints 0.03 and up to 0.25;
+    // - all rows, event-driven: 0.19, 0.26, 0.26, 3.2, 4.2 with one joint; 0.02, 0.05, 0.1, 12
+    //   and more with ten;
+    // - all rows, `auto`: 0.02 to 0.1.
+    component.dofs() <= 100 && component.has_definite_mass()
 }
 
 /// Returns the upper end of the frequency range with joints, rad/s: the highest odd harmonic of
 /// `excited` (rad/s) up to which the number of modes stays within its limit.
 fn joint_frequency_range(component: &Component, excited: f64) -> f64 {
-    let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= MAX_MODES_WITH_JOINTS);
-    let mut beyond =
-        (RANGE_WITHOUT_JOINTS + 1..=RANGE_WITH_JOINTS).rev().step_by(2).map(|harmonic| f64::from(harmonic) * excited);
+    // Largest number of modes when the range is extended for joints. More modes make time
+    // integration slow, and the mesh rarely resolves the highest ones.
+    let few = |omega: &f64| component.modes_below(*omega).is_some_and(|count| count <= 60);
+    // Default range with joints, in the same multiples. The harmonics of friction fall with the
+    // square of their order. A mode near one of them amplifies it again. Measured on a chain of
+    // 60 masses, where a mode meets harmonic 7: ranges of 5, 9, 15 and 31 harmonics left errors
+    // of 9e-3, 1e-3, 5e-5 and 5e-6.
+    let mut beyond = (RANGE_WITHOUT_JOINTS + 1..=15).rev().step_by(2).map(|harmonic| f64::from(harmonic) * excited);
     beyond.find(few).unwrap_or(f64::from(RANGE_WITHOUT_JOINTS) * excited)
 }
 
@@ -530,21 +521,18 @@ fn node_row(component: &Component, table: &CompiledTable, node: &str, along: &st
     })
 }
 
-/// Largest number of rows that a message lists.
-const MAX_LISTED_ROWS: usize = 4;
-/// Number of rows that are searched for a similar name; each takes a microsecond.
-const MAX_SEARCHED_ROWS: usize = 200_000;
-
 /// Returns the help for an unknown row: the rows of the same node, a similar name, or the first
 /// rows.
 fn row_help(component: &Component, name: &str) -> String {
+    // Largest number of rows that a message lists.
+    let max_listed_rows = 4;
     let rows = component.rows();
     let node = name.rsplit_once('.').map_or(name, |(node, _)| node);
     let same: Vec<&str> = rows
         .iter()
         .map(String::as_str)
         .filter(|row| row.rsplit_once('.').is_some_and(|(of, _)| of == node))
-        .take(2 * MAX_LISTED_ROWS)
+        .take(2 * max_listed_rows)
         .collect();
     if !same.is_empty() {
         return format!(
@@ -552,12 +540,13 @@ fn row_help(component: &Component, name: &str) -> String {
             alternatives(same).replace(" or ", ", ")
         );
     }
-    match suggest(name, rows.iter().take(MAX_SEARCHED_ROWS).map(String::as_str)) {
+    // Number of rows that are searched for a similar name; each takes a microsecond.
+    match suggest(name, rows.iter().take(200_000).map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`?"),
         None => {
-            let first = rows.iter().take(MAX_LISTED_ROWS).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
+            let first = rows.iter().take(max_listed_rows).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
             match rows.last() {
-                Some(last) if rows.len() > MAX_LISTED_ROWS => {
+                Some(last) if rows.len() > max_listed_rows => {
                     format!("its {} rows are {first}, … `{last}`", rows.len())
                 }
                 _ => format!("its rows are {first}"),

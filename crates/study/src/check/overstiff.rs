@@ -66,17 +66,14 @@ pub(crate) fn overstiff_element(model: &Model, omega: f64) -> Option<ModelError>
     Some(element_error(by, message))
 }
 
-/// Share of a motion that rounding may reach because of a mode far below the excitation.
-const ROUNDING_SHARE: f64 = 1e-6;
-
 /// Returns the error of a spring whose stiffness is lost in the rounding of the inertia at
 /// `omega`, rad/s.
 ///
-/// The condition is `ε √(m Ω²/k) >` [`ROUNDING_SHARE`] for the stiffest element of a mass.
+/// The condition is `ε √(m Ω²/k) > 1e-6` for the stiffest element of a mass.
 /// Returns `None` without such a spring.
 pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
-    let lost =
-        |held: &AttachedMass<'_>| f64::EPSILON * omega > ROUNDING_SHARE * (held.stiffness / held.mass.mass).sqrt();
+    // Share of a motion that rounding may reach because of a mode far below the excitation.
+    let lost = |held: &AttachedMass<'_>| f64::EPSILON * omega > 1e-6 * (held.stiffness / held.mass.mass).sqrt();
     let AttachedMass { mass, stiffness, element: by } = attached_masses(model).find(lost)?;
     let message = format!(
         "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
@@ -95,10 +92,6 @@ fn element_error(by: Element, message: String) -> ModelError {
     ModelError { element: by, key, message, wrong_name: None }
 }
 
-/// Factor of inertia over rounding at the suggested frequency; the motion is still quasi-static
-/// there.
-const INERTIA_MARGIN: f64 = 100.0;
-
 /// Returns the error of an excitation frequency `omega`, rad/s, that is too slow for every
 /// mass.
 pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
@@ -116,7 +109,9 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
     }
     let (own, name) = softest?;
     let shown = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
-    let enough = TAU * 10f64.powf((INERTIA_MARGIN.sqrt() * slowest / TAU).log10().ceil());
+    // Factor of inertia over rounding at the suggested frequency; the motion is still
+    // quasi-static there.
+    let enough = TAU * 10f64.powf((100f64.sqrt() * slowest / TAU).log10().ceil());
     let message = format!(
         "at {} inertia has no effect, because it is lost in rounding; the lowest natural frequency of a single mass is \
          {}, that of `{name}`",

@@ -28,55 +28,86 @@ pub struct StudySize {
     pub memory_all_tables: u64,
 }
 
-/// Bytes of a number in a table.
-const NUMBER: f64 = 8.0;
-/// Bytes of a word in a table: its handle and its heap allocation.
-const WORD: f64 = 56.0;
-/// Bytes of a cell as text in a CSV file. Measured: 85 for three numbers and a word.
-const CSV_CELL_BYTES: f64 = 20.0;
-/// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in
-/// HTML.
-const FIGURE_POINT_BYTES: f64 = 240.0;
-/// Bytes of an orbit: of exact laws per entry of its state and per switch, of smooth laws per
-/// entry.
-///
-/// Measured: exact 8 kB for the couple and 170 kB for 8 masses and joints; smooth 80 kB and 600
-/// kB.
-const ORBIT_ENTRY: f64 = 500.0;
-const SMOOTH_ENTRY: f64 = 24_000.0;
-/// Bytes per harmonic coefficient of a place or joint while harmonic balance solves an orbit.
-///
-/// Measured: 15 kB for the couple, 130 kB for 8 masses and joints, at 15 harmonics.
-const SERIES_ENTRY: f64 = 80.0;
-/// Bytes of the samples of force and contact of a joint over a period.
-///
-/// Measured: a ring of 480 blades and joints with seven harmonics takes 87 MB on two threads,
-/// including the orbits that are next to be solved.
-const SERIES_SAMPLES: f64 = 40.0 * 1024.0;
-/// Bytes of a complex coefficient.
-///
-/// An orbit keeps one for every degree of freedom, for each harmonic, the mean and the initial
-/// state. Its equations have one for each direction of a joint.
-const COEFFICIENT: f64 = 16.0;
-const DIRECTIONS: f64 = 3.0;
-/// Bytes of the measured quantities of a place, including its name.
-const PLACE_BYTES: f64 = 100.0;
-/// Samples per period at which [`SERIES_SAMPLES`] was measured.
-const REFERENCE_SAMPLES: f64 = 1024.0;
-/// Numbers per entry of a full matrix for a method that integrates in time.
-///
-/// These are three matrices of the structure, the inverse mass, and the return map with its
-/// products, which has twice the rows.
-const TIME_METHOD_MATRICES: f64 = 16.0;
-/// Bytes of the motion at one instant, per mass and joint.
-const SAMPLE: f64 = 64.0;
-/// Points per case of a curve with adaptive frequencies. Measured: 100 to 600 at tolerances of
-/// 1 %.
-const ADAPTIVE: f64 = 300.0;
-/// Switching points per period and joint, in addition to the requested instants.
-const SWITCHES: f64 = 4.0;
-/// Harmonics of a series whose number is not given.
-const SERIES_HARMONICS: f64 = 15.0;
+/// Bytes and counts from which the memory of a run is estimated.
+#[derive(Debug, Clone)]
+struct MemoryModel {
+    /// Bytes of a number in a table.
+    number: f64,
+    /// Bytes of a word in a table: its handle and its heap allocation.
+    word: f64,
+    /// Bytes of a cell as text in a CSV file. Measured: 85 for three numbers and a word.
+    csv_cell: f64,
+    /// Bytes of a point of a figure, in the dataset and drawn in all formats. Measured: 220 in
+    /// HTML.
+    figure_point: f64,
+    /// Bytes of an orbit of exact laws per entry of its state and per switch.
+    ///
+    /// Measured: 8 kB for the couple and 170 kB for 8 masses and joints.
+    orbit_entry: f64,
+    /// Bytes of an orbit of smooth laws per entry of its state.
+    ///
+    /// Measured: 80 kB for the couple and 600 kB for 8 masses and joints.
+    smooth_entry: f64,
+    /// Bytes per harmonic coefficient of a place or joint while harmonic balance solves an orbit.
+    ///
+    /// Measured: 15 kB for the couple, 130 kB for 8 masses and joints, at 15 harmonics.
+    series_entry: f64,
+    /// Bytes of the samples of force and contact of a joint over a period.
+    ///
+    /// Measured: a ring of 480 blades and joints with seven harmonics takes 87 MB on two threads,
+    /// including the orbits that are next to be solved.
+    series_samples: f64,
+    /// Bytes of a complex coefficient.
+    ///
+    /// An orbit keeps one for every degree of freedom, for each harmonic, the mean and the initial
+    /// state.
+    coefficient: f64,
+    /// Complex coefficients per joint and harmonic: one for each direction.
+    directions: f64,
+    /// Bytes of the measured quantities of a place, including its name.
+    place: f64,
+    /// Samples per period at which `series_samples` was measured.
+    reference_samples: f64,
+    /// Numbers per entry of a full matrix for a method that integrates in time.
+    ///
+    /// These are three matrices of the structure, the inverse mass, and the return map with its
+    /// products, which has twice the rows.
+    time_method_matrices: f64,
+    /// Bytes of the motion at one instant, per mass and joint.
+    sample: f64,
+    /// Points per case of a curve with adaptive frequencies. Measured: 100 to 600 at tolerances of
+    /// 1 %.
+    adaptive: f64,
+    /// Switching points per period and joint, in addition to the requested instants.
+    switches: f64,
+    /// Harmonics of a series whose number is not given.
+    series_harmonics: f64,
+}
+
+impl Default for MemoryModel {
+    fn default() -> Self {
+        MemoryModel {
+            number: 8.0,
+            word: 56.0,
+            csv_cell: 20.0,
+            figure_point: 240.0,
+            orbit_entry: 500.0,
+            smooth_entry: 24_000.0,
+            series_entry: 80.0,
+            series_samples: 40.0 * 1024.0,
+            coefficient: 16.0,
+            directions: 3.0,
+            place: 100.0,
+            reference_samples: 1024.0,
+            time_method_matrices: 16.0,
+            sample: 64.0,
+            adaptive: 300.0,
+            switches: 4.0,
+            series_harmonics: 15.0,
+        }
+    }
+}
+
 /// Memory of stored factors and motions: number of factors, and bytes at most. The factor that
 /// is being computed comes in addition.
 const STORED_FACTORS: (f64, f64) = (2.0, 3e9);
@@ -134,6 +165,7 @@ pub struct SizeInputs<'a> {
     /// Memory of one factor of the dynamic stiffness in all rows, bytes; zero if none is made.
     /// Stored here because computing it takes seconds for a large structure.
     factor_bytes: f64,
+    memory: MemoryModel,
 }
 
 /// Returns true if the method of a case is harmonic balance.
@@ -149,6 +181,7 @@ impl<'a> SizeInputs<'a> {
     /// Returns the counts of a study with this first case.
     pub(crate) fn new(study: &'a Study, surveyed: &'a SurveyedCase) -> Self {
         let (case, system) = (&surveyed.case, surveyed.survey.system());
+        let memory = MemoryModel::default();
         // the option `width` makes exact laws smooth
         let width = case.method.options.get("width");
         let followed = |law: &SharedLaw| width.and_then(|width| law.regularised(*width)).unwrap_or_else(|| law.clone());
@@ -160,7 +193,7 @@ impl<'a> SizeInputs<'a> {
             study,
             case,
             cases: study.cases() as f64,
-            frequencies: if study.is_adaptive() { ADAPTIVE } else { given },
+            frequencies: if study.is_adaptive() { memory.adaptive } else { given },
             varied: case.varied.len() as f64,
             dofs: system.dofs() as f64,
             places: system.places().len() as f64,
@@ -169,6 +202,7 @@ impl<'a> SizeInputs<'a> {
             smooth: laws.iter().any(|law| law.ideal_elements().is_none()),
             harmonic_balance: series,
             factor_bytes: factor_bytes as f64,
+            memory,
         }
     }
 
@@ -213,7 +247,7 @@ impl<'a> SizeInputs<'a> {
     /// Returns the instants of a period in a table: `samples` steps, both ends, and the
     /// switches.
     pub fn instants(&self) -> f64 {
-        self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + SWITCHES * self.joints
+        self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + self.memory.switches * self.joints
     }
 
     /// Returns the lowest and highest excitation frequency, rad/s.
@@ -231,8 +265,10 @@ impl<'a> SizeInputs<'a> {
         let orbits = self.frequencies.min(BLOCK as f64);
         if self.is_series() {
             let option = |name: &str, default: f64| self.case.method.options.get(name).copied().unwrap_or(default);
-            let kept =
-                self.kept_series_bytes(option("harmonics", SERIES_HARMONICS), option("samples", REFERENCE_SAMPLES));
+            let kept = self.kept_series_bytes(
+                option("harmonics", self.memory.series_harmonics),
+                option("samples", self.memory.reference_samples),
+            );
             return orbits * kept + self.orbit_bytes();
         }
         orbits * self.orbit_bytes()
@@ -243,21 +279,26 @@ impl<'a> SizeInputs<'a> {
     /// Measured: 1.0 MB for a ring of 12 sectors with 1188 coordinates and 12 joints of three
     /// directions, at 15 harmonics.
     pub fn kept_series_bytes(&self, harmonics: f64, samples: f64) -> f64 {
-        let coefficients = (harmonics + 2.0) * (self.dofs + DIRECTIONS * self.joints);
-        COEFFICIENT * coefficients
-            + PLACE_BYTES * self.places
-            + SERIES_SAMPLES * samples / REFERENCE_SAMPLES * self.joints
+        let coefficients = (harmonics + 2.0) * (self.dofs + self.memory.directions * self.joints);
+        self.memory.coefficient * coefficients
+            + self.memory.place * self.places
+            + self.memory.series_samples * samples / self.memory.reference_samples * self.joints
     }
 
     /// Returns the bytes of an orbit in memory while it is computed.
     pub fn orbit_bytes(&self) -> f64 {
         let state = 2.0 * self.dofs + self.joints + 1.0;
         if self.is_series() {
-            let harmonics = self.case.method.options.get("harmonics").copied().unwrap_or(SERIES_HARMONICS);
-            return self.series_bytes(harmonics) + SERIES_SAMPLES * self.joints;
+            let harmonics = self.case.method.options.get("harmonics").copied().unwrap_or(self.memory.series_harmonics);
+            return self.series_bytes(harmonics) + self.memory.series_samples * self.joints;
         }
-        let matrices = TIME_METHOD_MATRICES * NUMBER * self.dofs * self.dofs;
-        matrices + if self.smooth { SMOOTH_ENTRY * state } else { ORBIT_ENTRY * state * (2.0 + SWITCHES * self.joints) }
+        let matrices = self.memory.time_method_matrices * self.memory.number * self.dofs * self.dofs;
+        matrices
+            + if self.smooth {
+                self.memory.smooth_entry * state
+            } else {
+                self.memory.orbit_entry * state * (2.0 + self.memory.switches * self.joints)
+            }
     }
 
     /// Returns true if the method of the study is harmonic balance.
@@ -267,13 +308,13 @@ impl<'a> SizeInputs<'a> {
 
     /// Returns the bytes of the motion at the instants of one period.
     pub fn samples_bytes(&self) -> f64 {
-        self.instants() * SAMPLE * (2.0 + self.dofs + self.joints)
+        self.instants() * self.memory.sample * (2.0 + self.dofs + self.joints)
     }
 
     /// Returns the bytes that harmonic balance needs to solve an orbit of this number of
     /// harmonics.
     pub fn series_bytes(&self, harmonics: f64) -> f64 {
-        SERIES_ENTRY * (2.0 * harmonics + 1.0) * (2.0 * self.dofs + 4.0 * self.joints)
+        self.memory.series_entry * (2.0 * harmonics + 1.0) * (2.0 * self.dofs + 4.0 * self.joints)
     }
 }
 
@@ -297,12 +338,13 @@ impl SizeInputs<'_> {
     /// Returns the size of a study with these tables, divided into `units` units of work.
     pub(crate) fn size(&self, planned: &PlannedSize, units: usize) -> StudySize {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let tables = planned.cells(NUMBER + CSV_CELL_BYTES, WORD + CSV_CELL_BYTES);
+        let tables = planned.cells(self.memory.number + self.memory.csv_cell, self.memory.word + self.memory.csv_cell);
         // finished units wait until they are in order; a figure reads back at most
         // [`MAX_ROWS`] rows of a table
         let waiting = tables * ((UNITS_AHEAD * threads) as f64 / units.max(1) as f64).min(1.0);
-        let shown = planned.figure_cells(NUMBER + CSV_CELL_BYTES, WORD + CSV_CELL_BYTES);
-        let drawn = FIGURE_POINT_BYTES * planned.drawn.min(MAX_ROWS as f64 * (self.places + self.joints));
+        let shown =
+            planned.figure_cells(self.memory.number + self.memory.csv_cell, self.memory.word + self.memory.csv_cell);
+        let drawn = self.memory.figure_point * planned.drawn.min(MAX_ROWS as f64 * (self.places + self.joints));
         let factor = self.factor_bytes;
         let factors = factor + (STORED_FACTORS.0 * factor).min(STORED_FACTORS.1);
         let working = units.min(threads) as f64 * (planned.unit + factors);
@@ -310,7 +352,7 @@ impl SizeInputs<'_> {
         let whole = |value: f64| value as u64;
         StudySize {
             rows: whole(planned.rows()),
-            results: whole(planned.cells(NUMBER, NUMBER)),
+            results: whole(planned.cells(self.memory.number, self.memory.number)),
             memory: whole(tables.min(waiting + shown) + drawn + working),
             memory_all_tables: whole(tables + drawn + working),
         }

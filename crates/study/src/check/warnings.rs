@@ -234,14 +234,6 @@ fn narrowest_of(
     })
 }
 
-/// Fraction of the first slip below which a range of amplitudes shows a linear mode only.
-const NO_SLIP_FRACTION: f64 = 0.99;
-
-/// Multiple of the largest requested amplitude above which the first slip is due to rounding. A
-/// mode of a symmetric structure that does not move its joints still loads them by the rounding
-/// errors of its shape.
-const ROUNDING_SLIP_FACTOR: f64 = 1e6;
-
 /// Warnings of a nonlinear mode: its amplitudes end before any joint slips, or a constant force
 /// acts on the structure.
 pub(crate) fn mode_warnings(cases: &[SurveyedCase]) -> Vec<String> {
@@ -267,14 +259,18 @@ fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {
         let to = values.table("amplitude")?.quantity("to")?;
         // the range is that of the place with the largest motion in the mode without joints
         let slip = one.survey.slip_amplitude(number)? / unit_amplitude(one.survey.system(), number).ok()??;
-        if slip * NO_SLIP_FRACTION <= to {
+        // Fraction of the first slip below which a range of amplitudes shows a linear mode only.
+        if slip * 0.99 <= to {
             return None;
         }
         if slip < needed {
             (needed, asked) = (slip, to);
         }
     }
-    if needed > ROUNDING_SLIP_FACTOR * asked {
+    // Multiple of the largest requested amplitude above which the first slip is due to rounding.
+    // A mode of a symmetric structure that does not move its joints still loads them by the
+    // rounding errors of its shape.
+    if needed > 1e6 * asked {
         return Some("no joint slips in this mode at any amplitude: its motion does not load the joints".to_owned());
     }
     Some(format!(

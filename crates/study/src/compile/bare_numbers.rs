@@ -9,9 +9,6 @@ use crate::syntax::units;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 
-/// Relative difference of two factors that counts as rounding.
-const ROUNDING: f64 = 1e-12;
-
 /// Returns a problem if one quantity is a bare number and another one has a unit with a
 /// different factor to SI.
 pub(crate) fn bare_number_problem<'a>(
@@ -21,7 +18,8 @@ pub(crate) fn bare_number_problem<'a>(
     let all: Vec<&CompiledQuantity> = all.into_iter().collect();
     // a bare frequency is in Hz
     let bare = |dimension| if matches!(dimension, Dimension::FREQUENCY | Dimension::SWEEP_RATE) { TAU } else { 1.0 };
-    let is_bare_unit = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= ROUNDING;
+    // Relative difference of two factors that counts as rounding.
+    let is_bare_unit = |factor: f64, dimension| (factor / bare(dimension) - 1.0).abs() <= 1e-12;
     // no problem if one of the quantities has the unit in which a bare number counts
     if all.iter().filter_map(|q| literal_unit(q)).any(|(_, factor, dimension)| is_bare_unit(factor, dimension)) {
         return None;

@@ -263,6 +263,10 @@ impl CompiledValue {
         environment: &Environment<'_>,
         problems: &mut Vec<Problem>,
     ) -> Result<ResolvedValue, Problem> {
+        // Bounds of the tolerance of adaptive frequencies. A finer tolerance costs too many
+        // points, a coarser one hides the shape of the curve.
+        let min_adaptive_tolerance = 1e-5;
+        let max_adaptive_tolerance = 0.5;
         Ok(match self {
             CompiledValue::Fixed(given) => given.clone(),
             CompiledValue::Names(names) => ResolvedValue::Names(names.iter().map(|(name, _)| name.clone()).collect()),
@@ -291,9 +295,9 @@ impl CompiledValue {
                 check_range(start, end, to, Some(Dimension::FREQUENCY))?;
                 let positive = Expected { dimension: Dimension::NONE, within: Bounds::Positive };
                 let share = tolerance.number("tolerance", positive, "\"1 %\"", environment)?;
-                if !(MIN_ADAPTIVE_TOLERANCE..=MAX_ADAPTIVE_TOLERANCE).contains(&share) {
+                if !(min_adaptive_tolerance..=max_adaptive_tolerance).contains(&share) {
                     let message = format!(
-                        "must lie between {MIN_ADAPTIVE_TOLERANCE} and {MAX_ADAPTIVE_TOLERANCE}, found {share}"
+                        "must lie between {min_adaptive_tolerance} and {max_adaptive_tolerance}, found {share}"
                     );
                     return Err(tolerance.problem("tolerance", message).help("1 % makes a smooth figure"));
                 }
@@ -378,11 +382,6 @@ fn law(
     }
     row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
 }
-
-/// Bounds of the tolerance of adaptive frequencies. A finer tolerance costs too many points, a
-/// coarser one hides the shape of the curve.
-const MIN_ADAPTIVE_TOLERANCE: f64 = 1e-5;
-const MAX_ADAPTIVE_TOLERANCE: f64 = 0.5;
 
 /// Refuses a range whose end is not above its start.
 pub(crate) fn check_range(

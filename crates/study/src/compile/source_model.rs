@@ -328,14 +328,14 @@ fn reduction_advice(model: &Model) -> Option<String> {
 
 /// Limits of plausible frequencies of a structure, rad/s.
 const MIN_PLAUSIBLE_FREQUENCY: f64 = 1e-3 * std::f64::consts::TAU;
-const MAX_PLAUSIBLE_FREQUENCY: f64 = 1e8 * std::f64::consts::TAU;
 
 /// Returns the lowest frequencies of a component (rad/s) if they are plausible: one within the
 /// limits, none above.
 pub(crate) fn plausible_frequencies(component: &Component) -> Option<Vec<f64>> {
+    let max_plausible_frequency = 1e8 * std::f64::consts::TAU;
     let lowest = component.frequencies(SHOWN_FREQUENCIES.min(component.dofs())).ok()?;
-    let elastic = |omega: &&f64| (MIN_PLAUSIBLE_FREQUENCY..=MAX_PLAUSIBLE_FREQUENCY).contains(*omega);
-    (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= MAX_PLAUSIBLE_FREQUENCY))
+    let elastic = |omega: &&f64| (MIN_PLAUSIBLE_FREQUENCY..=max_plausible_frequency).contains(*omega);
+    (lowest.iter().any(|omega| elastic(&omega)) && lowest.iter().all(|omega| *omega <= max_plausible_frequency))
         .then_some(lowest)
 }
 

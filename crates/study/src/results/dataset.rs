@@ -239,11 +239,14 @@ impl Table {
     ///
     /// # Example
     /// ```
-    /// use stickslip_study::dataset::{Column, Table, CellValues};
+    /// use stickslip_study::dataset::{CellValues, Column, Table};
     /// let values = || CellValues::Number(vec![1.0]);
     /// let column = |name: &str| Column { name: name.to_owned(), values: values() };
     /// let mut table = Table { name: "curve".to_owned(), columns: vec![column("a"), column("c")] };
-    /// table.append(Table { name: "curve".to_owned(), columns: vec![column("a"), column("b"), column("c")] });
+    /// table.append(Table {
+    ///     name: "curve".to_owned(),
+    ///     columns: vec![column("a"), column("b"), column("c")],
+    /// });
     /// let names: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
     /// assert_eq!((names, table.rows()), (vec!["a", "b", "c"], 2));
     /// assert!(table.numbers("b").unwrap()[0].is_nan());

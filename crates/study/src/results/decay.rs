@@ -13,9 +13,6 @@
 
 use std::f64::consts::TAU;
 
-/// Swings below this share of the largest swing count as rest.
-const SMALLEST_SWING: f64 = 1e-9;
-
 /// One cycle of a decay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
@@ -74,7 +71,8 @@ impl Decay {
 
     /// Returns the consecutive cycles until the motion rests.
     pub fn cycles(&self) -> Vec<Cycle> {
-        let least = SMALLEST_SWING * self.largest();
+        // Swings below this share of the largest swing count as rest.
+        let least = 1e-9 * self.largest();
         let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
         let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
         let (swings, turns) = (&swings[..moves], &self.turns);
@@ -127,16 +125,14 @@ fn cubic([t0, x0, v0]: [f64; 3], [t1, x1, v1]: [f64; 3]) -> impl Fn(f64) -> [f64
 /// The motion has velocity `v0` at the first time; the search ends where the velocity in the
 /// direction of `v0` vanishes.
 fn turning_point(motion: &PlaceMotionFn<'_>, [mut low, mut high]: [f64; 2], v0: f64) -> (f64, f64) {
-    for _ in 0..BISECTIONS {
+    // Number of bisections of the time between two samples: all bits of a double.
+    for _ in 0..53 {
         let middle = 0.5 * (low + high);
         if motion(middle)[1] * v0 > 0.0 { low = middle } else { high = middle }
     }
     let time = 0.5 * (low + high);
     (time, motion(time)[0])
 }
-
-/// Number of bisections of the time between two samples: all bits of a double.
-const BISECTIONS: usize = 53;
 
 #[cfg(test)]
 mod tests {

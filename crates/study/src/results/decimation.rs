@@ -19,11 +19,16 @@ pub const MAX_ROWS: usize = 500_000;
 ///
 /// # Example
 /// ```
-/// use stickslip_study::{read_study, run::{Context, check}, decimation::Decimation};
+/// use stickslip_study::{
+///     decimation::Decimation,
+///     read_study,
+///     run::{Context, check},
+/// };
 /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
 /// let study = read_study("couple.toml", text, &[]).unwrap();
 /// let block = check(&study).unwrap().block(0..4, &Context::without_progress(1)).unwrap();
-/// let rows: Vec<_> = block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
+/// let rows: Vec<_> =
+///     block.tables.iter().map(|table| (table.name.as_str(), table.rows())).collect();
 /// let mut decimation = Decimation::new(&study, &rows);
 /// block.tables.iter().cloned().for_each(|table| decimation.add(table));
 /// assert!(decimation.keeps_all());
@@ -101,7 +106,9 @@ impl DecimatedTable {
                 study.cases().div_ceil(each)
             };
             // a bin keeps at most two rows for every column: a few dozen
-            bin = (kept * rows_per_case > most).then(|| (rows_per_case * kept).div_ceil(most).max(1) * ROWS_PER_BIN);
+            // Approximate number of rows that a bin keeps: a table has about a dozen columns
+            // with extremes at different rows.
+            bin = (kept * rows_per_case > most).then(|| (rows_per_case * kept).div_ceil(most).max(1) * 24);
         }
         DecimatedTable { rows: empty.clone(), cases, bin, key_columns: keys, current_case: None, open_bin: empty }
     }
@@ -170,10 +177,6 @@ impl DecimatedTable {
         self.rows
     }
 }
-
-/// Approximate number of rows that a bin keeps: a table has about a dozen columns with extremes
-/// at different rows.
-const ROWS_PER_BIN: usize = 24;
 
 fn key(table: &Table, row: usize, keys: usize) -> Vec<u64> {
     let columns = table.columns.iter().take(keys);

@@ -67,18 +67,15 @@ fn combine_draws(draws: &[&Panel]) -> Option<Panel> {
     Some(panel)
 }
 
-/// Largest number of points of a curve between two adjacent abscissae of a common grid.
-///
-/// Two evenly spaced grids satisfy this.
-const MAX_POINTS_PER_CELL: usize = 2;
-
 /// Returns true if `grid` is as fine as the points `x`, so that a curve over `grid` loses no
 /// detail.
 ///
 /// Adaptive steps fail this test: they put many points where other curves have few.
 fn is_as_fine_as(grid: &[f64], x: &[f64]) -> bool {
     let mut cells = x.chunk_by(|a, b| grid.partition_point(|at| at < a) == grid.partition_point(|at| at < b));
-    cells.all(|cell| cell.len() <= MAX_POINTS_PER_CELL)
+    // Largest number of points of a curve between two adjacent abscissae of a common grid. Two
+    // evenly spaced grids satisfy this.
+    cells.all(|cell| cell.len() <= 2)
 }
 
 fn is_line(style: Style) -> bool {

@@ -89,7 +89,9 @@ impl<'a> FigureInput<'a> {
             Some(true) => PanelLayout::Masses,
             Some(false) => PanelLayout::Cases,
             None if cases > 1 && cases * panels > MAX_PANELS => PanelLayout::Masses,
-            None if masses > 1 && cases <= MAX_CASES => PanelLayout::Cases,
+            // Up to this number of cases each case has a panel with all masses; beyond it each
+            // mass has a panel with all cases.
+            None if masses > 1 && cases <= 6 => PanelLayout::Cases,
             None => PanelLayout::Masses,
         }
     }
@@ -127,7 +129,9 @@ impl<'a> FigureInput<'a> {
         let positive = values.iter().all(|value| *value > 0.0);
         let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
         let middle = values.get(values.len() / 2).copied().unwrap_or(0.0);
-        let by_ratio = positive && high > DECADES * low && (middle / (low * high).sqrt()).ln().abs() < 0.7;
+        // Ratio of largest to smallest parameter value above which a logarithmic scale is
+        // considered.
+        let by_ratio = positive && high > 10.0 * low && (middle / (low * high).sqrt()).ln().abs() < 0.7;
         Some(if by_ratio { axis.log() } else { axis })
     }
 
@@ -216,11 +220,6 @@ impl<'a> FigureInput<'a> {
 
 /// Largest number of panels in a figure; the tables hold all cases.
 pub(crate) const MAX_PANELS: usize = 12;
-/// Up to this number of cases each case has a panel with all masses; beyond it each mass has a
-/// panel with all cases.
-const MAX_CASES: usize = 6;
-/// Ratio of largest to smallest parameter value above which a logarithmic scale is considered.
-const DECADES: f64 = 10.0;
 
 /// Returns at most `most` of `all`, evenly chosen, including both ends.
 pub(crate) fn evenly_chosen<T>(all: &[T], most: usize) -> Vec<&T> {

@@ -3,12 +3,8 @@
 use crate::results::dataset::{Axis, Panel, Series, Style};
 use crate::results::weibull::WeibullMaxima;
 
-/// Smallest number of values for a histogram.
-pub(crate) const MIN_VALUES: usize = 20;
 /// Smallest and largest number of bars.
 const BAR_LIMITS: (f64, f64) = (6.0, 60.0);
-/// Number of first values used for the fit; more values give the percentiles without a fit.
-const MAX_FITTED: usize = 20_000;
 /// Percentiles used in design.
 const DESIGN_PERCENTILES: [(f64, &str); 2] = [(0.99, "99 %"), (0.999, "99.9 %")];
 /// Number of points of the fitted curve, and the probabilities between which it is drawn. The
@@ -21,7 +17,8 @@ pub(crate) fn panel(values: &[f64], x: &Axis, title: &str, each: &str) -> Option
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let [low, .., high] = sorted[..] else { return None };
-    if sorted.len() < MIN_VALUES {
+    // Fewer values do not show a distribution.
+    if sorted.len() < 20 {
         return None;
     }
     let width = freedman_diaconis_width(&sorted);
@@ -57,7 +54,8 @@ fn freedman_diaconis_width(sorted: &[f64]) -> f64 {
 /// The title states the high percentiles if the distribution fits.
 pub(crate) fn panel_of_maxima(values: &[f64], x: &Axis, title: &str, each: &str) -> Option<Panel> {
     let mut panel = panel(values, x, title, each)?;
-    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(MAX_FITTED).collect();
+    // Number of first values used for the fit; more values give the percentiles without a fit.
+    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).take(20_000).collect();
     let Some(fit) = WeibullMaxima::fit(&finite) else { return Some(panel) };
     let bars = &panel.series[0];
     let top = bars.y.iter().copied().fold(0.0, f64::max);

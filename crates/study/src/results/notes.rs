@@ -15,10 +15,6 @@ use stickslip::structure::Reduction;
 /// Prefix of a note that is a warning.
 pub(crate) const WARNING: &str = "warning: ";
 
-/// Largest number of cases that a note names. If it applies to more cases, it gives their
-/// number.
-const MAX_NAMED_CASES: usize = 3;
-
 /// Largest number of cases with a permanently stuck joint that are named one by one. The points
 /// of all other such cases are counted together.
 const MAX_STUCK_CASES: usize = 4;
@@ -27,10 +23,6 @@ const MAX_STUCK_CASES: usize = 4;
 const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibrium under the constant loads, applied as one \
     ramp. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
     orbit that its run reached.";
-
-/// Relative change of the amplitudes with the history above which it is reported: the tolerance
-/// of harmonic balance.
-const HISTORY_TOLERANCE: f64 = 1e-3;
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,7 +35,7 @@ pub enum Note {
     Cases {
         /// Number of cases.
         cases: usize,
-        /// The first cases, at most [`MAX_NAMED_CASES`].
+        /// The first cases, at most three.
         named: Vec<String>,
         /// The sentence. It begins with [`WARNING`] if it is a warning.
         text: String,
@@ -150,7 +142,9 @@ impl Note {
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
         let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::UnknownStability(1));
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
-        let spread = orbit.evidence.history_spread.filter(|spread| *spread > HISTORY_TOLERANCE);
+        // Relative change of the amplitudes with the history above which it is reported: the
+        // tolerance of harmonic balance.
+        let spread = orbit.evidence.history_spread.filter(|spread| *spread > 1e-3);
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
         said.chain(Note::stuck_offset_note(model, orbit))
             .chain(range)
@@ -238,7 +232,9 @@ impl Note {
                     if text == same =>
                 {
                     *cases += more;
-                    let free_names = MAX_NAMED_CASES.saturating_sub(named.len());
+                    // Largest number of cases that a note names. If it applies to more cases, it
+                    // gives their number.
+                    let free_names = 3usize.saturating_sub(named.len());
                     named.extend(others.iter().take(free_names).cloned());
                     return;
                 }

@@ -2,18 +2,6 @@
 
 use crate::results::dataset::{Series, Style};
 
-/// Ends of the band and the line in it, as fractions.
-const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
-/// Minimum fraction of the curves that must have a value at an abscissa; below it the band has a
-/// gap. Curves without any value do not count.
-///
-/// If curves end at different abscissae, the remaining ones are not a sample of all. With this
-/// fraction their median is that of all to 2.5 percentage points.
-const MIN_FRACTION: f64 = 0.95;
-/// Relative distance of abscissae that differ by rounding only, such as computed amplitudes at
-/// which a curve begins.
-const ABSCISSA_TOLERANCE: f64 = 1e-9;
-
 /// Returns the median and the band of curves `(x, y)`, over the abscissae of the first curve
 /// with the most points.
 ///
@@ -28,7 +16,11 @@ pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: 
     let sorted = |at: usize| {
         let mut values: Vec<f64> = all.iter().map(|y| y[at]).filter(|value| !value.is_nan()).collect();
         values.sort_by(f64::total_cmp);
-        Some(values).filter(|values| !values.is_empty() && values.len() as f64 >= MIN_FRACTION * known as f64)
+        // Minimum fraction of the curves that must have a value at an abscissa; below it the
+        // band has a gap. Curves without any value do not count. If curves end at different
+        // abscissae, the remaining ones are not a sample of all. With this fraction their median
+        // is that of all to 2.5 percentage points.
+        Some(values).filter(|values| !values.is_empty() && values.len() as f64 >= 0.95 * known as f64)
     };
     let values: Vec<Option<Vec<f64>>> = (0..grid.len()).map(sorted).collect();
     let first = values.iter().position(Option::is_some).unwrap_or(0);
@@ -40,7 +32,8 @@ pub(crate) fn percentiles(curves: &[(Vec<f64>, Vec<f64>)], label: &str, colour: 
             .map(|values| values.as_ref().map_or(f64::NAN, |values| quantile(values, share)))
             .collect()
     };
-    let [low, middle, high] = QUANTILES.map(at_quantile);
+    // Ends of the band and the line in it, as fractions.
+    let [low, middle, high] = [0.05, 0.5, 0.95].map(at_quantile);
     let named = |what: &str| if label.is_empty() { what.to_owned() } else { format!("{label}, {what}") };
     vec![
         Series::band(named("5 % to 95 %"), x.to_vec(), low, high, colour),
@@ -59,7 +52,9 @@ fn quantile(values: &[f64], share: f64) -> f64 {
 
 /// Returns whether two abscissae differ by rounding only.
 fn is_same_abscissa(one: f64, other: f64) -> bool {
-    (one - other).abs() <= ABSCISSA_TOLERANCE * one.abs().max(other.abs())
+    // Relative distance of abscissae that differ by rounding only, such as computed amplitudes
+    // at which a curve begins.
+    (one - other).abs() <= 1e-9 * one.abs().max(other.abs())
 }
 
 /// Returns a curve at other abscissae by linear interpolation; NaN outside its range.

@@ -29,32 +29,6 @@ pub(crate) struct WeibullMaxima {
     covariance: [[f64; 3]; 3],
 }
 
-/// Minimum number of values for a fit of three parameters.
-const MIN_VALUES: usize = 20;
-/// Lower end of the search for the bound: its distance above the largest value, relative to the
-/// range of the values.
-const MIN_BOUND_DISTANCE: f64 = 1e-4;
-/// Upper end of the search for the bound. From here on the distribution equals that of Gumbel,
-/// which has no bound, to a thousandth of its shape.
-const MAX_BOUND_DISTANCE: f64 = 1e3;
-/// Number of steps of the search for the bound, in equal ratios.
-const SEARCH_STEPS: usize = 48;
-/// Relative tolerance of the bound's distance.
-const BOUND_TOLERANCE: f64 = 1e-10;
-/// Maximum number of iterations for the shape. Newton's method takes about six; bisection keeps
-/// it within its bounds.
-const MAX_ITERATIONS: usize = 80;
-/// Relative change of the shape at which the iteration ends.
-const SHAPE_TOLERANCE: f64 = 1e-13;
-/// Below this shape the density has a peak or a step at the bound, and the likeliest bound is
-/// the largest value itself.
-const MIN_SHAPE: f64 = 1.0;
-/// Above this shape the likelihood is regular in the bound, too (Smith 1985).
-const MIN_REGULAR_SHAPE: f64 = 2.0;
-/// Kolmogorov-Smirnov distance times the square root of the number of values above which the
-/// fit is rejected. One in a hundred samples exceeds it if the parameters are known, fewer if
-/// they are fitted (Kolmogorov 1933).
-const KOLMOGOROV_LIMIT: f64 = 1.63;
 /// Half width, in standard deviations, of the interval that contains 95 % of a normal
 /// distribution.
 const NORMAL_QUANTILE_975: f64 = 1.959_963_984_540_054;
@@ -72,25 +46,36 @@ impl WeibullMaxima {
     /// Returns `None` for fewer than 20 values, for equal values, and if the likelihood has no
     /// maximum because the values crowd at their upper end.
     pub fn fit(values: &[f64]) -> Option<WeibullMaxima> {
+        // Number of steps of the search for the bound, in equal ratios.
+        let search_steps: usize = 48;
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         let range = high - low;
-        if values.len() < MIN_VALUES || !(range > 0.0 && range.is_finite()) {
+        // Minimum number of values for a fit of three parameters.
+        if values.len() < 20 || !(range > 0.0 && range.is_finite()) {
             return None;
         }
         let bound = |s: f64| high + range * libm::exp(s);
-        let profile = |s: f64| ProfileLikelihood::fit(values, bound(s)).filter(|profile| profile.shape > MIN_SHAPE);
+        // Below this shape the density has a peak or a step at the bound, and the likeliest
+        // bound is the largest value itself.
+        let profile = |s: f64| ProfileLikelihood::fit(values, bound(s)).filter(|profile| profile.shape > 1.0);
         let height = |s: f64| profile(s).map_or(f64::NEG_INFINITY, |profile| profile.likelihood);
-        let (from, to) = (libm::log(MIN_BOUND_DISTANCE), libm::log(MAX_BOUND_DISTANCE));
-        let step = (to - from) / SEARCH_STEPS as f64;
+        // Lower end of the search for the bound: its distance above the largest value, relative
+        // to the range of the values.
+        // Upper end of the search for the bound. From here on the distribution equals that of
+        // Gumbel, which has no bound, to a thousandth of its shape.
+        let (from, to) = (libm::log(1e-4), libm::log(1e3));
+        let step = (to - from) / search_steps as f64;
         let at = |i: usize| from + step * i as f64;
-        let heights: Vec<f64> = (0..=SEARCH_STEPS).map(|i| height(at(i))).collect();
-        let best = (0..=SEARCH_STEPS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
-        let ends = (at(best.saturating_sub(1)), at((best + 1).min(SEARCH_STEPS)));
-        let Ok((s, _)) = golden_section(ends, |a, b| b - a < BOUND_TOLERANCE, |s| Ok::<_, Infallible>(height(s)));
+        let heights: Vec<f64> = (0..=search_steps).map(|i| height(at(i))).collect();
+        let best = (0..=search_steps).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
+        let ends = (at(best.saturating_sub(1)), at((best + 1).min(search_steps)));
+        // Relative tolerance of the bound's distance.
+        let Ok((s, _)) = golden_section(ends, |a, b| b - a < 1e-10, |s| Ok::<_, Infallible>(height(s)));
         let ProfileLikelihood { scale, shape, .. } = profile(s)?;
         let found = WeibullMaxima { upper_bound: bound(s), scale, shape, covariance: [[0.0; 3]; 3] };
         // the bound counts as known at the far end, and if the likelihood is not regular in it
-        let known = best == SEARCH_STEPS || shape <= MIN_REGULAR_SHAPE;
+        // Above this shape the likelihood is regular in the bound, too (Smith 1985).
+        let known = best == search_steps || shape <= 2.0;
         Some(WeibullMaxima { covariance: found.covariance(values, known)?, ..found })
     }
 
@@ -110,7 +95,10 @@ impl WeibullMaxima {
             let share = self.cumulative_probability(*value);
             (share - below as f64 / count).max((below + 1) as f64 / count - share)
         });
-        apart.fold(0.0, f64::max) * count.sqrt() <= KOLMOGOROV_LIMIT
+        // Kolmogorov-Smirnov distance times the square root of the number of values above which
+        // the fit is rejected. One in a hundred samples exceeds it if the parameters are known,
+        // fewer if they are fitted (Kolmogorov 1933).
+        apart.fold(0.0, f64::max) * count.sqrt() <= 1.63
     }
 
     /// Returns the value that is not exceeded with the probability `share`.
@@ -222,7 +210,9 @@ impl ProfileLikelihood {
         // 1.28 is the standard deviation of ln y times the shape, π/√6
         let mut shape = 1.28 / spread;
         let (mut below, mut above) = (0.0, f64::INFINITY);
-        for _ in 0..MAX_ITERATIONS {
+        // Maximum number of iterations for the shape. Newton's method takes about six; bisection
+        // keeps it within its bounds.
+        for _ in 0..80 {
             let [sum, first, second] = sums(shape);
             let (slope, weighted) = (second / sum - (first / sum).powi(2), first / sum);
             let value = weighted - 1.0 / shape - mean;
@@ -236,7 +226,8 @@ impl ProfileLikelihood {
             let next = if newton > below && newton < above { newton } else { halved };
             let change = (next - shape).abs();
             shape = next;
-            if change <= SHAPE_TOLERANCE * shape {
+            // Relative change of the shape at which the iteration ends.
+            if change <= 1e-13 * shape {
                 break;
             }
         }

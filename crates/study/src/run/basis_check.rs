@@ -15,33 +15,6 @@ use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
 use stickslip_numerics::tie_break::first_largest;
 
-/// Factors on the frequency limit of the basis. The check uses the first factor whose number of
-/// modes is at most [`MAX_MODES`].
-///
-/// Measured on chains of 80 and 300 masses, compared with all rows. The driven end has a slider
-/// of 2 N/um or a rigid one. A basis up to fifteen harmonics had errors of 3 to 8 %; twice that
-/// limit gave 2 %, four times 0.3 to 0.8 %, eight times 0.02 to 0.3 %.
-const BASIS_FACTORS: [f64; 2] = [8.0, 4.0];
-/// Number of points per unit of work that are solved again: the largest, and others over the
-/// whole range.
-///
-/// The error depends on which mode a harmonic excites. Measured on 300 masses: 0.8 % at the
-/// largest of 21 points, 9 % at the worst.
-const POINTS: usize = 4;
-/// Number of first units of work that are all checked.
-///
-/// Cases with different slip limits have different harmonics. Measured: one of three cases had
-/// an error of 0.6 %, the others 2.6 %.
-const CHECKED_FIRST_UNITS: usize = 16;
-/// Largest number of modes in the larger basis; methods that integrate in time are slow with
-/// more.
-const MAX_MODES: usize = 60;
-/// Largest number of rows for the check; reducing this size takes ten seconds.
-const MAX_ROWS: usize = 30_000;
-/// Difference relative to the largest amplitude above which the note becomes a warning with
-/// advice.
-const WARNING_DIFFERENCE: f64 = 0.01;
-
 /// Points with slip on a reduced structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SlipReductionCheck {
@@ -81,10 +54,12 @@ pub struct BasisDifference {
 
 /// Returns true if a unit of work with this number of points is checked.
 ///
-/// About [`POINTS`] of every [`BLOCK`] points are solved again, and [`POINTS`] of each of the
+/// About four of every [`BLOCK`] points are solved again, and four of each of the
 /// first units.
 pub(crate) fn is_checked(unit: usize, points: usize) -> bool {
-    unit < CHECKED_FIRST_UNITS || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
+    // Number of first units of work that are all checked. Cases with different slip limits have
+    // different harmonics. Measured: one of three cases had an error of 0.6 %, the others 2.6 %.
+    unit < 16 || unit.is_multiple_of((BLOCK / points.max(1)).max(1))
 }
 
 impl SlipReductionCheck {
@@ -171,7 +146,9 @@ impl SlipReductionCheck {
                      more",
                     hertz(*up_to)
                 );
-                match *error > WARNING_DIFFERENCE {
+                // Difference relative to the largest amplitude above which the note becomes a
+                // warning with advice.
+                match *error > 0.01 {
                     true => format!(
                         "{warning}{slips}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
                         hertz(*up_to)
@@ -191,20 +168,32 @@ impl CurvePoint {
 
 /// Returns the indices of the largest point and of others over the whole range, ascending.
 fn chosen(points: &[CurvePoint]) -> BTreeSet<usize> {
+    // Number of points per unit of work that are solved again: the largest, and others over the
+    // whole range. The error depends on which mode a harmonic excites. Measured on 300 masses:
+    // 0.8 % at the largest of 21 points, 9 % at the worst.
+    let few = 4;
     let heights: Vec<f64> = points.iter().map(CurvePoint::largest).collect();
-    let others = (0..POINTS - 1).map(|k| k * points.len().saturating_sub(1) / (POINTS - 2));
+    let others = (0..few - 1).map(|k| k * points.len().saturating_sub(1) / (few - 2));
     first_largest(heights.iter().copied()).into_iter().chain(others).filter(|index| *index < points.len()).collect()
 }
 
 /// Assembles the same model with a larger reduction basis, if it has few enough modes.
 fn larger_basis_system(model: &Model, system: &System) -> Option<System> {
     let (own, few) = (model.substructure.as_ref()?, system.reduced()?);
-    if own.component.dofs() > MAX_ROWS {
+    // Largest number of rows for the check; reducing this size takes ten seconds.
+    if own.component.dofs() > 30_000 {
         return None;
     }
+    // Largest number of modes in the larger basis; methods that integrate in time are slow with
+    // more.
     let counted =
-        |times: &f64| own.component.modes_below(times * few.intended_up_to()).is_some_and(|count| count <= MAX_MODES);
-    let times = BASIS_FACTORS.into_iter().find(counted)?;
+        |times: &f64| own.component.modes_below(times * few.intended_up_to()).is_some_and(|count| count <= 60);
+    // Factors on the frequency limit of the basis. The check uses the first factor whose number
+    // of modes is at most 60. Measured on chains of 80 and 300 masses, compared with
+    // all rows. The driven end has a slider of 2 N/um or a rigid one. A basis up to fifteen
+    // harmonics had errors of 3 to 8 %; twice that limit gave 2 %, four times 0.3 to 0.8 %,
+    // eight times 0.02 to 0.3 %.
+    let times = [8.0, 4.0].into_iter().find(counted)?;
     let model = Model { substructure: Some(own.with_extended_range(few, times)), ..model.clone() };
     model.assemble().ok()
 }

@@ -25,8 +25,6 @@ const TIME_LIMIT: Duration = Duration::from_secs(1);
 /// Additional time for a probe that does not end at the limit, because one of its steps is long.
 /// After that, its thread is abandoned and ends after this step.
 const GRACE_TIME: Duration = Duration::from_millis(500);
-/// Expected time above which a run announces it, s.
-const LONG_RUN: f64 = 3600.0;
 
 /// Expected time of a run on one thread.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,7 +79,8 @@ impl ExpectedTime {
             ExpectedTime::Extrapolated { seconds, .. } => *seconds,
             ExpectedTime::MoreThan { seconds, parts, .. } => *seconds * *parts as f64,
         };
-        (least >= LONG_RUN).then(|| format!("this run takes {self}; Ctrl-C ends the run and keeps the finished points"))
+        // Expected time above which a run announces it, s.
+        (least >= 3600.0).then(|| format!("this run takes {self}; Ctrl-C ends the run and keeps the finished points"))
     }
 }
 

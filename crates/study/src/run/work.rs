@@ -122,23 +122,22 @@ pub(crate) fn refusal_at_location(study: &Study, case: &Case, error: &MethodErro
     }
 }
 
-/// Velocity, m/s, over which laws are smoothed to test whether smoothing would help.
-const TRIAL_WIDTH: f64 = 1e-3;
-
 /// Returns the advice for a refused model. A kind that uses no method cannot take another one.
 fn refusal_advice(study: &Study, case: &Case, ways: &Alternatives) -> String {
+    // Velocity, m/s, over which laws are smoothed to test whether smoothing would help.
+    let trial_width = 1e-3;
     let kind = study.kind();
     if kind.uses_method || !ways.any() {
         return ways.to_string();
     }
-    let smoothed = Options::from([(WIDTH.to_owned(), TRIAL_WIDTH)]);
+    let smoothed = Options::from([(WIDTH.to_owned(), trial_width)]);
     let helps = case.model.assemble().is_ok_and(|system| (kind.needs)(&case.values, &smoothed, &system).is_ok());
     let smoothing = method::TABLE.iter().find(|row| row.options.iter().any(|option| option.key == WIDTH));
     match smoothing.filter(|_| helps) {
         Some(row) => format!(
             "give a velocity over which friction changes its sign: [method] with kind = \"{}\" and {WIDTH} = \"{}\"",
             row.name,
-            quantity_text(TRIAL_WIDTH, Some(Dimension::VELOCITY))
+            quantity_text(trial_width, Some(Dimension::VELOCITY))
         ),
         None => format!(
             "a study of kind `{}` uses its own method, which does not accept this model; for kinds with a choice of \

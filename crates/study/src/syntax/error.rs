@@ -161,11 +161,6 @@ impl StudyError {
     }
 }
 
-/// Longest line that is drawn, bytes.
-///
-/// A picture of a longer line is not readable, and `miette` panics on columns above 65535.
-const LONGEST_LINE: usize = 2_000;
-
 impl StudyError {
     /// Returns the bytes to underline if their lines and the adjacent lines are short enough to
     /// draw.
@@ -176,7 +171,9 @@ impl StudyError {
         let on = |from: usize| text[from..].find('\n').map_or(text.len(), |i| from + i);
         let start = back(span.start).map_or(0, |end| back(end).map_or(0, |i| i + 1));
         let end = on((on(span.end) + 1).min(text.len()));
-        text[start..end].split('\n').all(|line| line.len() <= LONGEST_LINE).then_some(span)
+        // Longest line that is drawn, bytes. A picture of a longer line is not readable, and
+        // `miette` panics on columns above 65535.
+        text[start..end].split('\n').all(|line| line.len() <= 2_000).then_some(span)
     }
 }
 

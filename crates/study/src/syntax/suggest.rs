@@ -40,10 +40,10 @@ pub(crate) fn alternatives<'a>(words: impl IntoIterator<Item = &'a str>) -> Stri
 /// Makes a word of the file fit for one line of a message: replaces control characters and cuts
 /// it to 60 characters.
 pub(crate) fn excerpt(word: &str) -> String {
-    const MAX_LENGTH: usize = 60;
+    let max_length = 60;
     let mut text: String =
-        word.chars().take(MAX_LENGTH).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
-    if word.chars().nth(MAX_LENGTH).is_some() {
+        word.chars().take(max_length).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
+    if word.chars().nth(max_length).is_some() {
         text.push('…');
     }
     text

@@ -300,11 +300,6 @@ struct UnitParser<'a> {
     depth: usize,
 }
 
-/// Maximum depth of parentheses in a unit.
-const MAX_DEPTH: usize = 8;
-/// Maximum power of a unit.
-const MAX_POWER: i32 = 9;
-
 impl UnitParser<'_> {
     fn rest(&self) -> &str {
         &self.text[self.position..]
@@ -413,7 +408,8 @@ impl UnitParser<'_> {
         let start = self.position;
         let unit = if self.peek() == Some('(') {
             self.depth += 1;
-            if self.depth > MAX_DEPTH {
+            // Maximum depth of parentheses in a unit.
+            if self.depth > 8 {
                 return Err(TextError::new(start..start + 1, "too many parentheses in a unit"));
             }
             self.position += 1;
@@ -441,6 +437,8 @@ impl UnitParser<'_> {
     }
 
     fn exponent(&mut self) -> Result<Option<i32>, TextError> {
+        // Maximum power of a unit.
+        let max_power = 9;
         const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
         let start = self.position;
         let raised: String = self.rest().chars().take_while(|c| *c == '⁻' || RAISED.contains(c)).collect();
@@ -470,10 +468,10 @@ impl UnitParser<'_> {
             raised.chars().map(plain).collect()
         };
         match digits.parse::<i32>() {
-            Ok(exponent) if exponent.abs() <= MAX_POWER => Ok(Some(exponent)),
+            Ok(exponent) if exponent.abs() <= max_power => Ok(Some(exponent)),
             _ => Err(TextError::new(
                 start..self.position,
-                format!("the power of a unit must be a whole number from -{MAX_POWER} to {MAX_POWER}"),
+                format!("the power of a unit must be a whole number from -{max_power} to {max_power}"),
             )
             .help("to raise a quantity to another power, put it in parentheses: \"(2 m)^0.5\"")),
         }

@@ -4,23 +4,10 @@
 use super::natural_modes::{BLOCK, ModesError, NaturalModes};
 use crate::eigen;
 use crate::interrupt;
+use crate::random::SplitMix64;
 use crate::sparse::{LdlFactor, SparseMatrix, multi_vector};
+use crate::vector::dot;
 use nalgebra::DMatrix;
-
-/// Largest residual (a relative error bound of `λ - σ`) of an accepted mode;
-/// 1e-11 to 1e-15 is usual. The error is about its square.
-const ACCURATE: f64 = 1e-8;
-/// A new vector is rounding if its norm, relative to its norm before the projection, is below this.
-const DEPENDENCE: f64 = 1e-14;
-/// Below this fraction, so much has cancelled that the vector is orthogonalized once more. If
-/// half of it then vanishes, it was rounding.
-const CANCELLED: f64 = 1e-6;
-/// Below this fraction `M v` is recomputed, because the digits of a projected
-/// `M v` cancel with those of v.
-const RECOMPUTE_BELOW: f64 = 0.1;
-/// A negative `vᵀ M v` up to this fraction of `Σ |vᵢ Mᵢₖ vₖ|` is the rounding
-/// of a file with ten digits.
-const MASSLESS: f64 = 1e-10;
 
 /// An eigenvalue of the projected operator (Ritz value) and its vector.
 pub(super) struct RitzPair {
@@ -49,7 +36,7 @@ pub(super) struct Lanczos<'a> {
     /// Components of the last expansion along the block that it added.
     coupling: DMatrix<f64>,
     /// State of the random start vectors.
-    seed: u64,
+    random: SplitMix64,
 }
 
 impl<'a> Lanczos<'a> {
@@ -67,7 +54,7 @@ impl<'a> Lanczos<'a> {
             projected: vec![],
             expanded: 0,
             coupling,
-            seed: 0,
+            random: SplitMix64::new(0),
         }
     }
 
@@ -120,18 +107,21 @@ impl<'a> Lanczos<'a> {
     /// Returns the norm of a vector `v`, with `force` = M v. It is zero if all digits of
     /// `vᵀ M v` cancel, as for a motion without mass.
     fn norm(&self, v: &[f64], force: &[f64]) -> Result<f64, ModesError> {
+        // A negative `vᵀ M v` up to this fraction of `Σ |vᵢ Mᵢₖ vₖ|` is the rounding of a file
+        // with ten digits.
+        let massless = 1e-10;
         let (square, longest) = (dot(v, force), self.max_mass_entry * dot(v, v));
         if !square.is_finite() {
             return Err(ModesError::OutOfRange);
         }
-        if square > MASSLESS * longest {
+        if square > massless * longest {
             return Ok(square.sqrt());
         }
         let sum: f64 = self.mass.entries().map(|(row, column, value)| (v[row] * value * v[column]).abs()).sum();
         let rounding = f64::EPSILON * self.n.max(16) as f64;
         if square > rounding * sum {
             Ok(square.sqrt())
-        } else if square >= -MASSLESS * sum - 8.0 * rounding * longest {
+        } else if square >= -massless * sum - 8.0 * rounding * longest {
             Ok(0.0)
         } else {
             Err(ModesError::NegativeMass)
@@ -176,18 +166,24 @@ impl<'a> Lanczos<'a> {
                 multi_vector::add(n, &mut force, -1.0, &self.mass_times_basis[(first - self.expanded) * n..], &part);
                 along += part;
                 // The sign of a product that cancels to rounding is not reliable either.
-                if dot(&column, &force) < (RECOMPUTE_BELOW * left).powi(2) {
+                // Below this fraction `M v` is recomputed, because the digits of a projected `M
+                // v` cancel with those of v.
+                if dot(&column, &force) < (0.1 * left).powi(2) {
                     force = self.mass.multiply_columns(&column);
                 }
                 left = self.norm(&column, &force)?;
             }
             (0..along.nrows()).for_each(|i| components[(i, k)] = along[(i, 0)]);
-            if left <= DEPENDENCE * size {
+            // A new vector is rounding if its norm, relative to its norm before the projection,
+            // is below this.
+            if left <= 1e-14 * size {
                 continue;
             }
             scale(&mut column, 1.0 / left);
             scale(&mut force, 1.0 / left);
-            if left < CANCELLED * size {
+            // Below this fraction, so much has cancelled that the vector is orthogonalized once
+            // more. If half of it then vanishes, it was rounding.
+            if left < 1e-6 * size {
                 self.project_out(&mut column, &mut force);
                 let second = self.norm(&column, &force)?;
                 if second < 0.5 {
@@ -220,14 +216,9 @@ impl<'a> Lanczos<'a> {
         Ok(())
     }
 
-    /// Returns a random number between -1 and 1, with the same bits on every
-    /// machine (Steele, Lea and Flood 2014, splitmix64).
+    /// Returns a random number between -1 and 1, with the same bits on every machine.
     fn random(&mut self) -> f64 {
-        self.seed = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.seed;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        2.0 * self.random.next_unit() - 1.0
     }
 
     /// Returns the eigenvalues of the projected operator, in falling order of |θ|.
@@ -300,7 +291,9 @@ impl<'a> Lanczos<'a> {
         let residuals = self.norms(&off, &self.mass.multiply_columns(&off))?;
         // A rigid-body mode not found yet may spoil others by the rounding of
         // the factor. A later run finds those.
-        let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= ACCURATE).collect();
+        // Largest residual (a relative error bound of `λ - σ`) of an accepted mode; 1e-11 to
+        // 1e-15 is usual. The error is about its square.
+        let good: Vec<usize> = (0..count).filter(|&k| residuals[k] <= 1e-8).collect();
         if good.is_empty() {
             return Err(ModesError::Inaccurate { value: values[0], residual: residuals[0] });
         }
@@ -310,10 +303,6 @@ impl<'a> Lanczos<'a> {
         modes.merge(n, NaturalModes { values, shapes, residuals, ..NaturalModes::empty() });
         Ok(modes)
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn scale(v: &mut [f64], factor: f64) {

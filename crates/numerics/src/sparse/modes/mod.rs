@@ -29,46 +29,71 @@ use lanczos::{Lanczos, RitzPair};
 use natural_modes::BLOCK;
 pub use natural_modes::{ModesCost, ModesError, NaturalModes};
 
-/// Residual in the Lanczos process, relative to θ, at which a mode has
-/// converged. The error of the eigenvalue is about its square.
-const CONVERGED: f64 = 1e-10;
-/// An eigenvalue above a bound by less than this relative difference counts as below it.
-const ROUNDING: f64 = 1e-9;
-/// Maximum number of vectors of a run. Each takes memory of n numbers.
-const MAX_VECTORS: usize = 320;
-/// Maximum number of runs. Each run except the first starts where eigenvalues are known to be
-/// missing, and finds about `MAX_VECTORS` / 3 modes.
-const MAX_RUNS: usize = 100;
-/// The first shift without other knowledge, relative to a typical `k_ii / m_ii`.
-///
-/// It is below the first mode of a compact body and far above the rounding of a rigid-body
-/// mode. An eigenvalue as far below zero is not rounding.
-const SHIFT: f64 = 1e-6;
-/// Smallest shift relative to a typical `k_ii / m_ii`: the rounding of K.
-const LEAST_SHIFT: f64 = 1e-12;
-/// The first shift relative to the upper bound of the wanted modes.
-const SHIFT_OF_BOUND: f64 = 0.01;
+/// Settings of the search for modes.
+#[derive(Debug, Clone)]
+struct ModesSettings {
+    /// Residual in the Lanczos process, relative to θ, at which a mode has
+    /// converged. The error of the eigenvalue is about its square.
+    tolerance: f64,
+    /// An eigenvalue above a bound by less than this relative difference counts as below it.
+    rounding: f64,
+    /// Maximum number of vectors of a run. Each takes memory of n numbers.
+    max_vectors: usize,
+    /// Maximum number of runs. Each run except the first starts where eigenvalues are known to be
+    /// missing, and finds about `max_vectors` / 3 modes.
+    max_runs: usize,
+    /// The first shift without other knowledge, relative to a typical `k_ii / m_ii`.
+    ///
+    /// It is below the first mode of a compact body and far above the rounding of a rigid-body
+    /// mode. An eigenvalue as far below zero is not rounding.
+    shift: f64,
+    /// Smallest shift relative to a typical `k_ii / m_ii`: the rounding of K.
+    least_shift: f64,
+    /// The first shift relative to the upper bound of the wanted modes.
+    shift_of_bound: f64,
+    /// Number of blocks after which an unfinished search tests if its first shift was too large.
+    /// These blocks cost about as much as another factor.
+    slender_check_blocks: usize,
+    /// Number of blocks between two convergence checks.
+    check_interval: usize,
+    /// Divisor of the number of blocks so far that gives a longer interval between checks. The
+    /// cost of the projected problem grows with the cube of the blocks.
+    check_divisor: usize,
+    /// Smallest gap between two eigenvalues, relative to their distance from the
+    /// first shift, in which eigenvalues can be counted.
+    gap: f64,
+    /// Distance beyond the last mode found at which eigenvalues are counted and the next run
+    /// starts. It is relative to the distance of that mode from the first shift.
+    ///
+    /// It is at least the magnitude of that shift, for structures with many rigid-body modes.
+    next_shift_distance: f64,
+    /// Number of attempts to factor near an eigenvalue, each further away by `gap`.
+    attempts: usize,
+}
+
+impl Default for ModesSettings {
+    fn default() -> Self {
+        ModesSettings {
+            tolerance: 1e-10,
+            rounding: 1e-9,
+            max_vectors: 320,
+            max_runs: 100,
+            shift: 1e-6,
+            least_shift: 1e-12,
+            shift_of_bound: 0.01,
+            slender_check_blocks: 12,
+            check_interval: 4,
+            check_divisor: 8,
+            gap: 1e-5,
+            next_shift_distance: 0.1,
+            attempts: 8,
+        }
+    }
+}
+
 /// Range of the first eigenvalue, relative to the first shift, in which the shift is far too
 /// large for a slender structure. Below the range the mode is a rigid-body mode.
 const SLENDER: (f64, f64) = (1e-6, 0.1);
-/// Number of blocks after which an unfinished search tests if its first shift was too large.
-/// These blocks cost about as much as another factor.
-const SLENDER_CHECK_BLOCKS: usize = 12;
-/// Number of blocks between two convergence checks.
-const CHECK_INTERVAL: usize = 4;
-/// Divisor of the number of blocks so far that gives a longer interval between checks. The cost
-/// of the projected problem grows with the cube of the blocks.
-const CHECK_DIVISOR: usize = 8;
-/// Smallest gap between two eigenvalues, relative to their distance from the
-/// first shift, in which eigenvalues can be counted.
-const GAP: f64 = 1e-5;
-/// Distance beyond the last mode found at which eigenvalues are counted and the next run
-/// starts. It is relative to the distance of that mode from the first shift.
-///
-/// It is at least the magnitude of that shift, for structures with many rigid-body modes.
-const NEXT_SHIFT_DISTANCE: f64 = 0.1;
-/// Number of attempts to factor near an eigenvalue, each further away by `GAP`.
-const ATTEMPTS: usize = 8;
 
 /// The modes to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,11 +123,17 @@ impl NaturalModes {
     ///
     /// # Example
     /// ```
-    /// use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis};
+    /// use stickslip_numerics::sparse::{
+    ///     ModeSelection, NaturalModes, SparseMatrix, SymbolicAnalysis,
+    /// };
     /// // two equal masses connected by two parallel springs, without support: 0 and 4
-    /// let k = SparseMatrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)]).unwrap();
+    /// let k =
+    ///     SparseMatrix::from_triplets(2, [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -2.0), (1, 0, -2.0)])
+    ///         .unwrap();
     /// let m = SparseMatrix::from_triplets(2, [(0, 0, 1.0), (1, 1, 1.0)]).unwrap();
-    /// let modes = NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2)).unwrap();
+    /// let modes =
+    ///     NaturalModes::new(&SymbolicAnalysis::new(&[&k, &m]), &k, &m, ModeSelection::Lowest(2))
+    ///         .unwrap();
     /// assert!(modes.values[0].abs() < 1e-12 && (modes.values[1] - 4.0).abs() < 1e-12);
     /// ```
     pub fn new(
@@ -115,8 +146,8 @@ impl NaturalModes {
             return Ok(NaturalModes::empty());
         }
         let scale = typical_eigenvalue(stiffness, mass);
-        Search { analysis, stiffness, mass, wanted, scale, found: NaturalModes { scale, ..NaturalModes::empty() } }
-            .run()
+        let found = NaturalModes { scale, ..NaturalModes::empty() };
+        Search { analysis, stiffness, mass, wanted, scale, found, settings: ModesSettings::default() }.run()
     }
 }
 
@@ -139,6 +170,7 @@ struct Search<'a> {
     /// A typical `k_ii / m_ii`, rad²/s².
     scale: f64,
     found: NaturalModes,
+    settings: ModesSettings,
 }
 
 /// The result of a run of the Lanczos process.
@@ -163,17 +195,17 @@ enum RunEnd {
 
 impl Search<'_> {
     fn run(mut self) -> Result<NaturalModes, ModesError> {
-        let least = LEAST_SHIFT * self.scale;
+        let least = self.settings.least_shift * self.scale;
         // The magnitude of the first, negative shift.
         let mut first_shift = match self.wanted {
             ModeSelection::Lowest(0) => return Ok(self.found),
-            ModeSelection::Lowest(_) => SHIFT * self.scale,
+            ModeSelection::Lowest(_) => self.settings.shift * self.scale,
             ModeSelection::UpTo { value, .. } if value.is_nan() || value <= 0.0 => return Ok(self.found),
-            ModeSelection::UpTo { value, .. } => (SHIFT_OF_BOUND * value).max(least),
+            ModeSelection::UpTo { value, .. } => (self.settings.shift_of_bound * value).max(least),
         };
         let (mut shift, mut factor) = self.first_factor(first_shift, None)?;
         let mut counted = 0;
-        for _ in 0..MAX_RUNS {
+        for _ in 0..self.settings.max_runs {
             let run = self.run_at(shift, &factor, counted, first_shift)?;
             self.found.cost.vectors += run.vectors;
             if let RunEnd::Slender(value) = run.end {
@@ -196,7 +228,9 @@ impl Search<'_> {
                 ModeSelection::UpTo { value, most } if counted > most => {
                     return Err(ModesError::TooMany { count: counted, below: shift.min(value), most });
                 }
-                ModeSelection::UpTo { value, .. } => (shift >= value, self.found.below(value + ROUNDING * value.abs())),
+                ModeSelection::UpTo { value, .. } => {
+                    (shift >= value, self.found.below(value + self.settings.rounding * value.abs()))
+                }
             };
             if found == counted && (enough || exhausted) {
                 return self.checked(keep);
@@ -211,7 +245,7 @@ impl Search<'_> {
     /// Returns the first `keep` modes. Fails if a mode is negative, because a large first shift
     /// does not detect eigenvalues just below zero.
     fn checked(mut self, keep: usize) -> Result<NaturalModes, ModesError> {
-        let below = -SHIFT * self.scale;
+        let below = -self.settings.shift * self.scale;
         match self.found.below(below) {
             0 => {
                 self.found.truncate(keep);
@@ -243,8 +277,8 @@ impl Search<'_> {
     /// Factors at a shift, or slightly above it if the shift is an eigenvalue.
     fn factor_near(&mut self, shift: f64, first_shift: f64, last: LdlFactor) -> Result<(f64, LdlFactor), ModesError> {
         let (mut last, mut failed) = (Some(last), Singular { row: 0 });
-        for attempt in 0..ATTEMPTS {
-            let shift = shift + attempt as f64 * GAP * (shift.abs() + first_shift);
+        for attempt in 0..self.settings.attempts {
+            let shift = shift + attempt as f64 * self.settings.gap * (shift.abs() + first_shift);
             match self.factor(shift, last.take()) {
                 Ok(factor) => return Ok((shift, factor)),
                 Err(singular) => failed = singular,
@@ -268,9 +302,10 @@ impl Search<'_> {
         let gaps = (below..values.len()).map(|i| (if i == 0 { above } else { values[i - 1].max(above) }, values[i]));
         let wide = |share: f64| move |(low, high): &(f64, f64)| high - low > share * (high + first_shift);
         // Inside a cluster no gap is wide, so the widest one serves.
-        let widest = || gaps.clone().filter(wide(ROUNDING)).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
-        let gap = gaps.clone().find(wide(GAP)).or_else(widest);
-        gap.map_or(last + (NEXT_SHIFT_DISTANCE * (last + first_shift)).max(first_shift), |(low, high)| {
+        let widest =
+            || gaps.clone().filter(wide(self.settings.rounding)).max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)));
+        let gap = gaps.clone().find(wide(self.settings.gap)).or_else(widest);
+        gap.map_or(last + (self.settings.next_shift_distance * (last + first_shift)).max(first_shift), |(low, high)| {
             0.5 * (low + high)
         })
     }
@@ -287,21 +322,21 @@ impl Search<'_> {
         let missing = counted.saturating_sub(self.found.below(shift));
         let wanted = match self.wanted {
             ModeSelection::Lowest(n) => missing.max((n + 1).saturating_sub(self.found.count())),
-            ModeSelection::UpTo { .. } => MAX_VECTORS,
+            ModeSelection::UpTo { .. } => self.settings.max_vectors,
         };
         let value = |pair: &RitzPair| shift + 1.0 / pair.theta;
-        let (mut blocks, mut next) = (0, CHECK_INTERVAL);
+        let (mut blocks, mut next) = (0, self.settings.check_interval);
         loop {
             blocks += 1;
             let exhausted = !lanczos.expand()?;
-            let full = lanczos.expanded + BLOCK > MAX_VECTORS;
+            let full = lanczos.expanded + BLOCK > self.settings.max_vectors;
             if !(exhausted || full || blocks == next) {
                 continue;
             }
-            next += CHECK_INTERVAL.max(blocks / CHECK_DIVISOR);
+            next += self.settings.check_interval.max(blocks / self.settings.check_divisor);
             let mut pairs = lanczos.pairs()?;
             let nearest_value = pairs.first().map(value);
-            let converged = |pair: &RitzPair| pair.residual <= CONVERGED * pair.theta.abs();
+            let converged = |pair: &RitzPair| pair.residual <= self.settings.tolerance * pair.theta.abs();
             let nearest = pairs.iter().take_while(|pair| converged(pair)).count();
             pairs.retain(converged);
             let near = &pairs[..nearest];
@@ -321,7 +356,10 @@ impl Search<'_> {
                 };
                 return Ok(LanczosRun { modes, vectors: lanczos.expanded, end });
             }
-            if blocks >= SLENDER_CHECK_BLOCKS && self.found.count() == 0 && first_shift > LEAST_SHIFT * self.scale {
+            if blocks >= self.settings.slender_check_blocks
+                && self.found.count() == 0
+                && first_shift > self.settings.least_shift * self.scale
+            {
                 let elastic = pairs.iter().map(value).filter(|value| *value > SLENDER.0 * first_shift);
                 let first = elastic.fold(f64::INFINITY, f64::min);
                 if first < SLENDER.1 * first_shift {

@@ -7,12 +7,6 @@ use crate::sparse::Singular;
 /// One run finds eigenvalues of multiplicity up to four. A solution for four right sides takes
 /// much less than four times the time of one.
 pub(super) const BLOCK: usize = 4;
-/// Eigenvalues below this fraction of a typical `k_ii / m_ii` may be rigid-body
-/// modes, in matrices of ten digits.
-const RIGID_BODY: f64 = 1e-10;
-/// The first elastic eigenvalue exceeds those of the rigid-body modes by more than this factor.
-/// Consecutive eigenvalues of a slender beam, however small, have a smaller ratio.
-const SEPARATION: f64 = 1e3;
 
 /// The lowest natural modes, without gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,8 +109,13 @@ impl NaturalModes {
     /// ten digits of a file, and far below the next.
     pub fn rigid_body_count(&self) -> usize {
         let values = &self.values;
-        let separated = |k: &usize| *k == 0 || *k == values.len() || values[*k] > SEPARATION * values[*k - 1].abs();
-        (0..=self.below(RIGID_BODY * self.scale)).rev().find(separated).unwrap_or(0)
+        // The first elastic eigenvalue exceeds those of the rigid-body modes by more than this
+        // factor. Consecutive eigenvalues of a slender beam, however small, have a smaller
+        // ratio.
+        let separated = |k: &usize| *k == 0 || *k == values.len() || values[*k] > 1e3 * values[*k - 1].abs();
+        // Eigenvalues below this fraction of a typical `k_ii / m_ii` may be rigid-body modes, in
+        // matrices of ten digits.
+        (0..=self.below(1e-10 * self.scale)).rev().find(separated).unwrap_or(0)
     }
 
     /// Returns the shape φ of a mode, counted from 0.

@@ -55,12 +55,6 @@ fn bar_trace(range: AxisRange) -> Value {
     })
 }
 
-/// The graphics processor draws curves with more points than this.
-const MANY_POINTS: usize = 5000;
-
-/// Overlap of stripes, which hides seams.
-const OVERLAP: f64 = 0.03;
-
 /// A panel whose curves are drawn.
 struct PanelTraces<'f> {
     index: usize,
@@ -124,7 +118,8 @@ impl PanelTraces<'_> {
         let value = value.map_or(String::new(), |text| format!("<br>{}", plain(&text)));
         let (x, y) = (hover("x", &panel.x, self.x.power), hover("y", &panel.y, self.y.power));
         let mut trace = json!({
-            "type": if series.x.len() > MANY_POINTS { "scattergl" } else { "scatter" },
+            // The graphics processor draws curves with more points than this.
+            "type": if series.x.len() > 5000 { "scattergl" } else { "scatter" },
             "x": self.x.numbers(panels::points(panel, series).map(|p| p.0)),
             "y": self.y.numbers(panels::points(panel, series).map(|p| p.1)),
             "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
@@ -173,7 +168,8 @@ impl PanelTraces<'_> {
         let value = format!("{} = %{{z:.4~g}} {}", plain(&shown.quantity), plain(&axis::unit(shown, 0)));
         Some(json!({
             "type": "heatmap", "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
-            "x": self.x.numbers(panels::edges(&series.x[..count], self.axes.x).into_iter()), "y": [y - 0.5, y + 0.5 + OVERLAP],
+            // Overlap of stripes, which hides seams.
+            "x": self.x.numbers(panels::edges(&series.x[..count], self.axes.x).into_iter()), "y": [y - 0.5, y + 0.5 + 0.03],
             "z": [shades.numbers(series.shades[..count].iter().copied())], "coloraxis": "coloraxis", "showlegend": false,
             "hovertemplate": format!("{}<br>{value}<extra>{}</extra>", hover("x", &self.panel.x, self.x.power), plain(&name)),
         }))
@@ -201,7 +197,7 @@ impl PanelTraces<'_> {
 fn outline(panel: &Panel, series: &Series, range: AxisRange) -> (Vec<f64>, Vec<f64>) {
     let points: Vec<(usize, (f64, f64))> = panels::points(panel, series).enumerate().collect();
     let (mut x, mut y) = (Vec::new(), Vec::new());
-    for piece in points.split(|(_, p)| !panels::drawable(*p)).filter(|piece| !piece.is_empty()) {
+    for piece in points.split(|(_, p)| !panels::drawable(p.0, p.1)).filter(|piece| !piece.is_empty()) {
         let lower = piece.iter().rev().map(|(i, p)| (p.0, panels::base(panel, series, *i).unwrap_or(range.from)));
         for p in piece.iter().map(|(_, p)| *p).chain(lower).chain([(f64::NAN, f64::NAN)]) {
             x.push(p.0);
@@ -224,7 +220,7 @@ fn dash(style: Style) -> &'static str {
 fn isolated(panel: &Panel, series: &Series) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = panels::points(panel, series).collect();
     points
-        .split(|p| !panels::drawable(*p))
+        .split(|p| !panels::drawable(p.0, p.1))
         .filter_map(|piece| if let [point] = piece { Some(*point) } else { None })
         .collect()
 }
@@ -238,18 +234,16 @@ struct NumberFormat {
     scale: Scale,
 }
 
-/// Digits of a number, counted from the leading digit of the axis length.
-///
-/// A reader can zoom in by 10,000 before a point moves by a thousandth of the picture.
-const DIGITS: i32 = 8;
-
 impl NumberFormat {
     fn of(range: AxisRange) -> NumberFormat {
+        // Digits of a number, counted from the leading digit of the axis length. A reader can
+        // zoom in by 10,000 before a point moves by a thousandth of the picture.
+        let digits = 8;
         let power = power(range);
         let first = axis::log10(axis::scaled(range.to - range.from, power)).floor() as i32;
         let digits = match range.scale {
-            Scale::Linear => (DIGITS - 1 - first).clamp(0, 300),
-            Scale::Log => DIGITS - 1,
+            Scale::Linear => (digits - 1 - first).clamp(0, 300),
+            Scale::Log => digits - 1,
         };
         NumberFormat { power, digits: digits as usize, scale: range.scale }
     }

@@ -1,6 +1,6 @@
 //! Incremental writer of an SVG document: lines, areas, marks and text.
 
-use super::style::{AXIS, CROSS, LABEL, MARK, TEXT};
+use super::style::{AXIS, LABEL, MARK, TEXT};
 use crate::figure::clip::Point;
 use crate::figure::font::{self, Weight};
 use std::fmt::Write;
@@ -136,7 +136,8 @@ impl Svg {
 
     /// Writes a cross, which marks a point without a value.
     pub(super) fn cross(&mut self, (x, y): Point, colour: &str) {
-        let [left, right, top, bottom] = [x - CROSS, x + CROSS, y - CROSS, y + CROSS].map(short);
+        let reach = 2.8;
+        let [left, right, top, bottom] = [x - reach, x + reach, y - reach, y + reach].map(short);
         let _ = writeln!(
             self.0,
             "<path d=\"M{left} {top}L{right} {bottom}M{left} {bottom}L{right} {top}\" stroke=\"{colour}\" stroke-width=\"1.4\"/>"

@@ -222,7 +222,9 @@ impl PlotArea {
     /// Returns the page position of a point. Distant points are moved closer, without visible
     /// effect on lines.
     pub(super) fn map(&self, (x, y): Point) -> Point {
-        let part = |v: f64, r: AxisRange| r.fraction(v).clamp(-MAX_DISTANCE, MAX_DISTANCE);
+        // Maximum distance of a point from the plot area, in axis lengths.
+        let max_distance = 1e6;
+        let part = |v: f64, r: AxisRange| r.fraction(v).clamp(-max_distance, max_distance);
         (self.left + self.width * part(x, self.x), self.top + self.height * (1.0 - part(y, self.y)))
     }
 
@@ -230,9 +232,6 @@ impl PlotArea {
         ClipRect { left: self.left, top: self.top, right: self.left + self.width, bottom: self.top + self.height }
     }
 }
-
-/// Maximum distance of a point from the plot area, in axis lengths.
-const MAX_DISTANCE: f64 = 1e6;
 
 /// Returns `true` if labels at unequal distances do not touch each other.
 fn apart(ticks: &Ticks, range: AxisRange, width: f64) -> bool {

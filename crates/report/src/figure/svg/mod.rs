@@ -24,8 +24,8 @@ use document::{Pen, Svg, Text};
 use layout::{Bar, Layout, PlacedEntry, PlotArea, SAMPLE};
 use stickslip_study::dataset::{Dataset, Emphasis, Figure, Panel, Series, Style};
 use style::{
-    AXIS, BAR_STEPS, COLOUR_BAR_WIDTH, FINE_GRID, GRID, LABEL, LEADING, LINE, MARGIN, MARK, MINOR_LENGTH, PANEL_TITLE,
-    SMALL_MARK, THIN, TICK, TICK_LENGTH, TITLE,
+    AXIS, COLOUR_BAR_WIDTH, FINE_GRID, GRID, LABEL, LEADING, LINE, MARGIN, MARK, MINOR_LENGTH, PANEL_TITLE, TICK,
+    TICK_LENGTH, TITLE,
 };
 
 /// The output `svg`.
@@ -94,9 +94,10 @@ fn box_around(x: f64, y: f64, width: f64, height: f64) -> [Point; 4] {
 fn draw_bar(svg: &mut Svg, bar: &Bar) {
     svg.open("colours");
     // Each step extends to the upper end and the next covers it, which avoids seams.
-    for i in 0..BAR_STEPS {
-        let part = |i: usize| i as f64 / BAR_STEPS as f64;
-        let colour = Colour::sequential((i as f64 + 0.5) / BAR_STEPS as f64).light;
+    let steps = 96; // they look continuous
+    for i in 0..steps {
+        let part = |i: i32| f64::from(i) / f64::from(steps);
+        let colour = Colour::sequential((f64::from(i) + 0.5) / f64::from(steps)).light;
         svg.area(&box_around(bar.left, bar.top, COLOUR_BAR_WIDTH, bar.height * (1.0 - part(i))), &colour, 1.0);
     }
     svg.frame(bar.left, bar.top, COLOUR_BAR_WIDTH, bar.height);
@@ -188,7 +189,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
         let colour = &scheme.colour(series).light;
         match series.style {
             Style::Marks => {
-                let size = if crowd { SMALL_MARK } else { MARK };
+                let size = if crowd { 2.0 } else { MARK };
                 let at = panels::drawn(panel, series).map(|p| plot.map(p));
                 for point in at.filter(|p| plot.clip_rect().contains(*p)) {
                     svg.mark(point, colour, size);
@@ -212,7 +213,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let pale = series.emphasis == Emphasis::Pale;
                 let thin = pale || crowd || series.emphasis == Emphasis::OwnReference;
-                let width = if thin { THIN } else { LINE };
+                let width = if thin { 1.0 } else { LINE };
                 let opacity = if pale { PALE } else { 1.0 };
                 let pen = Pen { colour, width, dashes: dashes(panels::line_style(series)), opacity };
                 draw_line(svg, panel, series, plot, &pen);
@@ -225,7 +226,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
 /// Draws the pieces of a curve between its gaps. A single point becomes a dot.
 fn draw_line(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, pen: &Pen<'_>) {
     let points: Vec<Point> = panels::points(panel, series).collect();
-    for piece in points.split(|p| !panels::drawable(*p)) {
+    for piece in points.split(|p| !panels::drawable(p.0, p.1)) {
         let piece: Vec<Point> = piece.iter().map(|p| plot.map(*p)).collect();
         match piece.as_slice() {
             [] => {}
@@ -277,7 +278,7 @@ struct Slot {
 fn draw_bars(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, slot: &Slot, colour: &str) {
     let opacity = if series.emphasis == Emphasis::Pale { PALE } else { 1.0 };
     let scale = plot.width / plot.x.span();
-    for (i, point) in panels::points(panel, series).enumerate().filter(|(_, p)| panels::drawable(*p)) {
+    for (i, point) in panels::points(panel, series).enumerate().filter(|(_, p)| panels::drawable(p.0, p.1)) {
         let (x, y) = plot.map(point);
         let base = panels::base(panel, series, i).map_or(plot.top + plot.height, |base| plot.map((point.0, base)).1);
         let corners = box_around(x + slot.shift * scale, y, slot.width * scale, base - y);

@@ -14,13 +14,9 @@ pub(super) const GAP: f64 = 26.0;
 pub(super) const TICK_LENGTH: f64 = 5.0;
 pub(super) const MINOR_LENGTH: f64 = 3.0;
 pub(super) const LINE: f64 = 1.8;
-pub(super) const THIN: f64 = 1.0;
 pub(super) const MARK: f64 = 3.8;
-pub(super) const SMALL_MARK: f64 = 2.0;
-pub(super) const CROSS: f64 = 2.8;
-/// Width of the colour bar, and number of its steps, which look continuous.
+/// Width of the colour bar.
 pub(super) const COLOUR_BAR_WIDTH: f64 = 16.0;
-pub(super) const BAR_STEPS: usize = 96;
 pub(super) const TEXT: &str = "#1a1a1a";
 pub(super) const AXIS: &str = "#444444";
 pub(super) const GRID: &str = "#e3e3e3";

@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! STICKJ01                                            eight bytes
-//! length u32 | check u32 | payload                    a frame, little endian; the check is CRC-32 of length and payload
+//! length u32 | check u32 | payload                    a frame, little endian; the check is the
+//!                                                     CRC-32 of length and payload
 //!   payload: 0, JSON of the header                    description of the run: the first frame
 //!   payload: 1, units, time, JSON of the tally, tables   a block, in the order of the units
 //!   payload: 2                                        end of a complete run: the last frame
@@ -33,8 +34,6 @@ use stickslip_study::run::CheckedStudy;
 /// Name of the file in its folder.
 pub(crate) const FILE: &str = "journal";
 const MAGIC: &[u8; 8] = b"STICKJ01";
-/// Maximum number of cells in a block: one megabyte.
-const MAX_BLOCK_CELLS: usize = 131_072;
 /// Interval after which a block is synchronized to disk regardless of its size. An abort loses
 /// at most the results of this interval.
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);
@@ -366,7 +365,8 @@ impl Journal {
             None => self.pending = Some(block),
         }
         let late = self.synced.elapsed() >= SYNC_INTERVAL;
-        let large = self.pending.as_ref().is_some_and(|pending| pending.cells() >= MAX_BLOCK_CELLS);
+        // Maximum number of cells in a block: one megabyte.
+        let large = self.pending.as_ref().is_some_and(|pending| pending.cells() >= 131_072);
         if late {
             self.sync()?;
         } else if large {

@@ -61,71 +61,105 @@ pub enum ModeEndCause {
     #[error("the continuation did not reach the end within 4000 steps; try fewer harmonics")]
     StepLimit,
 }
-/// Ratio of friction to the forces of the linear mode at which the continuation begins.
-/// Frequency and damping of the linear mode are then accurate to this ratio.
-const FRICTION_RATIO: f64 = 1e-4;
-/// Ratio of friction to the difference from the nearest mode at which the continuation begins.
-/// The linear shape is then accurate to one percent.
-const SEPARATION_RATIO: f64 = 1e-2;
-/// Factors on the initial amplitude, tried in this order if Newton's method does not converge
-/// from the linear mode. This happens if a joint hardly moves in the linear mode: friction alone
-/// then determines its motion and the phase of its force.
-const START_FACTORS: [f64; 7] = [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4];
-/// Maximum number of steps, including rejected ones. The blade couples take about 100, internal
-/// resonances some hundreds.
-const MAX_STEPS: usize = 4000;
-/// Maximum number of steps without a new smallest amplitude. The curve then runs in a loop, or
-/// follows another mode.
-const MAX_STEPS_WITHOUT_PROGRESS: usize = 1000;
-/// Damping ratio above which a motion counts as overdamped, ten times critical damping.
-const OVERDAMPED: f64 = 10.0;
-/// Work limit of overdamped motions: harmonics times samples, summed over the steps; about two
-/// seconds. Following rigid friction down to a nanometre would take thousands of expensive steps
-/// without a useful result.
-const OVERDAMPED_WORK: usize = 8_000_000;
-/// Work limit of laws with memory, in steps of the law; about ten seconds. A curve of one joint
-/// takes a few million.
-const MEMORY_WORK: usize = 4_000_000;
-/// Longest step in arc length, see [`ModeEquations::step`]. It changes the amplitude by up to a
-/// half, or the shape by a fifth.
-const MAX_STEP: f64 = 0.2;
-/// First step, also after a leap.
-const INITIAL_STEP: f64 = 0.02;
-/// A step below this is rounding: the curve ends.
-const MIN_STEP: f64 = 1e-7;
-/// Steps below this may pass a corner. The curve has kinks at the points at which a sampled
-/// joint begins to slip.
-const CORNER: f64 = 1e-3;
-/// Largest distance of a solution from the predictor, relative to such a step: a corner of up to
-/// 79 degrees.
-const MAX_CORNER: f64 = 5.0;
-/// Arc length over which the curve may jump. A sampled force is discontinuous if its reversal
-/// moves to another sample. Measured: 1e-6.
-const GAP: f64 = 1e-5;
-/// Smallest cosine between the tangents at both ends of a step.
-const MIN_TANGENT_COSINE: f64 = 0.9;
-/// Largest distance of a solution from the predictor, relative to the step.
-const MAX_PREDICTOR_ERROR: f64 = 0.5;
-/// Smallest modal assurance criterion between neighbours.
-const MIN_MAC: f64 = 0.9;
-/// A step that takes at most this many Newton iterations is followed by a longer one. At kinks,
-/// Newton's method takes more than the usual three without being close to failure.
-const FEW_ITERATIONS: usize = 8;
-/// Fractions of a decade in amplitude by which a leap skips a part of the curve that cannot be
-/// followed.
-const LEAPS: [f64; 6] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.7];
-/// Rigidity of the shape, see [`ModeEquations::phase_collinearity`], below which two modes count
-/// as merging. In the blade couple it falls to 0.3 with one harmonic, to 0.03 with 15 and to 0.1
-/// with 31. The three cases connect the modes differently.
-const MERGING: f64 = 1.0 / 3.0;
-/// Number of short steps from a computed state to a nearby amplitude, if a single step fails.
-const PARTS: u32 = 16;
-/// Relative change of amplitude up to which a turn is an effect of the sampled force and is not
-/// reported.
-const MIN_TURN: f64 = 1e-3;
-/// Relative tolerance of the amplitude with the largest damping. The damping is then accurate to
-/// its square.
-const PEAK_TOLERANCE: f64 = 1e-3;
+/// Settings of the continuation of a nonlinear mode.
+#[derive(Debug, Clone)]
+struct ModeCurveSettings {
+    /// Ratio of friction to the forces of the linear mode at which the continuation begins.
+    /// Frequency and damping of the linear mode are then accurate to this ratio.
+    friction_ratio: f64,
+    /// Ratio of friction to the difference from the nearest mode at which the continuation begins.
+    /// The linear shape is then accurate to one percent.
+    separation_ratio: f64,
+    /// Factors on the initial amplitude, tried in this order if Newton's method does not converge
+    /// from the linear mode. This happens if a joint hardly moves in the linear mode: friction
+    /// alone then determines its motion and the phase of its force.
+    start_factors: [f64; 7],
+    /// Maximum number of steps, including rejected ones. The blade couples take about 100,
+    /// internal resonances some hundreds.
+    max_steps: usize,
+    /// Maximum number of steps without a new smallest amplitude. The curve then runs in a loop, or
+    /// follows another mode.
+    max_steps_without_progress: usize,
+    /// Damping ratio above which a motion counts as overdamped, ten times critical damping.
+    overdamped: f64,
+    /// Work limit of overdamped motions: harmonics times samples, summed over the steps; about two
+    /// seconds. Following rigid friction down to a nanometre would take thousands of expensive
+    /// steps without a useful result.
+    overdamped_work: usize,
+    /// Work limit of laws with memory, in steps of the law; about ten seconds. A curve of one
+    /// joint takes a few million.
+    memory_work: usize,
+    /// Longest step in arc length, see [`ModeEquations::step`]. It changes the amplitude by up to
+    /// a half, or the shape by a fifth.
+    max_step: f64,
+    /// First step, also after a leap.
+    initial_step: f64,
+    /// A step below this is rounding: the curve ends.
+    min_step: f64,
+    /// Steps below this may pass a corner. The curve has kinks at the points at which a sampled
+    /// joint begins to slip.
+    corner_step: f64,
+    /// Largest distance of a solution from the predictor, relative to such a step: a corner of up
+    /// to 79 degrees.
+    max_corner_distance: f64,
+    /// Arc length over which the curve may jump. A sampled force is discontinuous if its reversal
+    /// moves to another sample. Measured: 1e-6.
+    jump_length: f64,
+    /// Smallest cosine between the tangents at both ends of a step.
+    min_tangent_cosine: f64,
+    /// Largest distance of a solution from the predictor, relative to the step.
+    max_predictor_error: f64,
+    /// Smallest modal assurance criterion between neighbours.
+    min_mac: f64,
+    /// A step that takes at most this many Newton iterations is followed by a longer one. At
+    /// kinks, Newton's method takes more than the usual three without being close to failure.
+    few_iterations: usize,
+    /// Fractions of a decade in amplitude by which a leap skips a part of the curve that cannot be
+    /// followed.
+    leaps: [f64; 6],
+    /// Rigidity of the shape, see [`ModeEquations::phase_collinearity`], below which two modes
+    /// count as merging. In the blade couple it falls to 0.3 with one harmonic, to 0.03 with 15
+    /// and to 0.1 with 31. The three cases connect the modes differently.
+    merging_collinearity: f64,
+    /// Number of short steps from a computed state to a nearby amplitude, if a single step fails.
+    refined_steps: u32,
+    /// Relative change of amplitude up to which a turn is an effect of the sampled force and is
+    /// not reported.
+    min_turn: f64,
+    /// Relative tolerance of the amplitude with the largest damping. The damping is then accurate
+    /// to its square.
+    peak_tolerance: f64,
+}
+
+impl Default for ModeCurveSettings {
+    fn default() -> Self {
+        ModeCurveSettings {
+            friction_ratio: 1e-4,
+            separation_ratio: 1e-2,
+            start_factors: [1.0, 0.1, 0.01, 1e-3, 10.0, 100.0, 1e4],
+            max_steps: 4000,
+            max_steps_without_progress: 1000,
+            overdamped: 10.0,
+            overdamped_work: 8_000_000,
+            memory_work: 4_000_000,
+            max_step: 0.2,
+            initial_step: 0.02,
+            min_step: 1e-7,
+            corner_step: 1e-3,
+            max_corner_distance: 5.0,
+            jump_length: 1e-5,
+            min_tangent_cosine: 0.9,
+            max_predictor_error: 0.5,
+            min_mac: 0.9,
+            few_iterations: 8,
+            leaps: [0.01, 0.03, 0.1, 0.2, 0.4, 0.7],
+            merging_collinearity: 1.0 / 3.0,
+            refined_steps: 16,
+            min_turn: 1e-3,
+            peak_tolerance: 1e-3,
+        }
+    }
+}
 
 /// The curve of a mode.
 pub(super) struct ModeCurve {
@@ -135,20 +169,29 @@ pub(super) struct ModeCurve {
     /// stick.
     sticks: bool,
     pub(super) ended: Option<ModeEnd>,
+    settings: ModeCurveSettings,
 }
 
 impl ModeCurve {
     /// Follows mode `index` down to the modal amplitude `low`. If forces grow with amplitude,
     /// follows it up to `high` as well.
-    pub(super) fn follow(equations: &mut ModeEquations<'_>, index: usize, (low, high): (f64, f64)) -> Self {
+    pub(super) fn follow(equations: &mut ModeEquations<'_>, index: usize, low: f64, high: f64) -> Self {
+        let settings = ModeCurveSettings::default();
         let modes = equations.linear_modes();
         let begun = equations.time_steps();
         let none = |linear| {
             let ended = ModeEnd { at: f64::INFINITY, reason: ModeEndCause::NoStart };
-            ModeCurve { linear, arcs: Vec::new(), sticks: false, ended: Some(ended) }
+            ModeCurve {
+                linear,
+                arcs: Vec::new(),
+                sticks: false,
+                ended: Some(ended),
+                settings: ModeCurveSettings::default(),
+            }
         };
         let Some(linear) = modes.get(index).cloned() else { return none(None) };
-        let faint = equations.weak_friction_amplitude(&modes, index, FRICTION_RATIO, SEPARATION_RATIO);
+        let faint =
+            equations.weak_friction_amplitude(&modes, index, settings.friction_ratio, settings.separation_ratio);
         // without friction, any amplitude serves
         let faint = if faint > 0.0 { faint } else { low };
         // If the joints of a pair of modes are not alike, a travelling wave is not a motion. The
@@ -156,26 +199,27 @@ impl ModeCurve {
         let shapes = [Some(linear.clone()), linear.standing()];
         let start = shapes.into_iter().flatten().find_map(|linear| {
             equations.may_be_singular = linear.standing_mode.is_some();
-            let start = START_FACTORS.iter().find_map(|factor| {
-                if equations.time_steps() - begun > MEMORY_WORK {
+            let start = settings.start_factors.iter().find_map(|factor| {
+                if equations.time_steps() - begun > settings.memory_work {
                     return None;
                 }
                 let amplitude = factor * faint;
                 let guess = equations.linear_state(&linear, amplitude)?;
                 let state = equations.solve(&guess, amplitude, amplitude)?;
-                (equations.modal_assurance(&guess, &state) >= MIN_MAC)
+                (equations.modal_assurance(&guess, &state) >= settings.min_mac)
                     .then(|| equations.start_curve(&state, amplitude))?
             });
             Some((linear, start?))
         });
         let Some((linear, start)) = start else { return none(Some(linear)) };
         let top = start.amplitude;
-        let mut arcs = if equations.is_unbounded() { follow_upwards(equations, &start, high) } else { Vec::new() };
+        let mut arcs =
+            if equations.is_unbounded() { follow_upwards(equations, &settings, &start, high) } else { Vec::new() };
         arcs.push(start);
         let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
-        let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, ended: None };
-        let mut length = INITIAL_STEP;
-        for _ in 0..MAX_STEPS {
+        let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, ended: None, settings: settings.clone() };
+        let mut length = settings.initial_step;
+        for _ in 0..settings.max_steps {
             let now = &path.arcs[path.arcs.len() - 1];
             let at = now.amplitude;
             if at < low {
@@ -187,25 +231,25 @@ impl ModeCurve {
                 path.sticks = true;
                 return path;
             }
-            let step = try_step(equations, now, length);
+            let step = try_step(equations, &settings, now, length);
             since += 1;
-            if now.state.damping > OVERDAMPED {
+            if now.state.damping > settings.overdamped {
                 creeping += equations.resolution();
             }
             let reason = match step {
-                _ if creeping > OVERDAMPED_WORK => {
+                _ if creeping > settings.overdamped_work => {
                     path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::Overdamped });
                     return path;
                 }
-                _ if equations.time_steps() - begun > MEMORY_WORK => {
+                _ if equations.time_steps() - begun > settings.memory_work => {
                     path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::WorkLimit });
                     return path;
                 }
                 _ if at > top => ModeEndCause::Merged,
-                _ if since > MAX_STEPS_WITHOUT_PROGRESS => ModeEndCause::Turned,
+                _ if since > settings.max_steps_without_progress => ModeEndCause::Turned,
                 Some(step) => {
-                    if step.iterations <= FEW_ITERATIONS {
-                        length = (1.5 * length).min(MAX_STEP);
+                    if step.iterations <= settings.few_iterations {
+                        length = (1.5 * length).min(settings.max_step);
                     }
                     path.arcs.push(step.to);
                     if path.arcs[path.arcs.len() - 1].amplitude < path.arcs[lowest].amplitude {
@@ -213,19 +257,19 @@ impl ModeCurve {
                     }
                     continue;
                 }
-                None if length > MIN_STEP => {
+                None if length > settings.min_step => {
                     length *= 0.5;
                     continue;
                 }
                 None => ModeEndCause::Stalled,
             };
             // continue with the same shape at a smaller amplitude
-            let Some(next) = leap(equations, &path.arcs[lowest]) else {
+            let Some(next) = leap(equations, &settings, &path.arcs[lowest]) else {
                 path.ended = Some(ModeEnd { at: path.arcs[lowest].amplitude, reason });
                 return path;
             };
             path.arcs.push(next);
-            (length, lowest, since) = (INITIAL_STEP, path.arcs.len() - 1, 0);
+            (length, lowest, since) = (settings.initial_step, path.arcs.len() - 1, 0);
         }
         path.ended = Some(ModeEnd { at: path.smallest_amplitude(), reason: ModeEndCause::StepLimit });
         path
@@ -237,16 +281,19 @@ impl ModeCurve {
     pub(super) fn from_small_amplitude(
         equations: &mut ModeEquations<'_>,
         index: usize,
-        (low, high): (f64, f64),
+        low: f64,
+        high: f64,
     ) -> Option<Self> {
+        let settings = ModeCurveSettings::default();
         equations.may_be_singular = false;
         let guess = equations.small_amplitude_mode(index, low)?;
-        let state =
-            equations.solve(&guess, low, low).filter(|state| equations.modal_assurance(&guess, state) >= MIN_MAC)?;
+        let state = equations
+            .solve(&guess, low, low)
+            .filter(|state| equations.modal_assurance(&guess, state) >= settings.min_mac)?;
         let start = equations.start_curve(&state, low)?;
-        let mut arcs = follow_upwards(equations, &start, high);
+        let mut arcs = follow_upwards(equations, &settings, &start, high);
         arcs.push(start);
-        Some(ModeCurve { linear: None, arcs, sticks: false, ended: None })
+        Some(ModeCurve { linear: None, arcs, sticks: false, ended: None, settings })
     }
 
     /// Returns the largest amplitude on the curve.
@@ -273,7 +320,7 @@ impl ModeCurve {
         if a >= first.amplitude {
             let guess = equations.linear_state(self.linear.as_ref()?, a)?;
             let found = equations.solve(&guess, a, a).or_else(|| equations.solve(&first.state, first.amplitude, a))?;
-            return (equations.modal_assurance(&guess, &found) >= MIN_MAC).then_some(found);
+            return (equations.modal_assurance(&guess, &found) >= self.settings.min_mac).then_some(found);
         }
         // A branch from small amplitudes begins at a requested amplitude.
         if let Some(last) = self.arcs.last().filter(|last| last.amplitude == a) {
@@ -297,8 +344,9 @@ impl ModeCurve {
         }
         // between kinks: short steps from above
         let (mut before, mut state) = (pair[0].amplitude, pair[0].state.clone());
-        for part in 1..=PARTS {
-            let next = pair[0].amplitude * (a / pair[0].amplitude).powf(f64::from(part) / f64::from(PARTS));
+        for part in 1..=self.settings.refined_steps {
+            let next = pair[0].amplitude
+                * (a / pair[0].amplitude).powf(f64::from(part) / f64::from(self.settings.refined_steps));
             state = equations.solve(&state, before, next)?;
             before = next;
         }
@@ -357,14 +405,14 @@ impl ModeCurve {
         };
         let Ok(_) = golden_section(
             (high, low),
-            |above, below| above - below <= PEAK_TOLERANCE,
+            |above, below| above - below <= self.settings.peak_tolerance,
             |at| Ok::<_, Infallible>(damping(at)),
         );
         Some(top)
     }
 
     /// Returns the amplitudes of the computed states with the smallest rigidity, one for each
-    /// part of the curve below [`MERGING`].
+    /// part of the curve below `merging_collinearity`.
     pub(super) fn merges(&self, equations: &ModeEquations<'_>) -> Vec<f64> {
         let mut merges = Vec::new();
         // A travelling wave is orthogonal to itself everywhere; its partner is the wave in the
@@ -375,7 +423,7 @@ impl ModeCurve {
         let mut least: Option<(f64, f64)> = None;
         for arc in &self.arcs {
             let rigidity = equations.phase_collinearity(&arc.state);
-            if rigidity >= MERGING {
+            if rigidity >= self.settings.merging_collinearity {
                 merges.extend(least.take().map(|(_, at)| at));
             } else if least.is_none_or(|(before, _)| rigidity < before) {
                 least = Some((rigidity, arc.amplitude));
@@ -396,7 +444,9 @@ impl ModeCurve {
                 up = Some(up.map_or(a, |up| up.max(a)));
             } else {
                 let turn = up.take().map(|up| TurningPart { amplitude: least, return_amplitude: up });
-                turns.extend(turn.filter(|turn| turn.return_amplitude > (1.0 + MIN_TURN) * turn.amplitude));
+                turns.extend(
+                    turn.filter(|turn| turn.return_amplitude > (1.0 + self.settings.min_turn) * turn.amplitude),
+                );
                 least = a;
             }
         }
@@ -405,35 +455,47 @@ impl ModeCurve {
 }
 
 /// Takes a step. `None` if the corrector fails or leaves the curve.
-fn try_step(equations: &mut ModeEquations<'_>, now: &ModeArc, length: f64) -> Option<ModeStep> {
-    let step = equations.step(now, length, length < CORNER)?;
-    let smooth = step.predictor_distance <= MAX_PREDICTOR_ERROR * length
-        && step.tangent_cosine >= MIN_TANGENT_COSINE
+fn try_step(
+    equations: &mut ModeEquations<'_>,
+    settings: &ModeCurveSettings,
+    now: &ModeArc,
+    length: f64,
+) -> Option<ModeStep> {
+    let step = equations.step(now, length, length < settings.corner_step)?;
+    let smooth = step.predictor_distance <= settings.max_predictor_error * length
+        && step.tangent_cosine >= settings.min_tangent_cosine
         && step.to.determinant_sign * now.determinant_sign >= 0.0;
-    let corner = length < CORNER && step.predictor_distance <= MAX_CORNER * length + GAP;
-    ((smooth || corner) && equations.modal_assurance(&now.state, &step.to.state) >= MIN_MAC).then_some(step)
+    let corner = length < settings.corner_step
+        && step.predictor_distance <= settings.max_corner_distance * length + settings.jump_length;
+    ((smooth || corner) && equations.modal_assurance(&now.state, &step.to.state) >= settings.min_mac).then_some(step)
 }
 
 /// Follows the curve upwards from `start` to `high`, or until no step succeeds. Returns the
 /// points in decreasing order of amplitude. It is needed for forces that grow with amplitude,
 /// because the linear mode is then not a useful initial guess.
-fn follow_upwards(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64) -> Vec<ModeArc> {
+fn follow_upwards(
+    equations: &mut ModeEquations<'_>,
+    settings: &ModeCurveSettings,
+    start: &ModeArc,
+    high: f64,
+) -> Vec<ModeArc> {
     let mut arcs = Vec::new();
-    let (mut now, mut length, mut creeping, begun) = (start.reversed(), INITIAL_STEP, 0, equations.time_steps());
-    for _ in 0..MAX_STEPS {
-        if now.amplitude > high || length <= MIN_STEP {
+    let (mut now, mut length, mut creeping, begun) =
+        (start.reversed(), settings.initial_step, 0, equations.time_steps());
+    for _ in 0..settings.max_steps {
+        if now.amplitude > high || length <= settings.min_step {
             break;
         }
-        if now.state.damping > OVERDAMPED {
+        if now.state.damping > settings.overdamped {
             creeping += equations.resolution();
         }
-        if creeping > OVERDAMPED_WORK || equations.time_steps() - begun > MEMORY_WORK {
+        if creeping > settings.overdamped_work || equations.time_steps() - begun > settings.memory_work {
             break;
         }
-        match try_step(equations, &now, length) {
+        match try_step(equations, settings, &now, length) {
             Some(step) => {
-                if step.iterations <= FEW_ITERATIONS {
-                    length = (1.5 * length).min(MAX_STEP);
+                if step.iterations <= settings.few_iterations {
+                    length = (1.5 * length).min(settings.max_step);
                 }
                 now = step.to;
                 arcs.push(now.clone());
@@ -447,10 +509,11 @@ fn follow_upwards(equations: &mut ModeEquations<'_>, start: &ModeArc, high: f64)
 
 /// Skips a kink that no step passes, or leaves a curve that does not return. Solves at a smaller
 /// amplitude for the same shape.
-fn leap(equations: &mut ModeEquations<'_>, now: &ModeArc) -> Option<ModeArc> {
-    LEAPS.iter().find_map(|part| {
+fn leap(equations: &mut ModeEquations<'_>, settings: &ModeCurveSettings, now: &ModeArc) -> Option<ModeArc> {
+    settings.leaps.iter().find_map(|part| {
         let amplitude = now.amplitude * 10f64.powf(-part);
         let state = equations.solve(&now.state, now.amplitude, amplitude)?;
-        (equations.modal_assurance(&now.state, &state) >= MIN_MAC).then(|| equations.start_curve(&state, amplitude))?
+        (equations.modal_assurance(&now.state, &state) >= settings.min_mac)
+            .then(|| equations.start_curve(&state, amplitude))?
     })
 }

@@ -6,37 +6,60 @@ use crate::method::{Budget, Request, Solver};
 use crate::orbit::Orbit;
 use std::collections::BTreeMap;
 
-/// Maximum number of repetitions if the search for another quantity finds a higher point.
-const MAX_REPETITIONS: usize = 3;
-/// Maximum number of failed orbits in the search for one peak, because a failed search costs
-/// most.
-const MAX_FAILURES: usize = 2;
-/// Distance from the neighbour, relative to the initial bracket, beyond which a failed search is
-/// repeated with all fallbacks.
-const FALLBACK_DISTANCE: f64 = 1e-3;
-/// A missing orbit does not matter to a peak if the predicted relative rise towards it is below
-/// this value.
-const NEGLIGIBLE_RISE: f64 = 1e-5;
-/// Relative fall of a quantity next to its highest point that shows an unfinished search. At the
-/// final bracket width ([`MIN_DISTANCE`]) the fall is 1e-7 at a kink, 1e-3 at a fold, and one
-/// half at an unbounded peak.
-const STEEP_FALL: f64 = 1e-2;
-/// Criteria of an unbounded curve, see [`Bracket::is_cut_off`]. `1/a²` falls in a straight line
-/// and would reach zero within `UNBOUNDED_WITHIN` times the initial bracket. It counts as
-/// straight if its slope to the nearest point is less than `MAX_SLOPE_RATIO` times the slope to a
-/// distant point. The second constant is the ratio of both distances.
-const UNBOUNDED_WITHIN: f64 = 0.5;
-const DISTANCE_RATIO: f64 = 4.0;
-const MAX_SLOPE_RATIO: f64 = 1.5;
-/// Largest distance between the neighbours of the highest point, relative to the initial
-/// bracket, if a search has ended at a jump. A larger distance means an unfinished search. The
-/// value is [`MIN_DISTANCE`] on both sides, doubled by the last step.
-const CLOSED_WIDTH: f64 = 4.0 * MIN_DISTANCE;
-/// Orbits closer than this fraction of the initial bracket differ by rounding only.
-pub(super) const MIN_DISTANCE: f64 = 1e-7;
-/// Maximum number of orbits for the peak of one quantity, in addition to the orbits of other
-/// quantities. Smooth peaks take 3 to 6, kinks up to 15.
-pub(super) const MAX_ORBITS: usize = 40;
+/// Settings of the search for a peak.
+#[derive(Debug, Clone)]
+pub(super) struct PeakSettings {
+    /// Maximum number of repetitions if the search for another quantity finds a higher point.
+    pub(super) max_repetitions: usize,
+    /// Maximum number of failed orbits in the search for one peak, because a failed search costs
+    /// most.
+    pub(super) max_failures: usize,
+    /// Distance from the neighbour, relative to the initial bracket, beyond which a failed search
+    /// is repeated with all fallbacks.
+    pub(super) fallback_distance: f64,
+    /// A missing orbit does not matter to a peak if the predicted relative rise towards it is
+    /// below this value.
+    pub(super) negligible_rise: f64,
+    /// Relative fall of a quantity next to its highest point that shows an unfinished search. At
+    /// the final bracket width (`min_distance`) the fall is 1e-7 at a kink, 1e-3 at a fold, and
+    /// one half at an unbounded peak.
+    pub(super) steep_fall: f64,
+    /// A curve is unbounded, see [`Bracket::is_cut_off`], if `1/a²` falls in a straight line and
+    /// would reach zero within this multiple of the initial bracket.
+    pub(super) unbounded_within: f64,
+    /// Distance of the distant point of that line, relative to the distance of the nearest point.
+    pub(super) distance_ratio: f64,
+    /// The line is straight if its slope to the nearest point is less than this multiple of its
+    /// slope to the distant point.
+    pub(super) max_slope_ratio: f64,
+    /// Largest distance between the neighbours of the highest point, relative to the initial
+    /// bracket, if a search has ended at a jump. A larger distance means an unfinished search. The
+    /// value is `min_distance` on both sides, doubled by the last step.
+    pub(super) closed_width: f64,
+    /// Orbits closer than this fraction of the initial bracket differ by rounding only.
+    pub(super) min_distance: f64,
+    /// Maximum number of orbits for the peak of one quantity, in addition to the orbits of other
+    /// quantities. Smooth peaks take 3 to 6, kinks up to 15.
+    pub(super) max_orbits: usize,
+}
+
+impl Default for PeakSettings {
+    fn default() -> Self {
+        PeakSettings {
+            max_repetitions: 3,
+            max_failures: 2,
+            fallback_distance: 1e-3,
+            negligible_rise: 1e-5,
+            steep_fall: 1e-2,
+            unbounded_within: 0.5,
+            distance_ratio: 4.0,
+            max_slope_ratio: 1.5,
+            closed_width: 4e-7,
+            min_distance: 1e-7,
+            max_orbits: 40,
+        }
+    }
+}
 
 /// Three points of a curve, with a maximum of some quantities in the middle, and the orbits that
 /// the searches added between them.
@@ -47,11 +70,13 @@ pub(super) struct Bracket {
     /// For each quantity, the frequency at which its last search ended (rad/s), and whether it
     /// found the peak.
     pub(super) ended: BTreeMap<usize, (f64, bool)>,
+    settings: PeakSettings,
 }
 
 impl Bracket {
     pub(super) fn new(near: &[CurvePoint]) -> Self {
-        Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new() }
+        let settings = PeakSettings::default();
+        Bracket { points: near.to_vec(), width: near[2].omega - near[0].omega, ended: BTreeMap::new(), settings }
     }
 
     /// Returns the vertex value of the parabola at the highest point of a quantity.
@@ -65,10 +90,12 @@ impl Bracket {
         let points = &mut self.points;
         let mut shrink = BracketReduction::default();
         let (mut failures, mut budget) = (0, Budget::default());
-        for _ in 0..MAX_ORBITS {
+        for _ in 0..self.settings.max_orbits {
             let best = highest_inner(points, quantity);
-            let Some(omega) = shrink.next(points, best, quantity, MIN_DISTANCE * self.width) else { break };
-            if failures == MAX_FAILURES || budget.is_used_up() {
+            let Some(omega) = shrink.next(points, best, quantity, self.settings.min_distance * self.width) else {
+                break;
+            };
+            if failures == self.settings.max_failures || budget.is_used_up() {
                 break;
             }
             // The highest point is a sufficient initial guess on either side.
@@ -77,7 +104,7 @@ impl Bracket {
             let found = match solver.solve(&request.without_estimate(), &mut budget) {
                 // Far from the neighbour, all fallbacks are tried; close to it they gain
                 // nothing.
-                Err(_) if (omega - points[best].omega).abs() > FALLBACK_DISTANCE * self.width => {
+                Err(_) if (omega - points[best].omega).abs() > self.settings.fallback_distance * self.width => {
                     solver.solve(&request, &mut budget)
                 }
                 found => found,
@@ -99,7 +126,7 @@ impl Bracket {
     /// Repeats the search for quantities if another search has found a higher point since. There
     /// may be several maxima between two points of a curve.
     pub(super) fn repeat_overtaken(&mut self, solver: &mut dyn Solver, quantities: &dyn Fn(&Orbit) -> Vec<f64>) {
-        for _ in 0..MAX_REPETITIONS {
+        for _ in 0..self.settings.max_repetitions {
             let moved = |(quantity, (omega, _)): (&usize, &(f64, bool))| {
                 (self.points[highest_inner(&self.points, *quantity)].omega != *omega).then_some(*quantity)
             };
@@ -126,7 +153,7 @@ impl Bracket {
     fn is_cut_off(&self, top: usize, quantity: usize) -> bool {
         let here = &self.points[top];
         let value = here.value(quantity);
-        let jumps = |point: &CurvePoint| value - point.value(quantity) > STEEP_FALL * value;
+        let jumps = |point: &CurvePoint| value - point.value(quantity) > self.settings.steep_fall * value;
         let straight = |side: &mut dyn Iterator<Item = &CurvePoint>| {
             let slopes = side.map(|point| {
                 let run = (here.omega - point.omega).abs();
@@ -134,11 +161,12 @@ impl Bracket {
             });
             let slopes: Vec<(f64, f64)> = slopes.collect();
             let Some(&(nearest, slope)) = slopes.first() else { return false };
-            let distant = slopes.iter().find(|(run, _)| *run >= DISTANCE_RATIO * nearest);
-            slope * UNBOUNDED_WITHIN * self.width > -negative_inverse_square(value)
-                && distant.is_some_and(|(_, other)| slope < MAX_SLOPE_RATIO * other)
+            let distant = slopes.iter().find(|(run, _)| *run >= self.settings.distance_ratio * nearest);
+            slope * self.settings.unbounded_within * self.width > -negative_inverse_square(value)
+                && distant.is_some_and(|(_, other)| slope < self.settings.max_slope_ratio * other)
         };
-        let at_end = |end: &CurvePoint| (here.omega - end.omega).abs() <= CLOSED_WIDTH * self.width && jumps(end);
+        let at_end =
+            |end: &CurvePoint| (here.omega - end.omega).abs() <= self.settings.closed_width * self.width && jumps(end);
         let (left, right) = self.points.split_at(top);
         (jumps(&right[1]) && straight(&mut left.iter().rev()))
             || (jumps(&left[top - 1]) && straight(&mut right[1..].iter()))
@@ -149,7 +177,30 @@ impl Bracket {
     /// higher value.
     fn is_unfinished(&self, top: usize, quantity: usize) -> bool {
         let near = &self.points[top - 1..=top + 1];
-        near[2].omega - near[0].omega > CLOSED_WIDTH * self.width && parabola(near, 1, quantity).0 > NEGLIGIBLE_RISE
+        near[2].omega - near[0].omega > self.settings.closed_width * self.width
+            && parabola(near, 1, quantity).0 > self.settings.negligible_rise
+    }
+
+    /// Tells whether an orbit next to the highest of three points is missing, and the line from
+    /// the other side rises towards it.
+    fn lacks_neighbours(&self, near: &[CurvePoint], quantity: usize) -> bool {
+        let rises = |other: usize, failed: usize| {
+            let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
+            let here = negative_inverse_square(near[1].value(quantity));
+            let rise = (here - negative_inverse_square(near[other].value(quantity))) * run / (2.0 * here.abs());
+            // without an orbit on the other side, the rise is unknown
+            near[failed].values.is_empty() && (near[other].values.is_empty() || rise > self.settings.negligible_rise)
+        };
+        rises(0, 2) || rises(2, 0)
+    }
+
+    /// Tells whether a quantity falls steeply on both sides of the middle one of three points.
+    /// Such a fall is larger than that of a kink or a fold in a closed bracket. Near a fold the
+    /// fall is steep on one side only.
+    fn is_too_narrow(&self, near: &[CurvePoint], quantity: usize) -> bool {
+        let value = near[1].value(quantity);
+        let falls = |point: &CurvePoint| value - point.value(quantity) > self.settings.steep_fall * value;
+        falls(&near[0]) && falls(&near[2])
     }
 
     /// Returns the peak of a quantity in its present state.
@@ -157,11 +208,11 @@ impl Bracket {
         let top = highest_inner(&self.points, quantity);
         let point = &self.points[top];
         let near = &self.points[top - 1..=top + 1];
-        let unresolved = if lacks_neighbours(near, quantity) {
+        let unresolved = if self.lacks_neighbours(near, quantity) {
             Some(UnresolvedPeak::MissingNeighbours)
         } else if self.found(quantity) {
             None
-        } else if is_too_narrow(near, quantity) {
+        } else if self.is_too_narrow(near, quantity) {
             Some(UnresolvedPeak::TooNarrow)
         } else if self.is_cut_off(top, quantity) {
             Some(UnresolvedPeak::CutOff)
@@ -197,28 +248,6 @@ pub(super) fn vertex_value(near: &[CurvePoint], quantity: usize) -> f64 {
     // for all rises.
     let left = 1.0 - 2.0 * rise;
     if left > 0.0 { value / left.sqrt() } else { f64::INFINITY }
-}
-
-/// Tells whether an orbit next to the highest of three points is missing, and the line from the
-/// other side rises towards it.
-fn lacks_neighbours(near: &[CurvePoint], quantity: usize) -> bool {
-    let rises = |other: usize, failed: usize| {
-        let run = (near[failed].omega - near[1].omega) / (near[1].omega - near[other].omega);
-        let here = negative_inverse_square(near[1].value(quantity));
-        let rise = (here - negative_inverse_square(near[other].value(quantity))) * run / (2.0 * here.abs());
-        // without an orbit on the other side, the rise is unknown
-        near[failed].values.is_empty() && (near[other].values.is_empty() || rise > NEGLIGIBLE_RISE)
-    };
-    rises(0, 2) || rises(2, 0)
-}
-
-/// Tells whether a quantity falls steeply on both sides of the middle one of three points. Such
-/// a fall is larger than that of a kink or a fold in a closed bracket. Near a fold the fall is
-/// steep on one side only.
-fn is_too_narrow(near: &[CurvePoint], quantity: usize) -> bool {
-    let value = near[1].value(quantity);
-    let falls = |point: &CurvePoint| value - point.value(quantity) > STEEP_FALL * value;
-    falls(&near[0]) && falls(&near[2])
 }
 
 /// Returns the index of the highest inner point; the first and the last point are not higher.

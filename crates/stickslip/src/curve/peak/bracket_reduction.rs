@@ -7,22 +7,40 @@
 
 use super::CurvePoint;
 
-/// Predicted relative rise below which a peak counts as found: a hundred times the rounding of a
-/// closed orbit. The frequency is then accurate to 1e-5 of the peak's width.
-pub(super) const MIN_RISE: f64 = 1e-10;
-/// A rise below `NOISE` times the estimated error of an orbit is noise, but at most
-/// `MAX_NOISE`. The transitions of a sampled series move in steps.
-const NOISE: f64 = 1e-4;
-const MAX_NOISE: f64 = 1e-7;
-/// Fraction of the predicted rise that must be reached, so that the next trial is a parabola
-/// again.
-const CONFIRMED_FRACTION: f64 = 0.5;
-/// Number of consecutive failed predictions after which only bisection is used.
-const MAX_FAILED_PREDICTIONS: usize = 15;
-/// A parabolic step is not longer than this fraction of the step before the last one (R. P.
-/// Brent, Algorithms for minimization without derivatives, 1973). Otherwise parabolas would
-/// converge too slowly near a jump.
-const STEP_RATIO: f64 = 0.5;
+/// Settings of the reduction of a bracket.
+#[derive(Debug, Clone)]
+pub(super) struct ReductionSettings {
+    /// Predicted relative rise below which a peak counts as found: a hundred times the rounding of
+    /// a closed orbit. The frequency is then accurate to 1e-5 of the peak's width.
+    pub(super) min_rise: f64,
+    /// A rise below this multiple of the estimated error of an orbit is noise, at most
+    /// `max_noise`. The transitions of a sampled series move in steps.
+    pub(super) noise: f64,
+    /// Largest relative rise that counts as noise.
+    pub(super) max_noise: f64,
+    /// Fraction of the predicted rise that must be reached, so that the next trial is a parabola
+    /// again.
+    pub(super) confirmed_fraction: f64,
+    /// Number of consecutive failed predictions after which only bisection is used.
+    pub(super) max_failed_predictions: usize,
+    /// A parabolic step is not longer than this fraction of the step before the last one (R. P.
+    /// Brent, Algorithms for minimization without derivatives, 1973). Otherwise parabolas would
+    /// converge too slowly near a jump.
+    pub(super) step_ratio: f64,
+}
+
+impl Default for ReductionSettings {
+    fn default() -> Self {
+        ReductionSettings {
+            min_rise: 1e-10,
+            noise: 1e-4,
+            max_noise: 1e-7,
+            confirmed_fraction: 0.5,
+            max_failed_predictions: 15,
+            step_ratio: 0.5,
+        }
+    }
+}
 
 /// State of the bracket reduction for one quantity. Parabolas are used while their predictions
 /// are confirmed; otherwise intersecting lines and bisection.
@@ -39,6 +57,7 @@ pub(super) struct BracketReduction {
     steps: [Option<f64>; 2],
     /// True if the peak is found.
     pub(super) found: bool,
+    settings: ReductionSettings,
 }
 
 impl BracketReduction {
@@ -48,7 +67,7 @@ impl BracketReduction {
         let value = points[best].value(quantity);
         let (rise, vertex) = parabola(points, best, quantity);
         let floor = closest.max(4.0 * f64::EPSILON * middle);
-        let enough = (NOISE * points[best].error).clamp(MIN_RISE, MAX_NOISE);
+        let enough = (self.settings.noise * points[best].error).clamp(self.settings.min_rise, self.settings.max_noise);
         let at_kink = self.kink.is_some_and(|(omega, promised)| {
             omega == middle && (negative_inverse_square(value) - promised).abs() <= enough * promised.abs()
         });
@@ -61,13 +80,18 @@ impl BracketReduction {
         if self.found || right - left <= 2.0 * floor {
             return None;
         }
-        self.predicted = Some(value * (1.0 + CONFIRMED_FRACTION * rise));
+        self.predicted = Some(value * (1.0 + self.settings.confirmed_fraction * rise));
         self.kink = None;
         let wider = if right - middle > middle - left { 0.5 * (middle + right) } else { 0.5 * (left + middle) };
         let inside = |omega: &f64| *omega > left + floor && *omega < right - floor;
-        let creeps = |omega: &f64| self.steps[1].is_some_and(|step| (omega - middle).abs() > STEP_RATIO * step);
+        let creeps =
+            |omega: &f64| self.steps[1].is_some_and(|step| (omega - middle).abs() > self.settings.step_ratio * step);
         // a curve that fits neither form has a jump
-        let form = if self.failed_predictions < MAX_FAILED_PREDICTIONS { self.failed_predictions % 3 } else { 2 };
+        let form = if self.failed_predictions < self.settings.max_failed_predictions {
+            self.failed_predictions % 3
+        } else {
+            2
+        };
         let trial = match form {
             0 => vertex.filter(inside).filter(|omega| !creeps(omega)),
             1 => {
@@ -130,7 +154,7 @@ fn line_intersection(points: &[CurvePoint], best: usize, quantity: usize) -> Opt
 
 #[cfg(test)]
 mod tests {
-    use super::super::bracket::{MAX_ORBITS, MIN_DISTANCE, highest_inner};
+    use super::super::bracket::{PeakSettings, highest_inner};
     use super::*;
 
     /// Refines the middle one of three points of a given curve. Returns frequency, value and
@@ -138,11 +162,11 @@ mod tests {
     fn check(curve: &dyn Fn(f64) -> f64, [a, x, b]: [f64; 3]) -> (f64, f64, usize) {
         let point = |omega: f64| CurvePoint { omega, values: vec![curve(omega)], seed: None, error: 0.0 };
         let mut points = vec![point(a), point(x), point(b)];
-        let mut shrink = BracketReduction::default();
+        let (mut shrink, settings) = (BracketReduction::default(), PeakSettings::default());
         let mut count = 0;
-        while count < MAX_ORBITS {
+        while count < settings.max_orbits {
             let top = highest_inner(&points, 0);
-            let Some(omega) = shrink.next(&points, top, 0, MIN_DISTANCE * (b - a)) else { break };
+            let Some(omega) = shrink.next(&points, top, 0, settings.min_distance * (b - a)) else { break };
             let at = points.partition_point(|point| point.omega < omega);
             points.insert(at, point(omega));
             count += 1;
@@ -189,6 +213,6 @@ mod tests {
         // Parabolas approach the jump slowly from below, and every third step is a bisection.
         // The search ends close to the edge.
         assert!((omega - 1.05).abs() < 2e-5 * 0.3, "{omega} {count}");
-        assert!(count <= MAX_ORBITS, "{count}");
+        assert!(count <= PeakSettings::default().max_orbits, "{count}");
     }
 }

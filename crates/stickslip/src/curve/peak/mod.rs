@@ -15,17 +15,6 @@ use bracket::{Bracket, refine, vertex_value};
 pub use point::{CurvePoint, Peak, QuantityPeak, UnresolvedPeak};
 use rayon::prelude::*;
 
-/// A point that exceeds its neighbours by less than this fraction is rounding, not a peak.
-const MIN_PROMINENCE: f64 = 1e-10;
-/// Number of peaks at one point that share a solver and its stored data. It is small enough to
-/// keep all threads busy, and does not depend on their number.
-const PEAKS_PER_SOLVER: usize = 12;
-/// A maximum is searched only if the vertex of its parabola reaches this fraction of the highest
-/// value. Other maxima cannot contain the highest peak, unless the points are far too few. The
-/// second value applies after other quantities have added orbits.
-const CANDIDATE_RATIO: f64 = 0.8;
-const REFINED_CANDIDATE_RATIO: f64 = 0.95;
-
 /// Returns the highest peak of the first `wanted` quantities over a curve. `points` are in order
 /// of frequency; `solver` refines the peak between its neighbours. Each quantity is searched
 /// separately. The maximum over all quantities at each frequency would hide the peak of one
@@ -44,7 +33,8 @@ const REFINED_CANDIDATE_RATIO: f64 = 0.95;
 /// let mut solver = EventDriven.solver(&system).unwrap();
 /// let amplitude = |orbit: &Orbit| vec![orbit.places[0].amplitude()];
 /// let omegas = (0..9).map(|i| std::f64::consts::TAU * (120.9 + 0.1 * f64::from(i)));
-/// let points: Vec<CurvePoint> = omegas.map(|w| CurvePoint::new(&solver.orbit(w).unwrap(), &amplitude)).collect();
+/// let points: Vec<CurvePoint> =
+///     omegas.map(|w| CurvePoint::new(&solver.orbit(w).unwrap(), &amplitude)).collect();
 /// let peak = highest_peak(&mut *solver, &points, 1, &amplitude).unwrap();
 /// assert!((peak.value - 0.032_338).abs() < 1e-6);
 /// ```
@@ -74,7 +64,11 @@ pub fn highest_peak(
         let mut bracket = Bracket::new(&points[i - 1..=i + 1]);
         for quantity in here {
             // orbits that others added predict the peak better than the points of the curve
-            let share = if bracket.points.len() > 3 { REFINED_CANDIDATE_RATIO } else { CANDIDATE_RATIO };
+            // A maximum is searched only if the vertex of its parabola reaches this fraction of
+            // the highest value. Other maxima cannot contain the highest peak, unless the points
+            // are far too few. The second value applies after other quantities have added
+            // orbits.
+            let share = if bracket.points.len() > 3 { 0.95 } else { 0.8 };
             if bracket.vertex_value(quantity) >= share * peak.value {
                 bracket.refine(solver, quantity, quantities);
                 peak = higher(peak, bracket.peak(quantity).peak);
@@ -92,10 +86,6 @@ fn higher(one: Peak, other: Peak) -> Peak {
     if other.value > one.value || (other.value == one.value && one.at_end) { other } else { one }
 }
 
-/// Amplitudes below this fraction of the response of a single mass to the loads are rounding:
-/// friction holds the mass.
-const HELD_RATIO: f64 = 1e-10;
-
 /// Returns the amplitude (m) below which a place counts as held at a frequency: a fraction of
 /// the largest `F / (k + Ω²m)`.
 pub fn held_amplitude(system: &System, omega: f64) -> f64 {
@@ -103,7 +93,9 @@ pub fn held_amplitude(system: &System, omega: f64) -> f64 {
     let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
     let loads = system.excitation(omega);
     let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
-    HELD_RATIO * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
+    // Amplitudes below this fraction of the response of a single mass to the loads are rounding:
+    // friction holds the mass.
+    1e-10 * sizes.filter(|size| size.is_finite()).fold(0.0, f64::max)
 }
 
 /// Returns all local maxima of the first `wanted` quantities among the inner `points`, refined,
@@ -137,7 +129,9 @@ pub fn local_peaks(
     let tops = (1..points.len().saturating_sub(1)).flat_map(|i| {
         let near = &points[i - 1..=i + 1];
         let here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-        here.chunks(PEAKS_PER_SOLVER).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
+        // Number of peaks at one point that share a solver and its stored data. It is small
+        // enough to keep all threads busy, and does not depend on their number.
+        here.chunks(12).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
     });
     let tops: Vec<(&[CurvePoint], Vec<usize>)> = tops.collect();
     let found: Vec<Result<Vec<QuantityPeak>, MethodError>> = tops
@@ -168,12 +162,13 @@ pub fn drop_unused_series(points: &mut [CurvePoint]) {
 fn is_maximum(near: &[CurvePoint], quantity: usize) -> bool {
     let [left, here, right] = [0, 1, 2].map(|i| near[i].value(quantity));
     let known = near.iter().all(|point| !point.values.is_empty());
-    known && here >= left && here > right && here - left.min(right) > MIN_PROMINENCE * here.abs()
+    // A point that exceeds its neighbours by less than this fraction is rounding, not a peak.
+    known && here >= left && here > right && here - left.min(right) > 1e-10 * here.abs()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::bracket_reduction::MIN_RISE;
+    use super::bracket_reduction::ReductionSettings;
     use super::*;
     use crate::method::event_driven::EventDriven;
     use crate::method::{Budget, Request};
@@ -206,7 +201,10 @@ mod tests {
         let peak = highest_peak(&mut *EventDriven.solver(&system).unwrap(), &points, 2, &amplitudes).unwrap();
         // F / (c √(k/m - c²/4m²))
         let expected = 1.0 / f64::sqrt(1.21e4 - 0.25);
-        assert!((peak.value / expected - 1.0).abs() < MIN_RISE && peak.unresolved.is_none(), "{peak:?}");
+        assert!(
+            (peak.value / expected - 1.0).abs() < ReductionSettings::default().min_rise && peak.unresolved.is_none(),
+            "{peak:?}"
+        );
     }
 
     /// Without damping, a slider of 2 N cannot bound the response to 10 N, since 4/π·2 N < 10 N.

@@ -19,12 +19,6 @@ pub enum Contact {
     Open,
 }
 
-/// A smooth law never sticks completely. It counts as slipping while its force exceeds this
-/// fraction of its limit.
-pub(crate) const SMOOTH_SLIP_FRACTION: f64 = 0.95;
-/// A law with stick carries its limit during slip, up to accumulated rounding.
-const AT_LIMIT: f64 = 1.0 - 1e-9;
-
 impl Contact {
     /// Returns the sign of the slip velocity in one direction: +1, -1, or 0.
     pub fn sign(self) -> f64 {
@@ -56,12 +50,15 @@ impl Contact {
     /// Returns the state of a smooth law from its force relative to its limit, over all
     /// directions. With a limit of zero the faces slip in the direction of the velocity.
     pub fn of_smooth_law(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
-        Contact::from_fraction(SMOOTH_SLIP_FRACTION, limit, velocity, force)
+        // A smooth law never sticks completely. It counts as slipping while its force exceeds
+        // this fraction of its limit.
+        Contact::from_fraction(0.95, limit, velocity, force)
     }
 
     /// Returns the state of a law that sticks below its limit.
     pub fn of_sticking_law(limit: f64, velocity: &[f64], force: &[f64]) -> Self {
-        Contact::from_fraction(AT_LIMIT, limit, velocity, force)
+        // A law with stick carries its limit during slip, up to accumulated rounding.
+        Contact::from_fraction(1.0 - 1e-9, limit, velocity, force)
     }
 
     fn from_fraction(fraction: f64, limit: f64, velocity: &[f64], force: &[f64]) -> Self {

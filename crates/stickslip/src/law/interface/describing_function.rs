@@ -10,14 +10,6 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Samples per cycle. The result serves as an initial guess, so an error of 1 % is acceptable.
 const SAMPLES: usize = 128;
-/// Simulated cycles. Hysteresis is periodic by then, and states with slow relaxation are close
-/// to it.
-const CYCLES: usize = 3;
-/// Newton iterations for the states at a sample.
-const ITERATIONS: usize = 8;
-/// Penalty times velocity amplitude. The resolvent then evaluates the law at a velocity that
-/// differs by `λ / STEEP` of the velocity amplitude.
-const SCALED_PENALTY: f64 = 1e6;
 
 /// The views of a law from which its describing function follows.
 #[derive(Default)]
@@ -54,7 +46,9 @@ pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega:
         });
     }
     let Some(prox) = prox else { return ZERO };
-    let penalty = SCALED_PENALTY / (a * omega);
+    // Penalty times velocity amplitude. The resolvent then evaluates the law at a velocity that
+    // differs by `λ / STEEP` of the velocity amplitude.
+    let penalty = 1e6 / (a * omega);
     let rigid = first_harmonic(a, |theta| {
         let y = -penalty * a * omega * theta.sin();
         let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
@@ -94,11 +88,14 @@ pub(in crate::law) fn slider_or_stop(element: &IdealElement, amplitude: f64) -> 
 /// Returns the first harmonic of the force in the last cycle, divided by the amplitude of the
 /// motion.
 fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex64 {
+    // Simulated cycles. Hysteresis is periodic by then, and states with slow relaxation are
+    // close to it.
+    let cycles = 3;
     let mut sum = ZERO;
-    for i in 0..=CYCLES * SAMPLES {
+    for i in 0..=cycles * SAMPLES {
         let theta = TAU * i as f64 / SAMPLES as f64;
         let value = force(theta);
-        if i > (CYCLES - 1) * SAMPLES {
+        if i > (cycles - 1) * SAMPLES {
             sum += Complex64::cis(-theta) * value;
         }
     }
@@ -116,7 +113,8 @@ fn rate_law(rate: &dyn RateView, amplitude: f64, omega: f64) -> Complex64 {
         let (sin, cos) = theta.sin_cos();
         let motion = RelativeMotion::along(amplitude * cos, -amplitude * omega * sin);
         let before = z.clone();
-        for _ in 0..if states == 0 { 0 } else { ITERATIONS } {
+        // Newton iterations for the states at a sample.
+        for _ in 0..if states == 0 { 0 } else { 8 } {
             rate.evaluate_with_derivatives(1, &motion, &z, &mut point);
             let residual = DVector::from_fn(states, |s, _| z[s] - before[s] - length * point.rate[s]);
             let jacobian = DMatrix::from_fn(states, states, |s, t| {

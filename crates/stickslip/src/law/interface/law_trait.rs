@@ -18,11 +18,14 @@ pub type SharedLaw = Arc<dyn Law>;
 /// ```
 /// use std::sync::Arc;
 /// use stickslip::dimension::Dimension;
-/// use stickslip::law::{Law, LawInfo, Parameter, RateView, RateLaw, RelativeMotion};
+/// use stickslip::law::{Law, LawInfo, Parameter, RateLaw, RateView, RelativeMotion};
 /// use stickslip_numerics::dual::Real;
 ///
 /// #[derive(Debug)]
-/// struct Stiffening { stiffness: f64, growth: f64 }
+/// struct Stiffening {
+///     stiffness: f64,
+///     growth: f64,
+/// }
 ///
 /// static INFO: LawInfo = LawInfo {
 ///     name: "stiffening",
@@ -36,14 +39,27 @@ pub type SharedLaw = Arc<dyn Law>;
 /// };
 ///
 /// impl Law for Stiffening {
-///     fn info(&self) -> &'static LawInfo { &INFO }
-///     fn values(&self) -> Vec<f64> { vec![self.stiffness, self.growth] }
-///     fn is_odd(&self) -> bool { true }
-///     fn rate(&self) -> Option<&dyn RateView> { Some(self) }
+///     fn info(&self) -> &'static LawInfo {
+///         &INFO
+///     }
+///     fn values(&self) -> Vec<f64> {
+///         vec![self.stiffness, self.growth]
+///     }
+///     fn is_odd(&self) -> bool {
+///         true
+///     }
+///     fn rate(&self) -> Option<&dyn RateView> {
+///         Some(self)
+///     }
 /// }
 ///
 /// impl RateLaw for Stiffening {
-///     fn evaluate<S: Real>(&self, motion: &RelativeMotion<S>, _z: &[S], _rate: &mut [S]) -> [S; 3] {
+///     fn evaluate<S: Real>(
+///         &self,
+///         motion: &RelativeMotion<S>,
+///         _z: &[S],
+///         _rate: &mut [S],
+///     ) -> [S; 3] {
 ///         let u = motion.displacement[0];
 ///         let force = (u + u * u * u * S::from(self.growth)) * S::from(self.stiffness);
 ///         [force, S::from(0.0), S::from(0.0)]
@@ -165,7 +181,8 @@ pub trait Law: Debug + Send + Sync {
     /// Checks that the parameters are consistent with each other.
     ///
     /// # Errors
-    /// A sentence without the law's name, such as "`beta + gamma` is -1; it must be more than zero".
+    /// A sentence without the law's name, such as "`beta + gamma` is -1; it must be more than
+    /// zero".
     fn check_consistency(&self) -> Result<(), String> {
         Ok(())
     }
@@ -238,7 +255,11 @@ impl dyn Law + '_ {
     /// # Example
     /// ```
     /// use stickslip::law::{Coulomb, Cubic, Gap, Law};
-    /// let laws: [&dyn Law; 3] = [&Coulomb { limit: 2.0 }, &Gap { gap: 1e-3, stiffness: 1e4 }, &Cubic { stiffness: 4e9 }];
+    /// let laws: [&dyn Law; 3] = [
+    ///     &Coulomb { limit: 2.0 },
+    ///     &Gap { gap: 1e-3, stiffness: 1e4 },
+    ///     &Cubic { stiffness: 4e9 },
+    /// ];
     /// assert_eq!(laws.map(|law| law.has_faces()), [true, true, false]);
     /// ```
     pub fn has_faces(&self) -> bool {

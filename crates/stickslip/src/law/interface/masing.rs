@@ -34,11 +34,6 @@ pub trait MasingView: Debug + Send + Sync {
 /// stored with fewer legs that carry the same force.
 pub(in crate::law) const MAX_LEGS: usize = 16;
 
-/// A loop closes when a leg reaches this fraction of the previous leg. The margin to 1 covers
-/// rounding: a periodic motion repeats its return points only up to rounding, and must close its
-/// loops each time.
-const LOOP_CLOSURE: f64 = 1.0 - 1e-9;
-
 /// Adds a displacement `increment` to the legs of a history of a law that slips at `slips_at`.
 /// `force` returns the contribution of a leg from its index and length, see [`leg_force`].
 pub(in crate::law) fn advance_legs<S: Real>(
@@ -47,6 +42,10 @@ pub(in crate::law) fn advance_legs<S: Real>(
     slips_at: f64,
     force: impl Fn(usize, f64) -> f64,
 ) {
+    // A loop closes when a leg reaches this fraction of the previous leg. The margin to 1 covers
+    // rounding: a periodic motion repeats its return points only up to rounding, and must close
+    // its loops each time.
+    let loop_closure = 1.0 - 1e-9;
     let mut count = leg_count(legs);
     while let Some(k) = first_unreversed_leg(&legs[..count]) {
         // Two consecutive legs may have the same sign after an extrapolation between two step
@@ -69,12 +68,12 @@ pub(in crate::law) fn advance_legs<S: Real>(
     }
     loop {
         let length = |k: usize| legs[k].re().abs();
-        if count > 2 && length(count - 1) >= LOOP_CLOSURE * length(count - 2) {
+        if count > 2 && length(count - 1) >= loop_closure * length(count - 2) {
             let beyond = legs[count - 2] + legs[count - 1];
             legs[count - 3] += beyond;
             (legs[count - 2], legs[count - 1]) = (S::from(0.0), S::from(0.0));
             count -= 2;
-        } else if count == 2 && length(1) >= LOOP_CLOSURE * 2.0 * length(0) {
+        } else if count == 2 && length(1) >= loop_closure * 2.0 * length(0) {
             // the motion exceeds the first leg on the opposite side: first loading again
             let end = legs[0] + legs[1];
             (legs[0], legs[1]) = (end, S::from(0.0));
@@ -135,24 +134,23 @@ pub(in crate::law) fn leg_force<S: Real>(place: usize, leg: S, backbone: impl Fn
     if leg.re() < 0.0 { -force } else { force }
 }
 
-/// Number of quadrature panels over the half period in [`complex_stiffness`].
-const PANELS: u32 = 8;
-
 /// Returns the complex stiffness (N/m) of the first harmonic of the periodic force under
 /// `u = amplitude cos θ`. In the half period of decreasing u the force is
 /// `B(a) - 2 B((a - u)/2)`; the other half mirrors it.
 pub(in crate::law) fn complex_stiffness(law: &dyn MasingView, amplitude: f64) -> Complex64 {
+    // Number of quadrature panels over the half period in `complex_stiffness`.
+    let panels = 8;
     let top = law.backbone(amplitude).0;
     let mut sum = Complex64::ZERO;
-    for panel in 0..PANELS {
+    for panel in 0..panels {
         for (node, weight) in quadrature::GAUSS_8 {
-            let theta = PI * (f64::from(panel) + 0.5 * (1.0 + node)) / f64::from(PANELS);
+            let theta = PI * (f64::from(panel) + 0.5 * (1.0 + node)) / f64::from(panels);
             let force = top - 2.0 * law.backbone(0.5 * amplitude * (1.0 - theta.cos())).0;
             sum += Complex64::cis(-theta) * (force * weight);
         }
     }
     // 2/π times the integral over the half period
-    sum / (f64::from(PANELS) * amplitude)
+    sum / (f64::from(panels) * amplitude)
 }
 
 #[cfg(test)]

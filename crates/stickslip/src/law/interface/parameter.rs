@@ -113,8 +113,14 @@ impl Parameter {
     ///     row.parameters.iter().find(|p| p.key == key).unwrap().describe_values()
     /// };
     /// assert_eq!(parameter("dahl", "limit"), "force (N), zero or more");
-    /// assert_eq!(parameter("bouc-wen", "gamma"), "inverse length (1/m) to the power `exponent`, of either sign");
-    /// assert_eq!(parameter("friction-contact", "tangents"), "a whole number from 1 to 2; default 2");
+    /// assert_eq!(
+    ///     parameter("bouc-wen", "gamma"),
+    ///     "inverse length (1/m) to the power `exponent`, of either sign"
+    /// );
+    /// assert_eq!(
+    ///     parameter("friction-contact", "tangents"),
+    ///     "a whole number from 1 to 2; default 2"
+    /// );
     /// ```
     pub fn describe_values(&self) -> String {
         let power = self.power.map(|power| format!(" to the power `{power}`")).unwrap_or_default();

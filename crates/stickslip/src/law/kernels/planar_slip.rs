@@ -23,10 +23,6 @@ fn axpy<S: Real>(a: [S; 2], s: S, b: [S; 2]) -> [S; 2] {
     [a[0] + b[0] * s, a[1] + b[1] * s]
 }
 
-/// Relative tolerance between the squared force and the squared limit at which the force counts
-/// as being at the limit. It covers the rounding of the previous step.
-const LIMIT_ROUNDING: f64 = 1e-14;
-
 /// Returns the direction of a force that slipped in the previous step and continues to slip. `b`
 /// is the growth of the force along the path, `c` its distance from the limit, see [`step`].
 /// The force is normalized by the limit instead of its length. The square roots and the
@@ -34,7 +30,9 @@ const LIMIT_ROUNDING: f64 = 1e-14;
 #[inline]
 fn continued_slip_direction<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Option<[S; 2]> {
     let square = first.re() * first.re();
-    let on = b.re() > 0.0 && square >= f64::MIN_POSITIVE && c.re().abs() <= LIMIT_ROUNDING * square;
+    // Relative tolerance between the squared force and the squared limit at which the force
+    // counts as being at the limit. It covers the rounding of the previous step.
+    let on = b.re() > 0.0 && square >= f64::MIN_POSITIVE && c.re().abs() <= 1e-14 * square;
     on.then(|| {
         let inverse = first.recip();
         // 1 / |force| to first order in the rounding error
@@ -43,19 +41,14 @@ fn continued_slip_direction<S: Real>(force: [S; 2], first: S, b: S, c: S) -> Opt
     })
 }
 
-/// Below this difference of the limits, relative to their sum, the logarithm is replaced by its
-/// series. The ninth term is then below rounding.
-const LOG_SERIES_BELOW: f64 = 0.1;
-/// Below this relative change of the limit, the derivative is replaced by its series. The fifth
-/// term is then below rounding.
-const SLOPE_SERIES_BELOW: f64 = 1e-3;
-
 /// `ln(to / from) / (to - from)`: the reciprocal of the logarithmic mean.
 #[inline]
 fn inverse_mean<S: Real>(from: S, to: S) -> S {
     let sum = to + from;
     let change = (to - from) / sum;
-    if change.re().abs() < LOG_SERIES_BELOW {
+    // Below this difference of the limits, relative to their sum, the logarithm is replaced by
+    // its series. The ninth term is then below rounding.
+    if change.re().abs() < 0.1 {
         // ln((1 + x) / (1 - x)) / 2x
         let square = change * change;
         let high = ((square * (1.0 / 15.0) + 1.0 / 13.0) * square + 1.0 / 11.0) * square + 1.0 / 9.0;
@@ -85,8 +78,8 @@ pub(in crate::law) fn step<S: Real>(force: [S; 2], increment: [S; 2], stiffness:
         let size = dot(trial, trial).sqrt();
         return [trial[0] * last / size, trial[1] * last / size];
     }
-    // |force + stiffness s increment| reaches the limit at the fraction s of the path. It solves a s²
-    // + b s + c = 0 with c <= 0 and a + b + c > 0.
+    // |force + stiffness s increment| reaches the limit at the fraction s of the path. It solves
+    // a s² + b s + c = 0 with c <= 0 and a + b + c > 0.
     let change = last - first;
     let a = dot(increment, increment) * (stiffness * stiffness) - change * change;
     let b = (dot(force, increment) * stiffness - first * change) * 2.0;
@@ -298,7 +291,9 @@ pub(in crate::law) fn step_with_slopes(
 fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     let change = to / from - 1.0;
     let mean = inverse_mean(from, to);
-    let slope = if change.abs() < SLOPE_SERIES_BELOW {
+    // Below this relative change of the limit, the derivative is replaced by its series. The
+    // fifth term is then below rounding.
+    let slope = if change.abs() < 1e-3 {
         (((change * 0.8 - 0.75) * change + 2.0 / 3.0) * change - 0.5) / (from * from)
     } else {
         (1.0 / to - mean) / (to - from)
@@ -306,9 +301,17 @@ fn inverse_mean_with_slope(from: f64, to: f64) -> (f64, f64) {
     (mean, slope)
 }
 
-/// Writes a force along `y` and its derivative with respect to y. Given are the magnitude of the
-/// force and its derivative with respect to the magnitude of y.
-pub(in crate::law) fn radial(y: &[f64], size: f64, (value, rise): (f64, f64), force: &mut [f64], slope: &mut [f64]) {
+/// The magnitude of a force along a vector, as a function of the magnitude of the vector.
+pub(in crate::law) struct RadialForce {
+    /// Magnitude of the force.
+    pub value: f64,
+    /// Its derivative with respect to the magnitude of the vector.
+    pub rise: f64,
+}
+
+/// Writes a force along `y` of magnitude `size`, and its derivative with respect to y.
+pub(in crate::law) fn radial(y: &[f64], size: f64, magnitude: RadialForce, force: &mut [f64], slope: &mut [f64]) {
+    let RadialForce { value, rise } = magnitude;
     // perpendicular to y, only the direction changes
     let across = if size > 0.0 { value / size } else { rise };
     for i in 0..2 {

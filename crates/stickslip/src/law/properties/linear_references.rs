@@ -5,10 +5,6 @@ use crate::law::interface::ideal_elements::UNREACHABLE_LIMIT;
 use crate::law::interface::parameter::{LIMIT, STATIC_LIMIT};
 use crate::law::{Law, SharedLaw};
 
-/// Indices into the stiffnesses of [`Law::reference_springs`].
-const FREE: usize = 0;
-const STUCK: usize = 1;
-
 impl dyn Law + '_ {
     /// Returns the law with another slip limit (N), dynamic and static; `None` if it has no slip
     /// limit.
@@ -17,18 +13,15 @@ impl dyn Law + '_ {
         Some(law.with_value(STATIC_LIMIT, limit).unwrap_or(law))
     }
 
-    /// Returns the joint as linear springs, if the law defines them. `which` is `FREE` or
-    /// `STUCK`.
-    fn as_springs(&self, which: usize) -> Option<SharedLaw> {
-        self.reference_springs().map(|springs| LinearSprings::shared(&springs[which]))
-    }
-
     /// Returns the linear reference without friction: the slip limit is zero, or the faces stay
     /// apart. `None` if the law has neither a slip limit nor faces that separate.
     pub fn frictionless_reference(&self) -> Option<SharedLaw> {
         match self.closed_stiffness() {
             Some(along) => Some(LinearSprings::shared(&vec![0.0; along.len()])),
-            None => self.as_springs(FREE).or_else(|| self.with_slip_limit(0.0)),
+            None => {
+                let springs = self.reference_springs().map(|[free, _]| LinearSprings::shared(&free));
+                springs.or_else(|| self.with_slip_limit(0.0))
+            }
         }
     }
 
@@ -38,7 +31,10 @@ impl dyn Law + '_ {
     pub fn stuck_reference(&self) -> Option<SharedLaw> {
         match self.closed_stiffness() {
             Some(along) => Some(LinearSprings::shared(&along)),
-            None => self.as_springs(STUCK).or_else(|| self.with_slip_limit(UNREACHABLE_LIMIT)),
+            None => {
+                let springs = self.reference_springs().map(|[_, stuck]| LinearSprings::shared(&stuck));
+                springs.or_else(|| self.with_slip_limit(UNREACHABLE_LIMIT))
+            }
         }
     }
 }

@@ -9,12 +9,6 @@ use crate::law::{IdealElement, Law, MAX_DIRECTIONS, ProxView, RateView, Relative
 
 /// Magnitudes of the displacements, as powers of ten in metres.
 const DECADES: std::ops::RangeInclusive<i32> = -9..=0;
-/// Ratio of velocities to displacements, 1/s.
-const VELOCITY_RATIO: f64 = 1e3;
-/// Arguments of the resolvent, relative to the law's force scale.
-const FORCES: [f64; 4] = [0.3, 0.9, 1.5, 10.0];
-/// Difference relative to the largest force that is larger than rounding.
-const DIFFERENCE: f64 = 1e-9;
 /// One history in every direction, in relative units, with reversals and varying amplitude.
 const HISTORY: [[f64; MAX_DIRECTIONS]; 6] =
     [[0.3, 0.2, -0.1], [1.0, -0.4, 0.6], [0.4, -1.0, 1.0], [-0.2, -0.7, 0.3], [-0.9, 0.5, -0.8], [-0.1, 0.8, -0.3]];
@@ -52,18 +46,21 @@ fn forces_differ(forces: impl Fn(f64) -> Vec<ForceVector>) -> bool {
     let (there, back) = (forces(1.0), forces(-1.0));
     let all = || there.iter().flatten();
     let largest = all().fold(0.0f64, |most, force| most.max(force.abs()));
-    all().zip(back.iter().flatten()).any(|(a, b)| (a + b).abs() > DIFFERENCE * largest)
+    // Difference relative to the largest force that is larger than rounding.
+    all().zip(back.iter().flatten()).any(|(a, b)| (a + b).abs() > 1e-9 * largest)
 }
 
 fn by_rate(rate: &dyn RateView, size: f64) -> Vec<ForceVector> {
+    // Ratio of velocities to displacements, 1/s.
+    let velocity_ratio = 1e3;
     let (mut z, mut rates) = (vec![0.0; rate.states()], vec![0.0; rate.states()]);
     let mut before = [0.0; MAX_DIRECTIONS];
     let along = |point: &ForceVector| {
         let displacement = point.map(|u| u * size);
-        let velocity = std::array::from_fn(|a| VELOCITY_RATIO * (displacement[a] - before[a]));
+        let velocity = std::array::from_fn(|a| velocity_ratio * (displacement[a] - before[a]));
         before = displacement;
         let force = rate.evaluate_values(&RelativeMotion { displacement, velocity }, &z, &mut rates);
-        z.iter_mut().zip(&rates).for_each(|(z, rate)| *z += rate / VELOCITY_RATIO);
+        z.iter_mut().zip(&rates).for_each(|(z, rate)| *z += rate / velocity_ratio);
         force
     };
     HISTORY.iter().map(along).collect()
@@ -83,7 +80,8 @@ fn by_step(step: &dyn StepView, size: f64) -> Vec<ForceVector> {
 
 fn by_force(prox: &dyn ProxView, directions: usize, size: f64) -> Vec<ForceVector> {
     let penalty = 2.0 * prox.minimum_penalty().max(0.5);
-    let asked = FORCES.iter().zip(&HISTORY).map(|(share, point)| {
+    // Arguments of the resolvent, relative to the law's force scale.
+    let asked = [0.3, 0.9, 1.5, 10.0].iter().zip(&HISTORY).map(|(share, point)| {
         let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
         let y = point.map(|part| share * part * size);
         prox.resolve(&y[..directions], penalty, &mut force[..directions], &mut slope[..directions * directions]);

@@ -5,10 +5,6 @@
 
 use crate::law::Law;
 
-/// Tolerance between the factors of different parameters: the rounding of a few products and a
-/// root.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
-
 impl dyn Law + '_ {
     /// Returns the factor between the forces of this law and those of `other`, equal in every
     /// motion. `None` if the laws are not proportional.
@@ -30,7 +26,9 @@ impl dyn Law + '_ {
             }
             let factor = (own / its).powf(1.0 / f64::from(power));
             let expected = *times.get_or_insert(factor);
-            if !(factor > 0.0 && factor.is_finite()) || (factor - expected).abs() > ROUNDING * expected {
+            // Tolerance between the factors of different parameters: the rounding of a few
+            // products and a root.
+            if !(factor > 0.0 && factor.is_finite()) || (factor - expected).abs() > (8.0 * f64::EPSILON) * expected {
                 return None;
             }
         }

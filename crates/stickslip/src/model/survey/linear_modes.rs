@@ -29,19 +29,6 @@ pub(super) struct LinearStructure {
     pub(super) gyroscopic: bool,
 }
 
-/// Relative eigenvalue below which fewer than six digits are significant. For modes below it,
-/// the stiffest springs count as rigid. Symmetric QR has errors of about 1e-15 of the largest
-/// eigenvalue.
-const RESOLVED_EIGENVALUE: f64 = 1e-9;
-/// Relative eigenvalue below which the value is rounding.
-const ROUNDING: f64 = 1e-13;
-/// Springs above this fraction of the stiffest spring determine the highest modes.
-const STIFF_LEVEL: f64 = 1e-4;
-/// For matrix structures: eigenvalues below this fraction of the median are free motions. This
-/// suits matrices with ten digits.
-const FREE: f64 = 1e-10;
-/// Number of stiffness levels.
-const LEVELS: usize = 4;
 /// A pivot below this fraction of its original value is zero.
 const ZERO: f64 = 1e-12;
 /// Largest number of degrees of freedom for which modes are computed; more would take longer
@@ -77,7 +64,9 @@ impl ModalStructure {
         // a coordinate without mass follows the others and has no mode
         squares.truncate(squares.partition_point(|value| value.is_finite()));
         let usual = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
-        let free = squares.partition_point(|value| *value < FREE * usual);
+        // For matrix structures: eigenvalues below this fraction of the median are free motions.
+        // This suits matrices with ten digits.
+        let free = squares.partition_point(|value| *value < 1e-10 * usual);
         let shapes = shapes.columns(0, squares.len()).into_owned();
         let damping = shapes.tr_mul(&(damping * &shapes));
         Some(ModalStructure { squares, free, shapes: turn * shapes, damping })
@@ -156,10 +145,12 @@ impl LinearStructure {
         // these modes
         let mut high = elastic;
         let (mut links, mut rigid) = (links.to_vec(), rigid.to_vec());
-        for _ in 0..LEVELS {
+        // Number of stiffness levels.
+        for _ in 0..4 {
             let stiffest = links.iter().map(|link| link.stiffness).fold(0.0, f64::max);
+            // Springs above this fraction of the stiffest spring determine the highest modes.
             let (above, below): (Vec<&SpringDamper>, Vec<&SpringDamper>) =
-                links.iter().partition(|link| link.stiffness > STIFF_LEVEL * stiffest);
+                links.iter().partition(|link| link.stiffness > 1e-4 * stiffest);
             if below.is_empty() {
                 break;
             }
@@ -179,7 +170,8 @@ impl LinearStructure {
         high.drain(..high.len().saturating_sub(expected));
         if high.len() < expected {
             // take all eigenvalues above rounding, with the digits that they have
-            let mut all = total.above(ROUNDING);
+            // Relative eigenvalue below which the value is rounding.
+            let mut all = total.above(1e-13);
             all.drain(..all.len().saturating_sub(expected));
             if all.len() > high.len() {
                 high = all;
@@ -211,7 +203,10 @@ impl CondensedModes {
     }
 
     fn elastic(&self) -> Vec<NaturalMode> {
-        self.above(RESOLVED_EIGENVALUE)
+        // Relative eigenvalue below which fewer than six digits are significant. For modes below
+        // it, the stiffest springs count as rigid. Symmetric QR has errors of about 1e-15 of the
+        // largest eigenvalue.
+        self.above(1e-9)
     }
 
     fn shapes(&self, count: usize) -> DMatrix<f64> {

@@ -77,16 +77,31 @@ impl Model {
     /// use stickslip::law::FrictionContact;
     /// use stickslip::method::StaticEquilibrium;
     /// use stickslip::model::{Force, GROUND, Joint, Mass, Model};
-    /// let law = FrictionContact { tangential: 1e6, normal: 2e6, friction: 0.3, preload: 0.0, tangents: 1 };
+    /// let law = FrictionContact {
+    ///     tangential: 1e6,
+    ///     normal: 2e6,
+    ///     friction: 0.3,
+    ///     preload: 0.0,
+    ///     tangents: 1,
+    /// };
     /// let model = Model {
     ///     masses: vec![Mass::new("m", 1.0).along(&["t", "n"])],
-    ///     joints: vec![Joint { name: "foot".into(), between: ["m".into(), GROUND.into()], law: Arc::new(law) }],
+    ///     joints: vec![Joint {
+    ///         name: "foot".into(),
+    ///         between: ["m".into(), GROUND.into()],
+    ///         law: Arc::new(law),
+    ///     }],
     ///     forces: vec![Force { on: "m.n".into(), amplitude: 20.0, phase: 0.0, harmonic: 0 }],
     ///     ..Model::default()
     /// };
-    /// let survey = model.survey_under_load(&|system| Some(StaticEquilibrium::of(system)?.forces())).unwrap();
+    /// let survey = model
+    ///     .survey_under_load(&|system| Some(StaticEquilibrium::of(system)?.forces()))
+    ///     .unwrap();
     /// let slip = survey.first_slip();
-    /// assert!((slip[0].limit - 6.0).abs() < 1e-9 && (slip[1].equilibrium_force.unwrap() - 20.0).abs() < 1e-9);
+    /// assert!(
+    ///     (slip[0].limit - 6.0).abs() < 1e-9
+    ///         && (slip[1].equilibrium_force.unwrap() - 20.0).abs() < 1e-9
+    /// );
     /// assert_eq!(model.survey().unwrap().first_slip()[0].limit, 0.0);
     /// ```
     pub fn survey_under_load(

@@ -9,13 +9,6 @@ use super::linear_modes::MAX_DOFS;
 use super::stuck_joint::{StuckAxis, StuckState};
 use nalgebra::{DMatrix, DVector};
 
-/// Fraction of the preload below which a contact force is zero. In directions that nothing
-/// holds, it is rounding.
-const ZERO_FORCE: f64 = 1e-6;
-/// Stiffness of directions that nothing holds, relative to the stiffest contact. It lets them
-/// move without a significant force.
-const SOFT: f64 = 1e-12;
-
 /// Returns the force of each preloaded contact in static equilibrium, N, if all contacts stay
 /// closed and stuck.
 ///
@@ -48,14 +41,18 @@ pub(super) fn equilibrium_forces(system: &System, joints: &[StuckAxis]) -> Vec<O
             joint.at.iter().for_each(|&(b, v)| stiffness[(a, b)] += k * w * v);
         }
     }
-    (0..n).for_each(|i| stiffness[(i, i)] += SOFT * stiffest);
+    // Stiffness of directions that nothing holds, relative to the stiffest contact. It lets them
+    // move without a significant force.
+    (0..n).for_each(|i| stiffness[(i, i)] += 1e-12 * stiffest);
     // without free coordinates nothing deforms
     let solved = if n == 0 { Some(load) } else { stiffness.lu().solve(&load) };
     let Some(x) = solved else { return unknown() };
     let carried = |joint: &StuckAxis| {
         let preload = joint.pressed.filter(|force| *force > 0.0)?;
         let force = preload + springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>();
-        Some(if force.abs() <= ZERO_FORCE * preload { 0.0 } else { force })
+        // Fraction of the preload below which a contact force is zero. In directions that
+        // nothing holds, it is rounding.
+        Some(if force.abs() <= 1e-6 * preload { 0.0 } else { force })
     };
     joints.iter().map(carried).collect()
 }

@@ -8,43 +8,6 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::golden_section::golden_section;
 
-/// Limit of complex multiplications for an estimate of first slip: about 0.1 s.
-const WORK: f64 = 2.5e7;
-/// Number of frequencies sampled in a range, in addition to those around its modes.
-const FREQUENCIES: usize = 200;
-/// Smallest number of frequencies; fewer would miss maxima between modes.
-const MIN_FREQUENCIES: usize = 24;
-/// Sample points around a mode, in units of its damping ratio times its frequency.
-const MODE_OFFSETS: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// Instants per period of the highest harmonic, if there are several harmonics. The largest
-/// value has a relative error of (π/64)²/2, about 0.1 %.
-const INSTANTS: usize = 64;
-/// Largest number of instants; harmonics up to 64 have the full number.
-const MOST_INSTANTS: usize = 4096;
-/// Bisections that locate a border between stick and slip: the final interval is 1e-12 of the
-/// step.
-const HALVINGS: usize = 40;
-/// Tolerance for the frequency of the largest load, relative to two steps. The load is flat
-/// there.
-const PEAK_TOLERANCE: f64 = 1e-5;
-/// Compliance of a rigid joint, relative to that of the structure. It distributes the load over
-/// redundant joints.
-const COMPLIANCE: f64 = 1e-10;
-/// Lower bound of the factor on that compliance for joints with larger limits. A joint with a
-/// larger limit carries a larger part of a shared load. Joints along one line carry the load in
-/// proportion to their limits and slip together.
-const MIN_COMPLIANCE_FACTOR: f64 = 1e-3;
-/// Relative distance of frequencies up to which two modes form a pair.
-const EQUAL: f64 = 1e-9;
-
-/// Damping ratio that counts as zero, and relative work of an excitation on a mode that counts
-/// as zero. Both are rounding errors.
-const UNDAMPED: f64 = 1e-12;
-const UNDRIVEN: f64 = 1e-9;
-
-/// Largest number of degrees of freedom and joints for which borders are refined.
-const REFINED: usize = 40;
-
 impl Survey {
     /// Returns the loads of the stuck joints under the model's excitation, relative to their
     /// limits.
@@ -82,11 +45,13 @@ impl Survey {
                     power += *force * *x;
                     size += (*force * *x).norm();
                 }
-                (from..=to).contains(&at) && power.norm() > UNDRIVEN * size
+                (from..=to).contains(&at) && power.norm() > 1e-9 * size
             })
         };
         let modes = self.free.modes.elastic.iter().enumerate();
-        let bare = modes.filter(|(_, mode)| mode.damping.abs() <= UNDAMPED);
+        // Damping ratio that counts as zero, and relative work of an excitation on a mode that
+        // counts as zero. Both are rounding errors.
+        let bare = modes.filter(|(_, mode)| mode.damping.abs() <= 1e-12);
         bare.filter(|(index, mode)| driven(*index, mode.omega)).map(|(_, mode)| mode.omega).collect()
     }
 
@@ -98,7 +63,8 @@ impl Survey {
     pub fn slip_amplitude(&self, index: usize) -> Option<f64> {
         let modes = &self.stuck.modes.elastic;
         let omega = modes.get(index)?.omega;
-        let equal: Vec<usize> = (0..modes.len()).filter(|&k| (modes[k].omega / omega - 1.0).abs() <= EQUAL).collect();
+        // Relative distance of frequencies up to which two modes form a pair.
+        let equal: Vec<usize> = (0..modes.len()).filter(|&k| (modes[k].omega / omega - 1.0).abs() <= 1e-9).collect();
         let members = if equal.len() == 2 { equal } else { vec![index] };
         let mut squares = vec![0.0; self.joints.len()];
         for &member in &members {
@@ -159,7 +125,12 @@ impl Survey {
             StuckState::Nothing | StuckState::Spring { .. } => f64::INFINITY,
         };
         let least = rigid.iter().map(limit).fold(f64::INFINITY, f64::min);
-        rigid.iter().map(|joint| COMPLIANCE * (least / limit(joint)).max(MIN_COMPLIANCE_FACTOR)).collect()
+        // Compliance of a rigid joint, relative to that of the structure. It distributes the
+        // load over redundant joints.
+        // Lower bound of the factor on that compliance for joints with larger limits. A joint
+        // with a larger limit carries a larger part of a shared load. Joints along one line
+        // carry the load in proportion to their limits and slip together.
+        rigid.iter().map(|joint| 1e-10 * (least / limit(joint)).max(1e-3)).collect()
     }
 
     fn rigid(&self) -> Vec<usize> {
@@ -178,12 +149,15 @@ impl Survey {
         let unknowns = (self.dofs() + self.rigid().len()) as f64;
         let harmonics = self.harmonics();
         let cost = (unknowns.powi(3) / 3.0).max(1.0) * harmonics.len().max(1) as f64;
-        let affordable = (WORK / cost) as usize;
+        // Limit of complex multiplications for an estimate of first slip: about 0.1 s.
+        let affordable = (2.5e7 / cost) as usize;
         if from == to {
             return (affordable > 0).then(|| vec![from]);
         }
-        let count = FREQUENCIES.min(affordable / 2);
-        if count < MIN_FREQUENCIES {
+        // Number of frequencies sampled in a range, in addition to those around its modes.
+        let count = 200.min(affordable / 2);
+        // Smallest number of frequencies; fewer would miss maxima between modes.
+        if count < 24 {
             return None;
         }
         let mut omegas: Vec<f64> =
@@ -192,7 +166,11 @@ impl Survey {
         for mode in &self.stuck.modes.elastic {
             let width = mode.damping.clamp(1e-6, 0.1) * mode.omega;
             for h in &harmonics {
-                let points = MODE_OFFSETS.iter().flat_map(|a| [mode.omega - a * width, mode.omega + a * width]);
+                // Sample points around a mode, in units of its damping ratio times its
+                // frequency.
+                let points = [0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0]
+                    .iter()
+                    .flat_map(|a| [mode.omega - a * width, mode.omega + a * width]);
                 around.extend(points.map(|w| w / f64::from(*h)).filter(|w| (from..=to).contains(w)));
             }
         }
@@ -223,7 +201,10 @@ impl Survey {
             [one] => one[joint].norm(),
             several => {
                 let highest = harmonics.last().copied().unwrap_or(1) as usize;
-                let instants = (INSTANTS * highest).min(MOST_INSTANTS);
+                // Instants per period of the highest harmonic, if there are several harmonics.
+                // The largest value has a relative error of (π/64)²/2, about 0.1 %.
+                // Largest number of instants; harmonics up to 64 have the full number.
+                let instants = (64 * highest).min(4096);
                 let at = |i: usize| {
                     let terms = several.iter().zip(&harmonics);
                     let phase = |h: u32| TAU * ((i * h as usize) % instants) as f64 / instants as f64;
@@ -304,10 +285,13 @@ impl Survey {
         let mut best = (omegas[top], value(top));
         // refinement is limited to models with few joints; for large ones the samples are
         // accurate enough
-        let refined = (self.dofs() + self.joints.len()) <= REFINED;
+        // Largest number of degrees of freedom and joints for which borders are refined.
+        let refined = (self.dofs() + self.joints.len()) <= 40;
         if refined && omegas.len() > 1 && best.1.is_finite() {
             let (low, high) = (omegas[top.saturating_sub(1)], omegas[(top + 1).min(omegas.len() - 1)]);
-            let close = |a: f64, b: f64| b - a <= PEAK_TOLERANCE * (high - low);
+            // Tolerance for the frequency of the largest load, relative to two steps. The load
+            // is flat there.
+            let close = |a: f64, b: f64| b - a <= 1e-5 * (high - low);
             let found = golden_section((low, high), close, |omega| at(omega).ok_or(())).ok()?;
             if found.1 > best.1 {
                 best = found;
@@ -315,7 +299,9 @@ impl Survey {
         }
         let border = |inside: f64, outside: f64| -> Option<f64> {
             let (mut inside, mut outside) = (inside, outside);
-            for _ in 0..if refined { HALVINGS } else { 0 } {
+            // Bisections that locate a border between stick and slip: the final interval is
+            // 1e-12 of the step.
+            for _ in 0..if refined { 40 } else { 0 } {
                 let middle = 0.5 * (inside + outside);
                 if at(middle)? > 1.0 { inside = middle } else { outside = middle }
             }

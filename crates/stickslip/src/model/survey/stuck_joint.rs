@@ -131,7 +131,8 @@ fn small_stiffness(law: &dyn Law, axis: usize) -> f64 {
         return if prox.compliance() > 0.0 { prox.compliance().recip() } else { 0.0 };
     }
     if law.ideal_elements().is_some() {
-        return law.describing_function(LINEAR_AMPLITUDE, 1.0).re;
+        // An amplitude (m) at which no law slips. Its square is still a normal number.
+        return law.describing_function(1e-150, 1.0).re;
     }
     let (count, rest) = (law.directions(), [0.0; MAX_DIRECTIONS]);
     if let Some(step) = law.step() {
@@ -171,9 +172,6 @@ fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
         (None, None) => 0.0,
     }
 }
-
-/// An amplitude (m) at which no law slips. Its square is still a normal number.
-const LINEAR_AMPLITUDE: f64 = 1e-150;
 
 #[cfg(test)]
 mod tests {

@@ -126,7 +126,10 @@ impl WaveRows {
                 break;
             }
             let mut shape = shapes.column(column).into_owned();
-            let near = |other: &&usize| mode.omega - elastic[**other].omega <= EQUAL_FREQUENCY * mode.omega;
+            // Relative frequency distance within which modes can share an eigenspace. More
+            // distant modes are orthogonal up to rounding. Modes of one pair differ by at most
+            // 1e-6, even where frequencies have few significant digits.
+            let near = |other: &&usize| mode.omega - elastic[**other].omega <= 1e-3 * mode.omega;
             let first = kept.len() - kept.iter().rev().take_while(near).count();
             for [own, weighed, turned, turned_weighed] in &found[first..] {
                 let (along, across) = (weighed.dot(&shape), turned_weighed.dot(&shape));
@@ -135,7 +138,10 @@ impl WaveRows {
             }
             let weighed = weigh(&shape);
             let left = weighed.dot(&shape);
-            if left >= INDEPENDENT_NORM {
+            // Fraction of a shape's square that remains after projection on the earlier shapes
+            // and marks a new shape. For the partner in a pair, only rounding remains. Of up to
+            // six equal modes, some shape always has more.
+            if left >= 0.25 {
                 let (shape, weighed) = (shape / left.sqrt(), weighed / left.sqrt());
                 let turned = self.times_j(&shape);
                 let turned_weighed = self.times_j(&weighed);
@@ -180,15 +186,6 @@ struct SelectedModes {
     shapes: Vec<DVector<f64>>,
 }
 
-/// Relative frequency distance within which modes can share an eigenspace. More distant modes
-/// are orthogonal up to rounding. Modes of one pair differ by at most 1e-6, even where
-/// frequencies have few significant digits.
-const EQUAL_FREQUENCY: f64 = 1e-3;
-/// Fraction of a shape's square that remains after projection on the earlier shapes and marks a
-/// new shape. For the partner in a pair, only rounding remains. Of up to six equal modes, some
-/// shape always has more.
-const INDEPENDENT_NORM: f64 = 0.25;
-
 impl Model {
     /// Returns the `lowest` modes of a ring of equal sectors by nodal diameter.
     ///
@@ -203,7 +200,11 @@ impl Model {
     /// ```
     /// use stickslip::model::Disk;
     /// use stickslip::{GROUND, Mass, Model, Spring};
-    /// let spring = |other: &str, stiffness| Spring { between: ["b".into(), other.into()], stiffness, damping: 0.0 };
+    /// let spring = |other: &str, stiffness| Spring {
+    ///     between: ["b".into(), other.into()],
+    ///     stiffness,
+    ///     damping: 0.0,
+    /// };
     /// let sector = Model {
     ///     masses: vec![Mass::new("b", 1.0)],
     ///     springs: vec![spring(GROUND, 1.0), spring("next.b", 0.2)],
@@ -356,7 +357,8 @@ fn of_large(
     let mass = part(0, Vec::new())?;
     let (damping, stiffness) = (part(1, along(|link| link.damping))?, part(2, along(|link| link.stiffness))?);
     // free motions come on top of the requested elastic modes
-    let wanted = ModeSelection::Lowest((count.saturating_add(MAX_FREE_MODES)).min(n));
+    // Largest number of free motions: six of a body, twice for both directions of travel.
+    let wanted = ModeSelection::Lowest((count.saturating_add(12)).min(n));
     let found = NaturalModes::new(&SymbolicAnalysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
     let free = found.rigid_body_count();
     let mode = |k: usize| {
@@ -369,9 +371,6 @@ fn of_large(
     let modes = LinearModes { elastic: (free..found.count()).map(mode).collect(), rigid: free, unresolved: 0 };
     Some((mass, modes, shapes))
 }
-
-/// Largest number of free motions: six of a body, twice for both directions of travel.
-const MAX_FREE_MODES: usize = 12;
 
 #[cfg(test)]
 mod tests {

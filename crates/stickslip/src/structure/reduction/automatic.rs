@@ -9,27 +9,15 @@ use stickslip_numerics::sparse::{ModesError, NaturalModes};
 /// Modes are computed up to these multiples of the frequency of interest, one after the other,
 /// until a reduction reaches the tolerance.
 const EXTENTS: [f64; 2] = [1.5, 3.0];
-/// Multiples that are tried first if there are many ports. One order of residual vectors adds a
-/// coordinate per port, more than the modes up to these multiples.
-const EXTENTS_OF_MANY: [f64; 2] = [3.0, 6.0];
-/// Number of times that the last multiple is doubled for a requested Craig-Bampton reduction,
-/// up to 600 modes or all modes. Its error decreases slowly. Measured on bricks of 144 rows up
-/// to 5 kHz: 2e-3 at 48 times that frequency, with 53 modes.
-const MAX_DOUBLINGS: i32 = 12;
-/// Fractions of each multiple that are tried.
-const SHARES: [f64; 4] = [0.67, 0.8, 0.9, 1.0];
 /// Number of ports above which more modes are tried before more orders, and all modes are used
 /// at once. Compared with hundreds of residual vectors, fewer modes save little.
 const MANY_PORTS: usize = 96;
-/// Largest order of residual vectors.
-const ORDERS: usize = 3;
-/// Limit on the numbers in all residual vectors: 1 GB.
-const MAX_RESIDUAL_NUMBERS: usize = 1 << 27;
 
 /// Returns the largest order of residual vectors, reduced for large structures with many ports
 /// to limit memory.
 fn orders(whole: &FullStructure) -> usize {
-    (MAX_RESIDUAL_NUMBERS / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, ORDERS)
+    // At most 2²⁷ numbers in all residual vectors, 1 GB, and the order three.
+    ((1 << 27) / (whole.dofs() * whole.ports().len()).max(1)).clamp(1, 3)
 }
 
 /// Parameters of an automatic reduction.
@@ -42,13 +30,22 @@ fn orders(whole: &FullStructure) -> usize {
 /// // a rod of 400 masses, held at one end and seen at the other
 /// let n = 400;
 /// let stiffness = (0..n).flat_map(|i| {
-///     let linked = if i > 0 { vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)] } else { vec![] };
+///     let linked = if i > 0 {
+///         vec![(i - 1, i - 1, 1e6), (i - 1, i, -1e6), (i, i - 1, -1e6)]
+///     } else {
+///         vec![]
+///     };
 ///     linked.into_iter().chain([(i, i, 1e6)])
 /// });
 /// let stiffness = SparseMatrix::from_triplets(n, stiffness)?;
 /// let mass = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 0.001)))?;
 /// let up_to = TAU * 100.0;
-/// let whole = FullStructure::new(mass, StructureDamping::Ratio { ratio: 0.005, up_to }, stiffness, vec![vec![(n - 1, 1.0)]])?;
+/// let whole = FullStructure::new(
+///     mass,
+///     StructureDamping::Ratio { ratio: 0.005, up_to },
+///     stiffness,
+///     vec![vec![(n - 1, 1.0)]],
+/// )?;
 /// let chosen = AutomaticReduction { up_to, tolerance: 1e-4, kind: None }.apply(&whole)?;
 /// assert!(chosen.reduced.dofs() < 12 && chosen.deviation.error < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -151,7 +148,10 @@ impl AutomaticReduction {
             last = Some(modes);
         }
         if let (Some(ReductionKind::CraigBampton), Some(reference), Some(modes)) = (self.kind, reference, last) {
-            for doubled in 1..=MAX_DOUBLINGS {
+            // Number of times that the last multiple is doubled for a requested Craig-Bampton
+            // reduction, up to 600 modes or all modes. Its error decreases slowly. Measured on
+            // bricks of 144 rows up to 5 kHz: 2e-3 at 48 times that frequency, with 53 modes.
+            for doubled in 1..=12 {
                 let extent = EXTENTS[EXTENTS.len() - 1] * 2.0f64.powi(doubled);
                 let reduced = match whole.craig_bampton(extent * self.up_to) {
                     Ok(reduced) => reduced,
@@ -179,7 +179,9 @@ impl AutomaticReduction {
     fn attempts(self, whole: &FullStructure) -> Vec<Attempt> {
         let all = orders(whole);
         let many = whole.ports().len() > MANY_PORTS && self.kind != Some(ReductionKind::CraigBampton);
-        let first = EXTENTS_OF_MANY.into_iter().filter(|_| many).map(|extent| (extent, 1..=1, true));
+        // Multiples that are tried first if there are many ports. One order of residual vectors
+        // adds a coordinate per port, more than the modes up to these multiples.
+        let first = [3.0, 6.0].into_iter().filter(|_| many).map(|extent| (extent, 1..=1, true));
         let usual = EXTENTS.into_iter().map(|extent| (extent, if many { 2 } else { 1 }..=all, false));
         first
             .chain(usual)
@@ -195,12 +197,14 @@ impl AutomaticReduction {
         (extent, orders): (f64, RangeInclusive<usize>),
         whole: &FullStructure,
     ) -> Vec<(usize, usize)> {
+        // Fractions of each multiple that are tried.
+        let shares = [0.67, 0.8, 0.9, 1.0];
         let ports = whole.ports().len();
         let count = |share: f64| {
             let bound = (share * extent * self.up_to).powi(2);
             if share < 1.0 { modes.values.partition_point(|value| *value <= bound) } else { modes.count() }
         };
-        let shares = if ports > MANY_PORTS { &SHARES[SHARES.len() - 1..] } else { &SHARES[..] };
+        let shares = if ports > MANY_PORTS { &shares[shares.len() - 1..] } else { &shares[..] };
         let mut sizes: Vec<(usize, usize)> =
             orders.flat_map(|order| shares.iter().map(move |share| (count(*share), order))).collect();
         sizes.sort_by_key(|&(count, order)| (count + order * ports, order));

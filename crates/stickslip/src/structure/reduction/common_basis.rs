@@ -14,9 +14,6 @@ use super::{FullStructure, ReducedMatrices, ReductionDeviation, ReductionError, 
 use nalgebra::DMatrix;
 use stickslip_numerics::sparse::{SparseMatrix, multi_vector};
 
-/// Values of s at which a basis is compared with the whole structure.
-const CHECKED_FRACTIONS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-
 /// A structure with both stiffnesses in the same coordinates.
 #[derive(Debug, Clone)]
 pub(in crate::structure) struct CommonBasis {
@@ -41,13 +38,15 @@ impl FullStructure {
         reduce: impl Fn(&FullStructure) -> Result<(ReducedMatrices, f64), ReductionError>,
         tolerance: f64,
     ) -> Result<CommonBasis, ReductionError> {
+        // Values of s at which a basis is compared with the whole structure.
+        let checked_fractions = [0.0, 0.25, 0.5, 0.75, 1.0];
         let n = self.dofs();
         if there.n() != n {
             return Err(ReductionError::Size { matrix: "other stiffness", rows: there.n(), n });
         }
-        let wholes = CHECKED_FRACTIONS.map(|share| self.with_share(there, share));
+        let wholes = checked_fractions.map(|share| self.with_share(there, share));
         let wholes: Vec<FullStructure> = wholes.into_iter().collect::<Result<_, _>>()?;
-        let last = CHECKED_FRACTIONS.len() - 1;
+        let last = checked_fractions.len() - 1;
         let (mut vectors, mut up_to, mut taken) = (Vec::new(), f64::INFINITY, Vec::new());
         let mut take = |at: usize| -> Result<_, ReductionError> {
             let (reduced, own) = reduce(&wholes[at])?;

@@ -31,8 +31,6 @@ use stickslip_numerics::sparse::{ModeSelection, NaturalModes, multi_vector};
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
 /// which a combination is dropped. They are tried in this sequence.
 const SIZES: [(usize, f64); 5] = [(1, 1e-6), (1, 1e-9), (2, 1e-9), (3, 1e-9), (3, 1e-12)];
-/// Multiples of the frequency of interest up to which the modes of every wave are tried.
-const EXTENTS: [f64; 2] = [1.5, 3.0];
 /// First entry of the sequence of extents and sizes that each step tries for different blades.
 /// The first step is that of the tuned ring, without blade vectors.
 pub(in crate::structure) const STEPS: [usize; 5] = [0, 1, 2, 7, 9];
@@ -171,7 +169,8 @@ impl WaveCollection<'_> {
         let kind = kind.unwrap_or(ReductionKind::Rubin);
         let mut best: Option<(ReductionDeviation, usize)> = None;
         let mut level = 0;
-        let tried = EXTENTS.into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)));
+        // Multiples of the frequency of interest up to which the modes of every wave are tried.
+        let tried = [1.5, 3.0].into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)));
         for (extent, size) in tried.skip(from) {
             loop {
                 let taken = self.sector.diameters(level);
@@ -204,6 +203,9 @@ impl WaveCollection<'_> {
         (kind, orders): (ReductionKind, usize),
         up_to: f64,
     ) -> Result<SectorReduction, ReductionError> {
+        // Same ratio as in `Reduction::Modes` of a component: the last modes only improve those
+        // below.
+        let beyond = 1.5;
         let level = 1;
         let (taken, between) = (self.sector.diameters(level), self.sector.diameters(level + 1));
         let mut serves = f64::INFINITY;
@@ -216,11 +218,11 @@ impl WaveCollection<'_> {
             serves = last.min(serves);
             wholes.push((diameter, whole, modes));
         }
-        serves /= BEYOND;
+        serves /= beyond;
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
             let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-            self.computed.push(ComputedWave { diameter, whole, modes, extent: BEYOND, reference });
+            self.computed.push(ComputedWave { diameter, whole, modes, extent: beyond, reference });
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
@@ -401,10 +403,6 @@ impl WaveCollection<'_> {
         Ok(worst)
     }
 }
-
-/// Same ratio as in [`Reduction::Modes`] of a component: the last modes only improve those
-/// below.
-const BEYOND: f64 = 1.5;
 
 /// Returns `Vᵀ A V` for entries with shifts.
 fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {

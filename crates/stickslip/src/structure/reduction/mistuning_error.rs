@@ -28,20 +28,15 @@ use nalgebra::DMatrix;
 use stickslip_numerics::eigen;
 use stickslip_numerics::sparse::multi_vector;
 
-/// Refinement level of the nodal diameters whose forms are computed.
-const LEVEL: usize = 1;
 /// Frequencies below this fraction of the range are free motions, which blade stiffness does
 /// not affect.
 pub(super) const FREE: f64 = 1e-4;
-/// σ relative to the squared range: it makes A nonsingular for free motions and hardly affects
-/// other modes.
-const SHIFT: f64 = 1e-3;
-/// Energy outside the coordinates, relative to that of the forces, below which it is rounding.
-const ROUNDED: f64 = 1e-15;
 
 /// Returns σ, rad²/s², for a range up to `up_to`, rad/s.
 pub(super) fn shift(up_to: f64) -> f64 {
-    SHIFT * up_to * up_to
+    // σ relative to the squared range: it makes A nonsingular for free motions and hardly
+    // affects other modes.
+    1e-3 * up_to * up_to
 }
 
 /// The forces that the coordinates of a sector cannot represent, wave by wave.
@@ -73,7 +68,8 @@ impl MistuningError {
         up_to: f64,
     ) -> Result<Self, ReductionError> {
         let form = |diameter: usize| WaveForm::new(&sector.wave(diameter, seen)?, blade, reduced, (diameter, up_to));
-        let forms = sector.diameters(LEVEL).into_iter().map(form);
+        // Refinement level of the nodal diameters whose forms are computed.
+        let forms = sector.diameters(1).into_iter().map(form);
         let forms = forms.collect::<Result<_, _>>()?;
         Ok(MistuningError { sectors: sector.sectors, dofs: reduced.dofs(), up_to, forms })
     }
@@ -167,7 +163,9 @@ impl WaveForm {
         multi_vector::add(tall, &mut moved, -1.0, &basis, &answered);
         let energy = multi_vector::inner_products(tall, &moved, &forces);
         let eigen = eigen::symmetric((&energy + energy.transpose()) * 0.5).ok_or(ReductionError::OutOfRange)?;
-        let kept: Vec<usize> = (0..energy.nrows()).filter(|&k| eigen.eigenvalues[k] > ROUNDED * size).collect();
+        // Energy outside the coordinates, relative to that of the forces, below which it is
+        // rounding.
+        let kept: Vec<usize> = (0..energy.nrows()).filter(|&k| eigen.eigenvalues[k] > 1e-15 * size).collect();
         let row = |i: usize, k: usize| eigen.eigenvectors[(k, kept[i])] * eigen.eigenvalues[kept[i]].sqrt();
         Ok(WaveForm { diameter, rows: DMatrix::from_fn(kept.len(), energy.nrows(), row) })
     }

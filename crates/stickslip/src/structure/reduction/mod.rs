@@ -60,23 +60,11 @@ use stickslip_numerics::sparse::{
 /// A weighted sum of degrees of freedom, as (index from 0, weight).
 pub type Row = Vec<(usize, f64)>;
 
-/// Ratio of a frequency to the highest `√(k_ii/m_ii)` above which the frequency is a mistake:
-/// no mode is near.
-const MAX_FREQUENCY_RATIO: f64 = 100.0;
 /// Largest number of modes; each needs one number per degree of freedom.
 const MAX_MODES: usize = 600;
 /// Number of columns of full length processed at once. More would exhaust the memory for
 /// thousands of columns.
 const COLUMN_BLOCK: usize = 64;
-/// Kinetic energy of a reduced mode relative to its stiffness, in units of the largest, below
-/// which the mode has no frequency.
-const MASSLESS: f64 = 1e-14;
-/// Negative shift, relative to the ratio of stiffness to mass, that makes the matrix of a
-/// structure with free motions nonsingular.
-const SHIFT: f64 = 1e-6;
-/// Eigenvalues below this fraction of the shift are rounding of the stiffness, and the motion
-/// is free. A nonzero frequency would damp the free motion by a meaningless ratio.
-const FREE: f64 = 1e-9;
 
 /// Damping of the whole structure.
 #[derive(Debug, Clone, PartialEq)]
@@ -258,14 +246,6 @@ pub enum ReductionError {
     OutOfRange,
 }
 
-/// A port whose displacement is below this fraction of the largest one of a shape does not
-/// observe that shape.
-const UNSEEN: f64 = 1e-9;
-
-/// Difference between an entry and its mirror image that counts as rounding of a program that
-/// writes ten digits. It is relative to the largest entry.
-const SYMMETRIC: f64 = 1e-9;
-
 impl FullStructure {
     /// Creates a structure from sparse symmetric matrices (kg, N/m), damping, and ports, the
     /// displacements that joints, forces and observers use.
@@ -298,8 +278,10 @@ impl FullStructure {
             if matrix.n() != n {
                 return Err(ReductionError::Size { matrix: name, rows: matrix.n(), n });
             }
+            // Difference between an entry and its mirror image that counts as rounding of a
+            // program that writes ten digits. It is relative to the largest entry.
             if name != "damping"
-                && let Some(pair) = matrix.asymmetry(SYMMETRIC * matrix.max_abs())
+                && let Some(pair) = matrix.asymmetry(1e-9 * matrix.max_abs())
             {
                 return Err(ReductionError::NotSymmetric { matrix: name, row: pair.row, column: pair.column });
             }
@@ -348,7 +330,9 @@ impl FullStructure {
         let ratios =
             (0..self.dofs()).map(own).filter(|(_, mass)| *mass > 0.0).map(|(stiffness, mass)| stiffness / mass);
         let highest = ratios.fold(0.0, f64::max).sqrt();
-        if highest > 0.0 && omega > MAX_FREQUENCY_RATIO * highest {
+        // Ratio of a frequency to the highest `√(k_ii/m_ii)` above which the frequency is a
+        // mistake: no mode is near.
+        if highest > 0.0 && omega > 100.0 * highest {
             return Err(ReductionError::FrequencyTooHigh { omega, highest });
         }
         let wanted = ModeSelection::UpTo { value: omega * omega, most: MAX_MODES };
@@ -424,6 +408,10 @@ pub struct ReducedMatrices {
     weights: DMatrix<f64>,
     n: usize,
 }
+
+/// A port whose displacement is below this fraction of the largest one of a shape does not
+/// observe that shape.
+const UNSEEN: f64 = 1e-9;
 
 impl ReducedMatrices {
     /// Computes the Galerkin projection on the columns of `basis`, n × r.
@@ -631,11 +619,17 @@ pub(crate) fn natural(mass: &DMatrix<f64>, stiffness: &DMatrix<f64>) -> Option<(
     let ratio = |i: usize| stiffness[(i, i)] / mass[(i, i)];
     let mut ratios: Vec<f64> = (0..r).map(ratio).filter(|v| v.is_finite() && *v > 0.0).collect();
     ratios.sort_by(f64::total_cmp);
-    let shift = SHIFT * ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
+    // Negative shift, relative to the ratio of stiffness to mass, that makes the matrix of a
+    // structure with free motions nonsingular.
+    let shift = 1e-6 * ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
     let (thetas, mut shapes) = eigen::generalized_symmetric(mass, &(stiffness + mass * shift))?;
     let largest = thetas.iter().fold(0.0f64, |most, theta| most.max(theta.abs()));
-    let massless = |theta: f64| theta <= MASSLESS * largest;
-    let free = |value: f64| value.abs() <= FREE * shift;
+    // Kinetic energy of a reduced mode relative to its stiffness, in units of the largest, below
+    // which the mode has no frequency.
+    let massless = |theta: f64| theta <= 1e-14 * largest;
+    // Eigenvalues below this fraction of the shift are rounding of the stiffness, and the motion
+    // is free. A nonzero frequency would damp the free motion by a meaningless ratio.
+    let free = |value: f64| value.abs() <= 1e-9 * shift;
     let value = |theta: f64| match 1.0 / theta - shift {
         _ if massless(theta) => f64::INFINITY,
         value if free(value) => 0.0,

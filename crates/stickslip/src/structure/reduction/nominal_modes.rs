@@ -38,15 +38,6 @@ use stickslip_numerics::sparse::{LdlFactor, ModesError, SparseMatrix, SymbolicAn
 /// vectors. Sixty steel strips had an error of 8.5e-5 at resonances with a multiple of 1.5, and
 /// 4e-6 with 3.
 pub(in crate::structure) const EXTENTS: [f64; 2] = [3.0, 6.0];
-/// Relative change of an eigenvalue in one step at which it counts as converged. The next step
-/// changes it by about a hundredth of that, because the omitted modes have nine times its
-/// eigenvalue. This is an error of 1e-7 at a resonance of half width [`HALF_WIDTH`].
-const EIGENVALUE_TOLERANCE: f64 = 1e-5 * HALF_WIDTH;
-/// Largest number of steps; three or four are typical.
-const STEPS: usize = 40;
-/// Inertia of a mode relative to its stiffness, in units of the largest, below which it has no
-/// mass.
-const MASSLESS: f64 = 1e-14;
 
 /// A tuned ring in reduced coordinates of every sector, with the start of the iteration for its
 /// modes.
@@ -136,7 +127,8 @@ impl NominalRing {
             false => self.nominal.clone(),
         };
         let (mut values, mut begun): (Vec<f64>, bool) = (Vec::new(), false);
-        for _ in 0..STEPS {
+        // Largest number of steps; three or four are typical.
+        for _ in 0..40 {
             let forces = self.mass.multiply_columns(&shapes);
             let mut moved = forces.clone();
             factor.solve(&mut moved);
@@ -153,7 +145,11 @@ impl NominalRing {
             }
             shapes = multi_vector::combine(n, &moved, &mixing);
             let before = std::mem::replace(&mut values, thetas.iter().map(|theta| 1.0 / theta - shift).collect());
-            let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= EIGENVALUE_TOLERANCE * (now + shift);
+            // Relative change of an eigenvalue in one step at which it counts as converged. The
+            // next step changes it by about a hundredth of that, because the omitted modes have
+            // nine times its eigenvalue. This is an error of 1e-7 at a resonance of half width
+            // `HALF_WIDTH`.
+            let stands = |(now, before): (&f64, &f64)| (now - before).abs() <= (1e-5 * HALF_WIDTH) * (now + shift);
             let inside = values.partition_point(|value| *value <= highest);
             if !std::mem::replace(&mut begun, true) || !values.iter().zip(&before).take(inside).all(stands) {
                 continue;
@@ -292,7 +288,9 @@ impl NominalRing {
 
     /// Returns modal mass and stiffness, normalized in A, of a mode with mass `theta`.
     fn own(&self, theta: f64, most: f64) -> [f64; 2] {
-        if theta <= MASSLESS * most {
+        // Inertia of a mode relative to its stiffness, in units of the largest, below which it
+        // has no mass.
+        if theta <= 1e-14 * most {
             return [0.0, 1.0];
         }
         let stiffness = 1.0 - shift(self.up_to) * theta;

@@ -12,26 +12,8 @@
 
 use super::{FullStructure, ReducedMatrices, ReductionError, ResidualSeries, StructureDamping};
 use nalgebra::{Complex, DMatrix};
+use stickslip_numerics::random::SplitMix64;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
-
-/// Largest number of samples; each needs a factorization of the whole structure.
-const SAMPLES: usize = 9;
-/// Distance of a sample from a mode, relative to its frequency, unless the damping is larger:
-/// the half width of a resonance.
-const MODE_DISTANCE: f64 = 1e-3;
-/// Samples closer than this, relative to the frequency, are merged.
-const MERGE_DISTANCE: f64 = 1e-4;
-/// Relative shift of a sample that coincides with a mode of the whole structure.
-const SAMPLE_SHIFT: f64 = 3e-5;
-/// Attempts to shift a sample away from a mode.
-const ATTEMPTS: usize = 5;
-
-/// Number of ports up to which each port is loaded separately. More ports are loaded all
-/// together, with [`PROBES`] vectors of random signs. Separate loads would need one solution
-/// per port and sample. The norm of the response to random signs is on average that of the
-/// matrix, here within a tenth.
-const MAX_SEPARATE_PORTS: usize = 96;
-const PROBES: usize = 48;
 
 /// ω in rad/s, and displacements of the ports under the loads in m.
 type ReceptanceSample = (f64, DMatrix<Complex<f64>>);
@@ -64,7 +46,8 @@ impl ReferenceReceptance {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn new(whole: &FullStructure, modes: &NaturalModes, up_to: f64) -> Result<Self, ReductionError> {
-        Self::with_samples(whole, modes, up_to, SAMPLES)
+        // Largest number of samples; each needs a factorization of the whole structure.
+        Self::with_samples(whole, modes, up_to, 9)
     }
 
     /// Computes at most `most` samples.
@@ -82,13 +65,18 @@ impl ReferenceReceptance {
     /// # Errors
     /// [`ReductionError::Singular`] if a sample coincides with a mode after all shifts.
     pub fn at_frequencies(whole: &FullStructure, frequencies: &[f64]) -> Result<Self, ReductionError> {
+        let probes = 48;
         let ports = whole.ports.len();
-        let alone = ports <= MAX_SEPARATE_PORTS;
+        // Number of ports up to which each port is loaded separately. More ports are loaded all
+        // together, with `probes` vectors of random signs. Separate loads would need one
+        // solution per port and sample. The norm of the response to random signs is on average
+        // that of the matrix, here within a tenth.
+        let alone = ports <= 96;
         let local = local_sizes(whole);
         let mut factors = Factors { whole, last: None };
         let loads = match alone {
             true => DMatrix::identity(ports, ports),
-            false => DMatrix::from_fn(ports, PROBES, |i, k| sign(i * PROBES + k) / local[i].sqrt()),
+            false => DMatrix::from_fn(ports, probes, |i, k| sign(i * probes + k) / local[i].sqrt()),
         };
         let together = (!alone).then_some(&loads);
         let samples: Vec<_> =
@@ -100,7 +88,7 @@ impl ReferenceReceptance {
         };
         let size = |port: usize| if alone { usual(port) } else { local[port] };
         let scales: Vec<f64> = (0..ports).map(|port| size(port).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
-        let of_loads = if alone { scales.clone() } else { vec![1.0; PROBES] };
+        let of_loads = if alone { scales.clone() } else { vec![1.0; probes] };
         Ok(ReferenceReceptance {
             samples,
             loads,
@@ -159,8 +147,10 @@ impl Factors<'_> {
     /// mode. `together` contains loads on all ports; `None` loads each port separately.
     fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<ReceptanceSample, ReductionError> {
         let mut failed = ReductionError::OutOfRange;
-        for attempt in 0..ATTEMPTS {
-            let omega = omega * (1.0 + SAMPLE_SHIFT * attempt as f64);
+        // Attempts to shift a sample away from a mode.
+        for attempt in 0..5 {
+            // Relative shift of a sample that coincides with a mode of the whole structure.
+            let omega = omega * (1.0 + 3e-5 * attempt as f64);
             match self.answers(omega, together) {
                 Ok(receptance) => return Ok((omega, receptance)),
                 Err(error) => failed = error,
@@ -227,25 +217,27 @@ fn local_sizes(whole: &FullStructure) -> Vec<f64> {
 
 /// Returns a reproducible pseudo-random sign ±1.
 pub(super) fn sign(number: usize) -> f64 {
-    // mixing function of splitmix64: Steele, Lea, Flood (2014)
-    let mut z = (number as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
+    let bits = SplitMix64::new(0).skip(number as u64).next_u64();
+    if bits & 1 == 0 { 1.0 } else { -1.0 }
 }
 
 /// Returns sample frequencies, alternately next to modes and between them, from the first
 /// elastic mode to the end of the range.
 fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: usize) -> Vec<f64> {
+    // Distance of a sample from a mode, relative to its frequency, unless the damping is larger:
+    // the half width of a resonance.
+    let mode_distance = 1e-3;
+    // Samples closer than this, relative to the frequency, are merged.
+    let merge_distance = 1e-4;
     let offset = match whole.damping {
-        StructureDamping::Ratio { ratio, .. } => ratio.max(MODE_DISTANCE),
-        _ => MODE_DISTANCE,
+        StructureDamping::Ratio { ratio, .. } => ratio.max(mode_distance),
+        _ => mode_distance,
     };
     let inside: Vec<f64> = modes
         .values
         .iter()
         .map(|value| value.max(0.0).sqrt())
-        .filter(|omega| *omega > MERGE_DISTANCE * up_to && *omega < up_to)
+        .filter(|omega| *omega > merge_distance * up_to && *omega < up_to)
         .collect();
     let mut all = Vec::new();
     for (k, omega) in inside.iter().enumerate() {
@@ -255,10 +247,10 @@ fn frequencies(whole: &FullStructure, modes: &NaturalModes, up_to: f64, most: us
     all.push(0.5 * inside.first().copied().unwrap_or(up_to));
     // equal modes, as in a square section, have no middle; at a mode, rounding would dominate
     // the error
-    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= MERGE_DISTANCE * mode));
+    all.retain(|omega| *omega <= up_to && inside.iter().all(|mode| (omega - mode).abs() >= merge_distance * mode));
     all.push(up_to);
     all.sort_by(f64::total_cmp);
-    all.dedup_by(|next, kept| *next - *kept < MERGE_DISTANCE * *kept);
+    all.dedup_by(|next, kept| *next - *kept < merge_distance * *kept);
     // evenly spaced indices of mixed parity keep both kinds of samples
     let last = all.len() - 1;
     let mut at: Vec<usize> = (0..most.min(all.len())).map(|i| i * last / (most - 1).min(last).max(1)).collect();

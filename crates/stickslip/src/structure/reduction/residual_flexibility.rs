@@ -19,11 +19,6 @@
 use super::{COLUMN_BLOCK, FullStructure, ReductionError};
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix, multi_vector};
 
-/// Attempts to factor next to an eigenvalue; each moves the shift by the relative amount
-/// `STEP`.
-const ATTEMPTS: usize = 8;
-const STEP: f64 = 1e-3;
-
 /// Returns the modes and the blocks `X₀, …` up to `order`, n × (k + p J), and the shift,
 /// rad²/s². The modes are projected out of the blocks.
 pub(super) fn basis(
@@ -73,8 +68,9 @@ fn factor(whole: &FullStructure, modes: &NaturalModes, shift: f64) -> Result<(Ld
         return Ok((factor.map_err(|singular| ReductionError::Singular { omega: 0.0, singular })?, 0.0));
     }
     let mut failed = None;
-    for attempt in 0..ATTEMPTS {
-        let shift = shift * (1.0 + STEP * attempt as f64);
+    // Attempts to factor next to an eigenvalue; each moves the shift by a thousandth.
+    for attempt in 0..8 {
+        let shift = shift * (1.0 + 1e-3 * attempt as f64);
         match whole.analysis.factor(&[(1.0, &whole.stiffness), (-shift, &whole.mass)]) {
             Ok(factor) => return Ok((factor, shift)),
             Err(singular) => failed = Some(ReductionError::Singular { omega: shift.max(0.0).sqrt(), singular }),

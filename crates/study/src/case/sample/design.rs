@@ -4,11 +4,12 @@
 //! computed in integers. The draws are the same on every machine, and a draw does not need the
 //! previous ones.
 //!
-//! Sources: Steele, Lea, Flood (2014), Fast splittable pseudorandom number generators (the
-//! mixing function, variant 13 of Stafford); McKay, Beckman, Conover (1979) for Latin
-//! hypercubes; Joe, Kuo (2008), Constructing Sobol sequences with better two-dimensional
-//! projections, and their table `new-joe-kuo-6.21201` for the direction numbers; Owen (1995)
-//! for the scrambling, which preserves the net property and makes each draw uniform.
+//! Sources: McKay, Beckman, Conover (1979) for Latin hypercubes; Joe, Kuo (2008), Constructing
+//! Sobol sequences with better two-dimensional projections, and their table
+//! `new-joe-kuo-6.21201` for the direction numbers; Owen (1995) for the scrambling, which
+//! preserves the net property and makes each draw uniform.
+
+use stickslip_numerics::random::{SplitMix64, mix64, open_unit};
 
 /// The distribution of draws in the unit cube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,25 +41,10 @@ pub(crate) const DESIGNS: [(&str, &str, Design); 3] = [
 /// Largest number of dimensions of the Sobol sequence.
 pub(crate) const MAX_SOBOL: usize = DIRECTIONS.len() + 1;
 
-/// Mixes 64 bits: every bit of the result depends on every bit of `z`.
-fn mix64(z: u64) -> u64 {
-    let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ z >> 31
-}
-
-/// Increment of the generator, odd: 2⁶⁴ divided by the golden ratio.
-const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-
 /// Returns a hash of several numbers.
 fn hash(numbers: &[u64]) -> u64 {
-    numbers.iter().fold(0, |hash, number| mix64(hash.wrapping_add(STEP) ^ mix64(number.wrapping_add(STEP))))
-}
-
-/// Returns the middle of one of 2⁵³ equal parts of the interval from zero to one, so never an
-/// end.
-fn unit(bits: u64) -> f64 {
-    ((bits >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    let step = SplitMix64::INCREMENT;
+    numbers.iter().fold(0, |hash, number| mix64(hash.wrapping_add(step) ^ mix64(number.wrapping_add(step))))
 }
 
 impl Design {
@@ -67,10 +53,10 @@ impl Design {
     pub fn coordinate(self, seed: u64, index: usize, count: usize, dimension: usize) -> f64 {
         let (index, dimension) = (index as u64, dimension as u64);
         match self {
-            Design::Random => unit(hash(&[seed, dimension, index])),
+            Design::Random => open_unit(hash(&[seed, dimension, index])),
             Design::LatinHypercube => {
                 let part = feistel_permutation(index, count as u64, hash(&[seed, dimension, u64::MAX]));
-                let value = (part as f64 + unit(hash(&[seed, dimension, index]))) / count as f64;
+                let value = (part as f64 + open_unit(hash(&[seed, dimension, index]))) / count as f64;
                 // rounding in the last part could give the end of the interval
                 value.min(1.0 - f64::EPSILON / 2.0)
             }
@@ -92,7 +78,9 @@ fn feistel_permutation(index: u64, count: u64, key: u64) -> u64 {
     let mut at = index;
     loop {
         let (mut left, mut right) = (at >> half, at & mask);
-        for round in 0..ROUNDS {
+        // Rounds of the network: four give a random appearance, and small networks need a few
+        // more.
+        for round in 0..8 {
             (left, right) = (right, left ^ hash(&[key, round, right]) & mask);
         }
         at = left << half | right;
@@ -102,9 +90,6 @@ fn feistel_permutation(index: u64, count: u64, key: u64) -> u64 {
         }
     }
 }
-
-/// Rounds of the network: four give a random appearance, and small networks need a few more.
-const ROUNDS: u64 = 8;
 
 /// Returns a coordinate of the Sobol sequence, 32 bits: element `index` in Gray code order.
 fn sobol(index: u32, dimension: usize) -> u32 {

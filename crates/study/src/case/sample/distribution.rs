@@ -3,10 +3,9 @@
 //!
 //! Logarithms and exponentials come from `libm`, not from the machine, so the bits are the same
 //! everywhere.
-//!
-//! Source of the normal quantile: Wichura (1988), Algorithm AS 241, `PPND16`, with 16 digits.
 
 use std::f64::consts::SQRT_2;
+use stickslip_numerics::random::normal_quantile_from;
 
 /// A distribution with its numbers, SI.
 #[derive(Debug, Clone, PartialEq)]
@@ -175,91 +174,10 @@ fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
-/// Limits of the central part in `p - 0.5`, and of the near tail in `√(-ln p)`.
-const CENTRE_LIMIT: f64 = 0.425;
-const NEAR_TAIL_LIMIT: f64 = 5.0;
-/// Numerators and denominators of the three parts, lowest power first.
-const CENTRE: [[f64; 8]; 2] = [
-    [
-        3.387_132_872_796_366_6,
-        133.141_667_891_784_38,
-        1_971.590_950_306_551_4,
-        13_731.693_765_509_46,
-        45_921.953_931_549_87,
-        67_265.770_927_008_7,
-        33_430.575_583_588_13,
-        2_509.080_928_730_122_7,
-    ],
-    [
-        1.0,
-        42.313_330_701_600_91,
-        687.187_007_492_057_9,
-        5_394.196_021_424_751,
-        21_213.794_301_586_597,
-        39_307.895_800_092_71,
-        28_729.085_735_721_943,
-        5_226.495_278_852_854,
-    ],
-];
-const NEAR_TAIL: [[f64; 8]; 2] = [
-    [
-        1.423_437_110_749_683_5,
-        4.630_337_846_156_546,
-        5.769_497_221_460_691,
-        3.647_848_324_763_204_6,
-        1.270_458_252_452_368_4,
-        0.241_780_725_177_450_6,
-        0.022_723_844_989_269_184,
-        7.745_450_142_783_414e-4,
-    ],
-    [
-        1.0,
-        2.053_191_626_637_759,
-        1.676_384_830_183_803_8,
-        0.689_767_334_985_1,
-        0.148_103_976_427_480_08,
-        0.015_198_666_563_616_457,
-        5.475_938_084_995_345e-4,
-        1.050_750_071_644_416_8e-9,
-    ],
-];
-const FAR_TAIL: [[f64; 8]; 2] = [
-    [
-        6.657_904_643_501_103,
-        5.463_784_911_164_114,
-        1.784_826_539_917_291_3,
-        0.296_560_571_828_504_87,
-        0.026_532_189_526_576_124,
-        0.001_242_660_947_388_078_4,
-        2.711_555_568_743_487_6e-5,
-        2.010_334_399_292_288_1e-7,
-    ],
-    [
-        1.0,
-        0.599_832_206_555_888,
-        0.136_929_880_922_735_8,
-        0.014_875_361_290_850_615,
-        7.868_691_311_456_133e-4,
-        1.846_318_317_510_054_8e-5,
-        1.421_511_758_316_446e-7,
-        2.044_263_103_389_939_8e-15,
-    ],
-];
-
 /// Returns the standard normal quantile of `p`.
 fn normal_quantile(p: f64) -> f64 {
-    let rational = |[above, below]: &[[f64; 8]; 2], r: f64| {
-        let power = |terms: &[f64; 8]| terms.iter().rev().fold(0.0, |sum, term| sum * r + term);
-        power(above) / power(below)
-    };
     let q = p - 0.5;
-    if q.abs() <= CENTRE_LIMIT {
-        return q * rational(&CENTRE, CENTRE_LIMIT * CENTRE_LIMIT - q * q);
-    }
-    let r = (-libm::log(p.min(1.0 - p))).sqrt();
-    let size =
-        if r <= NEAR_TAIL_LIMIT { rational(&NEAR_TAIL, r - 1.6) } else { rational(&FAR_TAIL, r - NEAR_TAIL_LIMIT) };
-    if q < 0.0 { -size } else { size }
+    normal_quantile_from(q, 0.425 * 0.425 - q * q, || (-libm::log(p.min(1.0 - p))).sqrt())
 }
 
 #[cfg(test)]

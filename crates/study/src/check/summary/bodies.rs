@@ -4,17 +4,16 @@ use crate::syntax::expression::quantity_text;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Body, Model, ROTATIONS};
 
-/// Largest number of listed bodies.
-const MAX_LISTED: usize = 6;
-
 /// Returns a line for every body; for a disk those of one sector. Only the first bodies are
 /// listed.
 pub(super) fn described(model: &Model) -> Vec<String> {
+    // Largest number of listed bodies.
+    let max_listed = 6;
     let sectors = model.ring.map_or(1, |ring| ring.sectors.max(1));
     let own = &model.bodies[..model.bodies.len() / sectors];
-    let mut lines: Vec<String> = own.iter().take(MAX_LISTED).map(|body| line(body, model)).collect();
-    if own.len() > MAX_LISTED {
-        lines.push(format!("and {} more", own.len() - MAX_LISTED));
+    let mut lines: Vec<String> = own.iter().take(max_listed).map(|body| line(body, model)).collect();
+    if own.len() > max_listed {
+        lines.push(format!("and {} more", own.len() - max_listed));
     }
     lines
 }

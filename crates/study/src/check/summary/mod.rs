@@ -72,6 +72,8 @@ pub enum OrbitCount {
 
 impl OrbitCount {
     fn new(system: &System) -> Option<OrbitCount> {
+        // Number of joints that are named as the reason for several orbits.
+        let max_named_joints = 2;
         let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
         let mut reasons: Vec<String> =
             separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
@@ -83,16 +85,13 @@ impl OrbitCount {
                 false => Some(OrbitCount::Several("the structure feeds energy into some motion".to_owned())),
             };
         }
-        if let Some(more @ 1..) = reasons.len().checked_sub(MAX_NAMED_JOINTS) {
-            reasons.truncate(MAX_NAMED_JOINTS);
+        if let Some(more @ 1..) = reasons.len().checked_sub(max_named_joints) {
+            reasons.truncate(max_named_joints);
             reasons.push(format!("{more} more"));
         }
         Some(OrbitCount::Several(reasons.join(", ")))
     }
 }
-
-/// Number of joints that are named as the reason for several orbits.
-const MAX_NAMED_JOINTS: usize = 2;
 
 /// State of a joint at rest, and its first slip.
 #[derive(Debug, Clone)]
@@ -114,13 +113,6 @@ pub struct JointSummary {
     /// the model is too large for a quick answer.
     pub onset: Option<SlipOnset>,
 }
-
-/// Number of cases that are checked for warnings, evenly spread over all cases. A warning about
-/// the model is true for all of them.
-const MAX_CHECKED_CASES: usize = 9;
-/// Degrees of freedom above which only the first case is checked, so that a summary takes at
-/// most a second.
-const MAX_DOFS_ALL_CASES: usize = 60;
 
 /// Factor on the excitation above which the first slip is due to rounding. Symmetry keeps the
 /// load from some joints, but rounding errors of the other loads remain. A load above this
@@ -151,7 +143,11 @@ impl ModelSummary {
     pub fn new(study: &Study) -> Result<ModelSummary, StudyError> {
         let mut cases = vec![SurveyedCase::new(study, 0)?];
         let last = study.cases().saturating_sub(1);
-        let others = if cases[0].survey.dofs() > MAX_DOFS_ALL_CASES { 0 } else { last.min(MAX_CHECKED_CASES - 1) };
+        // Nine cases are checked for warnings, evenly spread over all cases. A warning about the
+        // model is true for all of them.
+        // Degrees of freedom above which only the first case is checked, so that a summary takes
+        // at most a second.
+        let others = if cases[0].survey.dofs() > 60 { 0 } else { last.min(8) };
         for i in 1..=others {
             cases.push(SurveyedCase::new(study, last * i / others)?);
         }

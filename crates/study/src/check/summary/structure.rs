@@ -8,14 +8,8 @@ use std::f64::consts::TAU;
 use stickslip::model::{ReductionAccuracy, Substructure};
 use stickslip_numerics::sparse::SparseMatrix;
 
-/// Largest number of listed frequencies.
-const MAX_LISTED: usize = 6;
-
 /// Directions for which the mass is stated.
 pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
-/// Masses along several directions that differ by less than this share are stated once. The
-/// constrained rows of a structure cause small differences.
-const EQUAL_MASS: f64 = 1e-3;
 
 /// A structure given by matrices.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +57,8 @@ impl StructureSummary {
             error: reduced.error(),
             up_to: reduced.up_to(),
             rigid_body_modes: Some(reduced.free_modes()).filter(|_| one.case.model.ring.is_none()),
-            frequencies: reduced.frequencies().iter().skip(reduced.free_modes()).take(MAX_LISTED).copied().collect(),
+            // Largest number of listed frequencies.
+            frequencies: reduced.frequencies().iter().skip(reduced.free_modes()).take(6).copied().collect(),
         });
         Some(StructureSummary {
             rows: component.dofs(),
@@ -118,7 +113,9 @@ impl StructureSummary {
             return "unknown, because no row name has a direction (449.x); `units` cannot be checked".to_owned();
         };
         let kilograms = |mass: f64| format!("{} kg", format_significant(mass, 4));
-        let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= EQUAL_MASS * first.abs());
+        // Masses along several directions that differ by less than this share are stated once.
+        // The constrained rows of a structure cause small differences.
+        let alike = known.iter().all(|(_, mass)| (mass - first).abs() <= 1e-3 * first.abs());
         let text = if alike {
             let along: Vec<&str> = known.iter().map(|(along, _)| *along).collect();
             format!("{} along {}", kilograms(first), along.join(", "))

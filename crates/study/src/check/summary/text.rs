@@ -9,10 +9,6 @@ use stickslip::model::{LinearModes, NaturalMode};
 
 /// Largest number of listed modes and joints.
 const MAX_LISTED: usize = 10;
-/// Largest number of listed frequency ranges with slip per joint.
-const MAX_SLIP_RANGES: usize = 3;
-/// Width of the first column.
-const WIDTH: usize = 14;
 
 impl ModelSummary {
     fn modes(&self, modes: &LinearModes) -> String {
@@ -55,6 +51,8 @@ impl ModelSummary {
     }
 
     fn joint(&self, joint: &JointSummary) -> String {
+        // Largest number of listed frequency ranges with slip per joint.
+        let max_slip_ranges = 3;
         match joint.normal_force {
             Some(0.0) => return "open in static equilibrium: it closes and opens".to_owned(),
             Some(preload) => return normal_force_text(preload, joint.normal_force_at_rest),
@@ -98,10 +96,10 @@ impl ModelSummary {
             let mut ranges: Vec<String> = onset
                 .slip_ranges
                 .iter()
-                .take(MAX_SLIP_RANGES)
+                .take(max_slip_ranges)
                 .map(|(a, b)| format!("{} to {} Hz", hertz(*a), hertz(*b)))
                 .collect();
-            if let Some(more @ 1..) = onset.slip_ranges.len().checked_sub(MAX_SLIP_RANGES) {
+            if let Some(more @ 1..) = onset.slip_ranges.len().checked_sub(max_slip_ranges) {
                 ranges.push(format!("{more} more"));
             }
             let ranges = ranges.join(", ");
@@ -120,7 +118,8 @@ impl ModelSummary {
 
 /// Returns a line of the summary.
 pub(crate) fn line(name: &str, text: &str) -> String {
-    format!("  {name:<WIDTH$} {text}\n")
+    // Width of the first column.
+    format!("  {name:<14} {text}\n")
 }
 
 /// Returns the joint of a direction.
@@ -134,9 +133,6 @@ fn rounded_load(load: f64) -> f64 {
     format!("{load:.4e}").parse().unwrap_or(load)
 }
 
-/// Relative change of a preload by the structure below which it is ignored.
-const PRELOAD_CHANGE: f64 = 1e-3;
-
 /// Describes the normal load at rest that a preload produces.
 fn normal_force_text(preload: f64, at_rest: Option<f64>) -> String {
     let newtons = |force: f64| format_with_prefix(force, "N");
@@ -144,7 +140,8 @@ fn normal_force_text(preload: f64, at_rest: Option<f64>) -> String {
         None => {
             format!("pressed with {} if the structure is rigid: it opens and closes", newtons(preload))
         }
-        Some(force) if (force - preload).abs() <= PRELOAD_CHANGE * preload => {
+        // Relative change of a preload by the structure below which it is ignored.
+        Some(force) if (force - preload).abs() <= 1e-3 * preload => {
             format!("pressed with {} in static equilibrium: it opens and closes", newtons(force))
         }
         Some(force) if force > preload => format!(

@@ -156,7 +156,8 @@ fn motionless_joints(case: &SurveyedCase) -> Option<String> {
             let (sum, size) = weights.entry(*row).or_default();
             (*sum, *size) = (*sum + weight, *size + weight.abs());
         }
-        !axis.imposed().is_empty() || weights.values().any(|(sum, size)| sum.abs() > WEIGHT_ROUNDING * size)
+        // Relative rounding below which the weights of a row cancel.
+        !axis.imposed().is_empty() || weights.values().any(|(sum, size)| sum.abs() > 1e-12 * size)
     };
     let joints = case.survey.system().joints().iter();
     let names: Vec<String> =
@@ -169,14 +170,9 @@ fn motionless_joints(case: &SurveyedCase) -> Option<String> {
     (!names.is_empty()).then(|| format!("{those} {} {do_not} the same", list_names(&names)))
 }
 
-/// Relative rounding below which the weights of a row cancel.
-const WEIGHT_ROUNDING: f64 = 1e-12;
-
 /// Plausible frequencies of a structure of machine size, Hz. Mistaken units shift frequencies
 /// by powers of ten, beyond these limits.
 const PLAUSIBLE_FREQUENCIES: (f64, f64) = (0.1, 2e5);
-/// Error of a reduction above which it is visible in a response.
-const REDUCTION_ERROR: f64 = 1e-3;
 
 /// Warns of probable mistakes in a structure given by matrices.
 fn structure(case: &SurveyedCase) -> Vec<String> {
@@ -184,7 +180,8 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
     let mut found = system.reduced().map_or_else(Vec::new, coordinates);
     let Some(reduction) = system.reduction_evidence() else { return found };
     let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
-    if reduction.error > REDUCTION_ERROR {
+    // Error of a reduction above which it is visible in a response.
+    if reduction.error > 1e-3 {
         let worst = system.reduced().map_or(reduction.up_to, ReducedComponent::worst_at);
         found.push(format!(
             "the reduced model has an error of {} % at {}; use more modes, or `reduce = {{ up_to = … }}`, which \
@@ -286,10 +283,6 @@ fn no_references(study: &Study, cases: &[SurveyedCase]) -> Vec<String> {
     LinearReference::ALL.into_iter().filter_map(|reference| reference.model(&cases[0].case.model).err()).collect()
 }
 
-/// A bare length from this value on, m, was probably meant in millimetres: gaps and imposed
-/// motions of machines are tenths of a millimetre.
-const SUSPICIOUS_LENGTH: f64 = 0.01;
-
 /// Returns the assumed unit of an easily mistaken bare number, another unit, and the value in
 /// that unit.
 ///
@@ -297,7 +290,9 @@ const SUSPICIOUS_LENGTH: f64 = 0.01;
 fn likely_unit(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(&'static str, &'static str, f64)> {
     match dimension? {
         Dimension::ANGLE if si != 0.0 && !with_pi => Some(("rad", "deg", si * 180.0 / PI)),
-        Dimension::LENGTH if si.abs() >= SUSPICIOUS_LENGTH => Some(("m", "mm", si * 1e3)),
+        // A bare length from this value on, m, was probably meant in millimetres: gaps and
+        // imposed motions of machines are tenths of a millimetre.
+        Dimension::LENGTH if si.abs() >= 0.01 => Some(("m", "mm", si * 1e3)),
         _ => None,
     }
 }

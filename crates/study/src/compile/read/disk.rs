@@ -14,9 +14,6 @@ use crate::syntax::suggest::excerpt;
 use std::io::Read;
 use stickslip::structure::NodeCoordinates;
 
-/// Largest size of a file in bytes: lines for a million nodes.
-const MAX_BYTES: u64 = 1 << 26;
-
 impl Reader {
     pub(super) fn disk(&mut self, table: &TomlTable, keys: &[Key]) -> Option<DiskSource> {
         let stated = self.table(table, keys, "[disk]");
@@ -118,6 +115,8 @@ impl Reader {
 
     /// Reads a file whose path is relative to the folder of the study.
     fn read_text(&self, name: &str) -> Result<String, MessageAndHelp> {
+        // Largest size of a file in bytes: lines for a million nodes.
+        let max_bytes = 1 << 26;
         let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
         let failed = |error: std::io::Error| {
             let message = format!("`{}` cannot be read: {error}", excerpt(&path.display().to_string()));
@@ -125,8 +124,8 @@ impl Reader {
         };
         let mut text = String::new();
         let file = std::fs::File::open(&path).map_err(failed)?;
-        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
-        if text.len() as u64 > MAX_BYTES {
+        file.take(max_bytes + 1).read_to_string(&mut text).map_err(failed)?;
+        if text.len() as u64 > max_bytes {
             return Err((format!("`{}` is too large: the limit is 64 MiB", excerpt(name)), None));
         }
         Ok(text)

@@ -14,9 +14,6 @@ use crate::syntax::suggest::excerpt;
 use stickslip::dimension::Dimension;
 use stickslip::model::is_identifier;
 
-/// Largest value of an index. It keeps names short and sums of indices exact.
-const LARGEST_INDEX: u64 = 1_000_000;
-
 /// Converts a damping in percent to a damping ratio.
 fn percent(spring: &mut CompiledTable) {
     for entry in spring.entries.iter_mut().filter(|entry| entry.key == "damping") {
@@ -139,7 +136,8 @@ impl Reader {
         let mut indices = Vec::new();
         for TomlEntry { key, key_location, node } in repeat.entries.iter().filter(|entry| entry.key != "wrap") {
             let whole = |node: &TomlNode| match node.value {
-                TomlValue::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= LARGEST_INDEX),
+                // Largest value of an index. It keeps names short and sums of indices exact.
+                TomlValue::Number { whole, .. } => whole.filter(|whole| whole.unsigned_abs() <= 1_000_000),
                 _ => None,
             };
             let range = match &node.value {

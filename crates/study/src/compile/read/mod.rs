@@ -198,18 +198,25 @@ fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Read
 ///
 /// # Example
 /// ```
-/// use stickslip_study::{read_document, run::{Context, run}};
+/// use stickslip_study::{
+///     read_document,
+///     run::{Context, run},
+/// };
 /// let document = serde_json::json!({
 ///     "schema": 1,
 ///     "parameters": { "a": "2 mm" },
 ///     "motion": [{ "on": "mover", "amplitude": "a" }],
-///     "joint": [{ "name": "pad", "between": ["mover", "ground"], "law": { "kind": "jenkins", "stiffness": 1e3, "limit": "1 N" } }],
+///     "joint": [{
+///         "name": "pad",
+///         "between": ["mover", "ground"],
+///         "law": { "kind": "jenkins", "stiffness": 1e3, "limit": "1 N" },
+///     }],
 ///     "study": { "kind": "hysteresis", "frequency": "1 Hz" },
 /// });
 /// let study = read_document("pad", &document, &[("a".into(), "3 mm".into())]).unwrap();
 /// let dataset = run(&study, &Context::without_progress(1)).unwrap();
 /// let loss = dataset.tables[1].numbers("dissipation_J").unwrap()[0];
-/// assert!((loss - 4.0 * 1.0 * (3e-3 - 1e-3)).abs() < 1e-12);   // 4 limit (a - limit/stiffness)
+/// assert!((loss - 4.0 * 1.0 * (3e-3 - 1e-3)).abs() < 1e-12); // 4 limit (a - limit/stiffness)
 /// ```
 pub fn read_document(
     name: &str,

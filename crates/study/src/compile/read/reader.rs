@@ -8,9 +8,6 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Largest number of errors reported at once.
-const MAX_ERRORS: usize = 20;
-
 /// Reads one file and the template that it names.
 #[derive(Default)]
 pub(super) struct Reader {
@@ -34,7 +31,8 @@ pub(super) struct Reader {
 impl Reader {
     /// Returns all problems as one error.
     pub(super) fn error(&mut self, file: &str) -> StudyError {
-        self.problems.truncate(MAX_ERRORS);
+        // Largest number of errors reported at once.
+        self.problems.truncate(20);
         let error = StudyError::from_problems(&self.sources, std::mem::take(&mut self.problems));
         error.unwrap_or_else(|| StudyError::file(file, "the study could not be read", None))
     }

@@ -170,8 +170,12 @@ impl Template {
     /// # Example
     /// ```
     /// let couple = stickslip_study::templates::find("blade-couple").unwrap();
-    /// let limit = couple.parameters().into_iter().find(|parameter| parameter.key == "Ft").unwrap();
-    /// assert_eq!((limit.default.as_str(), limit.value, limit.doc.as_str()), ("2 N", 2.0, "slip limit"));
+    /// let limit =
+    ///     couple.parameters().into_iter().find(|parameter| parameter.key == "Ft").unwrap();
+    /// assert_eq!(
+    ///     (limit.default.as_str(), limit.value, limit.doc.as_str()),
+    ///     ("2 N", 2.0, "slip limit")
+    /// );
     /// ```
     ///
     /// # Panics

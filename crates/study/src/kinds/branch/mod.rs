@@ -82,25 +82,21 @@ pub(super) const KIND: Kind = Kind {
     draw: figure::draw,
 };
 
-/// Points of a branch per requested step; the continuation shortens steps where the branch
-/// bends.
-///
-/// Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border of stick.
-const POINTS: f64 = 5.0;
-/// Peaks and turning points per branch.
-const MARKS: f64 = 2.0;
-
 fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let values = &inputs.case.values;
     let branches = if along_parameter(inputs.study) { inputs.curves() } else { inputs.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
     let length = values.count("harmonics").unwrap_or(HARMONICS as u64) as f64;
     let samples = values.count("samples").unwrap_or(SERIES_SAMPLES) as f64;
-    let rows = steps * POINTS;
+    // Points of a branch per requested step; the continuation shortens steps where the branch
+    // bends. Measured: 3 to 15, and 109 for a ring of three whose branch turns at every border
+    // of stick.
+    let rows = steps * 5.0;
     PlannedSize {
         tables: vec![
             inputs.orbits(rows),
-            TableShape { rows: branches * MARKS, numbers: inputs.varied + 2.0, words: 0.0 },
+            // Peaks and turning points per branch.
+            TableShape { rows: branches * 2.0, numbers: inputs.varied + 2.0, words: 0.0 },
         ],
         drawn: rows * inputs.places,
         unit: rows / branches * inputs.kept_series_bytes(length, samples) + inputs.series_bytes(length),
@@ -203,7 +199,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         turns.end_row();
     }
     let reason = match branch.end {
-        BranchEnd::Border => missing_range_text(&branch, range, &name, factor),
+        BranchEnd::Border => missing_range_text(&branch, range.0, range.1, &name, factor),
         BranchEnd::Stalled { parameter: at } => {
             Some(format!("the continuation stopped at {name} = {:.9}: no step converges", at * factor))
         }
@@ -257,7 +253,7 @@ fn method(values: &Values) -> HarmonicBalance {
 }
 
 /// States which part of the range is missing after the branch left the range, and what to do.
-fn missing_range_text(branch: &Branch, (from, to): (f64, f64), name: &str, factor: f64) -> Option<String> {
+fn missing_range_text(branch: &Branch, from: f64, to: f64, name: &str, factor: f64) -> Option<String> {
     let reached = branch
         .points
         .iter()

@@ -27,7 +27,8 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         let speeds = numbers(table, SPEED, case_rows.rows.clone());
         let (low, high) = speeds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(*v), high.max(*v)));
         let highest = series.iter().flat_map(|line| &line.y).copied().fold(0.0, f64::max);
-        let top = PANEL_TOP * highest;
+        // Top of the panel as a multiple of the highest frequency.
+        let top = 1.1 * highest;
         for order in 1..=orders {
             // the line ends at the highest speed or at the top of the panel
             let end = (high * x_factor).min(top * x_factor / (order as f64 * y_factor));
@@ -51,9 +52,6 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     };
     Figure { panels: draw_panels::panels(drawing, &drawing.case_rows(table), &panel), ..Figure::default() }
 }
-
-/// Top of the panel as a multiple of the highest frequency.
-const PANEL_TOP: f64 = 1.1;
 
 fn frequencies(
     table: &Table,

@@ -168,12 +168,6 @@ fn excited_modes(
     })
 }
 
-/// Largest number of evaluations per crossing.
-const MAX_REFINED: usize = 60;
-/// Relative change of the speed at which the search for a crossing stops: a hundred times the
-/// observed rounding of the frequencies.
-const CROSSING_TOLERANCE: f64 = 1e-11;
-
 /// A mode at a speed of rotation, rad/s.
 #[derive(Clone, Copy)]
 struct ModeAtSpeed<'a> {
@@ -212,19 +206,23 @@ impl CampbellDiagram<'_> {
     /// stiffening are proportional to it. So false position in these squares is nearly Newton's
     /// method. If two steps in a row do not halve the interval, the next step bisects it.
     fn crossing(&self, order: f64, from: ModeAtSpeed<'_>, to: ModeAtSpeed<'_>) -> Result<f64, String> {
+        // Relative change of the speed at which the search for a crossing stops: a hundred times
+        // the observed rounding of the frequencies.
+        let crossing_tolerance = 1e-11;
         let (mut a, mut b) = (from.speed, to.speed);
         let excess = |speed: f64, mode: &NaturalFrequency| (mode.omega - order * speed) * (mode.omega + order * speed);
         let (mut at_a, mut at_b) = (excess(a, from.mode), excess(b, to.mode));
         let (mut last, mut slow) = (f64::NAN, 0);
-        for _ in 0..MAX_REFINED {
+        // Largest number of evaluations per crossing.
+        for _ in 0..60 {
             if at_a == 0.0 {
                 return Ok(a);
             }
             let secant = (a * a - at_a * (b * b - a * a) / (at_b - at_a)).sqrt();
             let next = if slow < 2 { secant.clamp(a.min(b), a.max(b)) } else { 0.5 * (a + b) };
             // at an end of the interval only rounding remains
-            let near = [a, b, last].into_iter().any(|known| (next - known).abs() <= CROSSING_TOLERANCE * next.abs());
-            if near || (b - a).abs() <= CROSSING_TOLERANCE * b.abs() {
+            let near = [a, b, last].into_iter().any(|known| (next - known).abs() <= crossing_tolerance * next.abs());
+            if near || (b - a).abs() <= crossing_tolerance * b.abs() {
                 return Ok(next);
             }
             last = next;

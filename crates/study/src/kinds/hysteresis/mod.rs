@@ -283,14 +283,13 @@ struct FirstHarmonic {
     equivalent_damping: f64,
 }
 
-/// Intervals of the quadrature per period. They end at the switches, so exact laws are smooth
-/// within each interval.
-const QUADRATURE: usize = 256;
 impl FirstHarmonic {
     /// Integrates `F₁ = (keq + jω ceq) U₁` with the first harmonics of force and displacement,
     /// and the loss `∮ F du`.
     fn new(orbit: &Orbit, source: &LoopSource) -> Self {
-        let (omega, times) = (orbit.omega, orbit_sweep::times(orbit, QUADRATURE));
+        // Intervals of the quadrature per period. They end at the switches, so exact laws are
+        // smooth within each interval.
+        let (omega, times) = (orbit.omega, orbit_sweep::times(orbit, 256));
         // u cos, u sin, F cos, F sin
         let mut sums = [0.0; 4];
         let mut corners = Vec::with_capacity(times.len());

@@ -215,10 +215,6 @@ fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     (CONVERGED, None)
 }
 
-/// Damping ratio of the joints, absolute, below which no joint slips. Solutions are accurate to
-/// 1e-11.
-const NO_SLIP_DAMPING: f64 = 1e-9;
-
 /// Returns the notes about a computed mode.
 fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
     let mut remarks: Vec<String> = mode
@@ -240,7 +236,9 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
         remarks.push(text.to_owned());
     }
     let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
-    if !mode.points.is_empty() && joints.fold(0.0, f64::max) < NO_SLIP_DAMPING {
+    // Damping ratio of the joints, absolute, below which no joint slips. Solutions are accurate
+    // to 1e-11.
+    if !mode.points.is_empty() && joints.fold(0.0, f64::max) < 1e-9 {
         remarks.push("no joint slips in this amplitude range, so the joints add no damping.".to_owned());
     }
     remarks

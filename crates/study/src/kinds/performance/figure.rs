@@ -7,9 +7,6 @@ use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
 use crate::results::percentiles::percentiles;
 
-/// Largest number of bands in the panel; more bands hide each other.
-const MAX_BANDS: usize = 7;
-
 pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(table), outer) = (drawing.table(tables::PERFORMANCE), drawing.study.varied().len().saturating_sub(1))
     else {
@@ -38,7 +35,8 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         // each entry holds all parameters but the last; its first case represents it
         let groups = drawing.group_draws(&cases);
         let draws = drawing.draws(groups.iter().map(|(_, group)| group.len()).max().unwrap_or(0));
-        let bands = groups.iter().take(MAX_BANDS).enumerate().flat_map(|(colour, (_, group))| {
+        // Largest number of bands in the panel; more bands hide each other.
+        let bands = groups.iter().take(7).enumerate().flat_map(|(colour, (_, group))| {
             let curve = |case_rows: &&CaseRows| {
                 (parameter(table, case_rows.rows.clone()), height(table, case_rows.rows.clone()))
             };

@@ -14,10 +14,6 @@ use stickslip_numerics::tie_break::{RELATIVE_TIE, first_largest};
 /// with pale curves behind it.
 pub(super) const MAX_SINGLE_PLACES: usize = 7;
 
-/// Number of colours for the curves of many places: the single curves and the largest
-/// amplitude.
-const COLOURS_OF_MANY_PLACES: usize = 2;
-
 /// Names of places with amplitude (m) and phase (degrees).
 pub(super) type DeflectionShape<'a> = Vec<(&'a str, f64, f64)>;
 
@@ -360,7 +356,9 @@ impl FigureData<'_> {
     pub(super) fn colours(&self) -> [usize; 3] {
         let places = match self.draws_each_place() {
             true => self.shown.len().max(self.system.places().len().min(MAX_SINGLE_PLACES)),
-            false => COLOURS_OF_MANY_PLACES,
+            // Number of colours for the curves of many places: the single curves and the largest
+            // amplitude.
+            false => 2,
         };
         let in_sector: BTreeSet<String> = self
             .shown

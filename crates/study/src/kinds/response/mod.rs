@@ -105,27 +105,23 @@ pub(super) const KIND: Kind = Kind {
     draw: figure::draw,
 };
 
-/// Peaks per mass, as some have two.
-const PEAKS_PER_MASS: f64 = 1.3;
-/// Peaks of the largest amplitude of a disk: about three for twelve blades that differ by 2 %.
-const DISK_PEAKS: f64 = 3.0;
-/// Share of the points of a curve at which the reverse sweep has another orbit.
-const REVERSE_SHARE: f64 = 0.2;
-
 fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (points, values) = (inputs.points(), &inputs.case.values);
     let sought = values.flag("peaks") != Some(false) && inputs.frequencies > 2.0;
     let peaks = match values.names("peak_of") {
         _ if !sought => 0.0,
         Some(_) => inputs.cases,
-        None => (inputs.cases * inputs.places * PEAKS_PER_MASS).floor(),
+        // Peaks per mass, as some have two.
+        None => (inputs.cases * inputs.places * 1.3).floor(),
     };
     // cases that differ only in their limits share the references
     let others = references::distinct_cases(inputs.study);
     let linear = (inputs.frequencies * REFERENCE_POINTS as f64 * others).floor();
     let tuned = if values.flag(amplification::KEY.name) == Some(true) { inputs.cases } else { 0.0 };
     let shapes = match inputs.case.model.ring {
-        Some(_) if values.names("peak_of").is_none() => peaks.min(DISK_PEAKS * inputs.cases),
+        // Peaks of the largest amplitude of a disk: about three for twelve blades that differ by
+        // 2 %.
+        Some(_) if values.names("peak_of").is_none() => peaks.min(3.0 * inputs.cases),
         Some(_) => peaks,
         None => 0.0,
     };
@@ -138,7 +134,8 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
             TableShape { rows: linear, numbers: inputs.varied + 1.0 + 2.0 * inputs.places, words: 0.0 },
             TableShape { rows: tuned, numbers: inputs.varied + 5.0, words: 1.0 },
             TableShape { rows: shapes, numbers: inputs.varied + 1.0 + 2.0 * inputs.places, words: 0.0 },
-            inputs.orbits((REVERSE_SHARE * reverse_points).floor()),
+            // Share of the points of a curve at which the reverse sweep has another orbit.
+            inputs.orbits((0.2 * reverse_points).floor()),
         ],
         drawn: curves * inputs.frequencies,
         unit: inputs.orbit_bytes(),
@@ -155,17 +152,15 @@ fn many_peaks_warning(cases: &[SurveyedCase]) -> Option<String> {
     let one = cases.first()?;
     let (values, places) = (&one.case.values, one.survey.system().places().len());
     let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
-    (sought && places >= MANY_PEAKS).then(|| {
+    // Number of places from which the warning is given. A disk of many blades needs all peaks;
+    // the nodes of a contact rarely do.
+    (sought && places >= 1000).then(|| {
         format!(
             "the peaks of {places} places are refined one by one, with about six orbits each; \
              peak_of = \"all\" in [study] refines only the largest amplitude, and peaks = false refines none"
         )
     })
 }
-
-/// Number of places from which the warning is given. A disk of many blades needs all peaks; the
-/// nodes of a contact rarely do.
-const MANY_PEAKS: usize = 1000;
 
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();

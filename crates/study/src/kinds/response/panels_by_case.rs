@@ -9,19 +9,6 @@ use crate::results::dataset::{Axis, Panel, Series, Style};
 use crate::results::drawing::{CaseRows, MAX_PANELS, join_title, numbers};
 use crate::syntax::format::format_significant;
 
-/// A mass below this share of the heaviest mass is drawn dashed, like the contact masses of the
-/// paper.
-const LIGHT_MASS_SHARE: f64 = 0.5;
-/// Colour of crosses at points without an orbit: the last of the palette.
-const FAILED_POINT_COLOUR: usize = 6;
-/// Largest number of bars that remain distinct in a panel: two for each of 60 blades.
-const MAX_BARS: usize = 120;
-/// Bars whose heights differ by at most this share belong to equal sectors.
-const EQUAL_BARS: f64 = 1e-5;
-/// Largest number of places drawn behind the curve of the largest amplitude; thousands of
-/// curves would form one grey area of several megabytes.
-const MAX_BACKGROUND: usize = 100;
-
 impl FigureData<'_> {
     /// Returns the panels of each case.
     ///
@@ -79,7 +66,8 @@ impl FigureData<'_> {
     fn places_panel(&self, case_rows: &CaseRows) -> Panel {
         let (mut panel, names) = (self.panel(case_rows.label()), self.names());
         panel.series.extend(self.references(&names, &[(0, case_rows)]));
-        panel.series.extend(self.failed_points(case_rows, 1, FAILED_POINT_COLOUR));
+        // Colour of crosses at points without an orbit: the last of the palette.
+        panel.series.extend(self.failed_points(case_rows, 1, 6));
         if self.draws_each_place() {
             // the mass is known only for a place that is one row of the structure
             let mass = |place: usize| match self.system.place_axes()[place].rows() {
@@ -90,7 +78,9 @@ impl FigureData<'_> {
             let heaviest = places.map(mass).filter(|mass| mass.is_finite()).fold(0.0, f64::max);
             for (name, place) in &self.shown {
                 let (x, y) = self.line(case_rows, name);
-                let light = mass(*place) < LIGHT_MASS_SHARE * heaviest;
+                // A mass below this share of the heaviest mass is drawn dashed, like the contact
+                // masses of the paper.
+                let light = mass(*place) < 0.5 * heaviest;
                 let style = if light { Style::Dashed } else { Style::Solid };
                 panel.series.push(Series { style, ..Series::line(name, x, y, self.colour_of(name, *place)) });
             }
@@ -103,7 +93,9 @@ impl FigureData<'_> {
             }
             return panel;
         }
-        let background = self.highest(case_rows, MAX_BACKGROUND);
+        // Largest number of places drawn behind the curve of the largest amplitude; thousands of
+        // curves would form one grey area of several megabytes.
+        let background = self.highest(case_rows, 100);
         let label = match background.len() < names.len() {
             true => format!("the {} highest of {} places", background.len(), names.len()),
             false => format!("each of {} places", names.len()),
@@ -150,13 +142,15 @@ impl FigureData<'_> {
             let (x, y) = place.sectors.iter().map(|(sector, size, _)| (*sector as f64, size * self.factor.1)).unzip();
             Series::bars(&place.place, x, y, first + colour)
         };
-        let fit = (MAX_BARS / ring.sectors.max(1)).clamp(1, disk_shape::MAX_PLACES);
+        // Largest number of bars that remain distinct in a panel: two for each of 60 blades.
+        let fit = (120 / ring.sectors.max(1)).clamp(1, disk_shape::MAX_PLACES);
         let series: Vec<Series> = disk_shape::largest_places(&shape, fit).into_iter().map(bars).collect();
         if series.iter().all(|bars| bars.x.len() < 2) {
             return None;
         }
         // bars of equal height, as for a tuned disk, are left out
-        let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > EQUAL_BARS * bars.y[0].abs());
+        // Bars whose heights differ by at most this share belong to equal sectors.
+        let differ = |bars: &Series| bars.y.iter().any(|y| (y - bars.y[0]).abs() > 1e-5 * bars.y[0].abs());
         let differ = series.iter().any(differ);
         let title = join_title([case_rows.label(), format!("at {} Hz", format_significant(frequency, 6))]);
         let (x, y) =

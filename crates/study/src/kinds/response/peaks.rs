@@ -9,20 +9,6 @@ use stickslip::model::System;
 use stickslip::orbit::{Orbit, PlaceMotion};
 use stickslip_numerics::tie_break::first_largest;
 
-/// Amplitudes below this share of the largest are rounding.
-const ROUNDING: f64 = 1e-10;
-/// Largest relative difference of two points before a peak that counts as level.
-///
-/// It is above the rounding of an orbit, and below the fall of a resonance between two points
-/// of any curve that can be drawn.
-const LEVEL_TOLERANCE: f64 = 1e-8;
-
-/// Largest relative difference of two peaks of both sweeps, between the same frequencies, that
-/// count as one.
-///
-/// Searches on a level top end at points that depend on the warm start.
-const SAME_PEAK: f64 = 1e-2;
-
 /// The quantities of an orbit for the peak search.
 pub(super) struct PeakQuantities {
     /// The places whose largest amplitude counts; empty if each place has separate peaks.
@@ -138,10 +124,12 @@ pub(super) fn all(
 fn is_same_peak(there: &FoundPeak, back: &FoundPeak, omegas: &[f64]) -> bool {
     let below = |peak: &Peak| omegas.partition_point(|omega| *omega <= peak.omega);
     let (a, b) = (&there.peak, &back.peak);
+    // Largest relative difference of two peaks of both sweeps, between the same frequencies,
+    // that count as one. Searches on a level top end at points that depend on the warm start.
     !there.reverse_sweep
         && there.mass == back.mass
         && below(a) == below(b)
-        && (a.value - b.value).abs() <= SAME_PEAK * a.value
+        && (a.value - b.value).abs() <= 1e-2 * a.value
 }
 
 /// Returns true if a peak of the reverse sweep is only its jump to the orbits of the forward
@@ -209,7 +197,8 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<CurvePoint>) -> Result<Vec<FoundPea
     }
     // the amplitude of a place held by friction is rounding only
     let largest = points.iter().flat_map(|point| point.values.iter().take(count)).fold(0.0f64, |a, b| a.max(*b));
-    let moves = |peak: &Peak| peak.value > (ROUNDING * largest).max(held_amplitude(&prepared.system, peak.omega));
+    // Amplitudes below this share of the largest are rounding.
+    let moves = |peak: &Peak| peak.value > (1e-10 * largest).max(held_amplitude(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
     let mut inner = peak::local_peaks(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
     inner.retain(|found| !is_end_of_plateau(&points, found.quantity, &found.peak));
@@ -226,7 +215,10 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<CurvePoint>) -> Result<Vec<FoundPea
 fn is_end_of_plateau(points: &[CurvePoint], quantity: usize, peak: &Peak) -> bool {
     let index = points.partition_point(|point| point.omega < peak.omega);
     let as_high = |point: &CurvePoint| {
-        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= LEVEL_TOLERANCE * peak.value)
+        // Largest relative difference of two points before a peak that counts as level. It is
+        // above the rounding of an orbit, and below the fall of a resonance between two points
+        // of any curve that can be drawn.
+        point.values.get(quantity).is_some_and(|value| (value - peak.value).abs() <= 1e-8 * peak.value)
     };
     index >= 2 && points[index - 2..index].iter().all(as_high)
 }

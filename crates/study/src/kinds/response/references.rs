@@ -30,16 +30,14 @@ pub(super) fn equal_previous(study: &Study, case: &Case) -> bool {
     })
 }
 
-/// Number of cases examined to estimate the number of references.
-const SAMPLED_CASES: usize = 9;
-
 /// Estimates the number of cases with different references, from some of the cases; zero if
 /// none are requested.
 pub(super) fn distinct_cases(study: &Study) -> f64 {
     if !study.wants_references() {
         return 0.0;
     }
-    let (cases, looked) = (study.cases(), study.cases().min(SAMPLED_CASES));
+    // Number of cases examined to estimate the number of references.
+    let (cases, looked) = (study.cases(), study.cases().min(9));
     let sampled = (0..looked).filter_map(|i| study.case(i * cases / looked).ok());
     let own = sampled.filter(|case| !equal_previous(study, case)).count();
     own as f64 * cases as f64 / looked as f64

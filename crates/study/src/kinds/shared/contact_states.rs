@@ -10,8 +10,6 @@ use std::ops::Range;
 
 /// Up to this number of joints, each joint has one panel.
 const MAX_SINGLE: usize = 3;
-/// Shares below this are rounding.
-const ROUNDING: f64 = 1e-9;
 /// Factor from shares to percent.
 const PERCENT: f64 = 100.0;
 
@@ -51,7 +49,8 @@ fn state_shares(table: &Table, joint: &str, rows: &Range<usize>) -> [Vec<f64>; 4
             .map(|column| numbers(table, &column, rows.clone()));
     // the remainder is contact of a stop
     let touch = (0..stick.len()).map(|i| 1.0 - stick[i] - slip[i] - open[i]);
-    let touch = touch.map(|share| if share.abs() < ROUNDING { 0.0 } else { share }).collect();
+    // Shares below this are rounding.
+    let touch = touch.map(|share| if share.abs() < 1e-9 { 0.0 } else { share }).collect();
     [stick, slip, touch, open].map(|shares: Vec<f64>| shares.into_iter().map(|share| share * PERCENT).collect())
 }
 

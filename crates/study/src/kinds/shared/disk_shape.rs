@@ -62,12 +62,6 @@ pub(in crate::kinds) fn place_and_sector(name: &str) -> Option<(String, usize)> 
 
 /// Length of the largest displacement as a share of the radius of the circle.
 const LARGEST_DISPLACEMENT: f64 = 0.35;
-/// Half the width of the picture in radii of the circle; all pictures have the same size.
-const HALF_WIDTH: f64 = 1.0 + LARGEST_DISPLACEMENT + 0.05;
-/// Smallest number of sectors for a picture.
-const MIN_SECTORS: usize = 3;
-/// Number of points of the circle at rest.
-const CIRCLE: usize = 180;
 /// Largest number of places in a picture: those that move most. More places hide each other.
 pub(in crate::kinds) const MAX_PLACES: usize = 4;
 
@@ -93,17 +87,23 @@ pub(in crate::kinds) fn panel(
     title: String,
     colour: usize,
 ) -> Option<Panel> {
+    // Half the width of the picture in radii of the circle; all pictures have the same size.
+    let half_width = 1.0 + LARGEST_DISPLACEMENT + 0.05;
+    // Smallest number of sectors for a picture.
+    let min_sectors = 3;
+    // Number of points of the circle at rest.
+    let circle: usize = 180;
     let largest = places.iter().map(PlaceInSectors::largest).fold(0.0, f64::max);
     let all = places.iter().flat_map(|around| &around.sectors);
     // the first of equal displacements determines the instant
     let (_, _, now) = *all.clone().nth(first_largest(all.map(|(_, size, _)| *size))?)?;
-    if sectors < MIN_SECTORS || places.iter().all(|around| around.sectors.len() < MIN_SECTORS) {
+    if sectors < min_sectors || places.iter().all(|around| around.sectors.len() < min_sectors) {
         return None;
     }
     let shown = largest_places(places, MAX_PLACES);
     let left_out = left_out(shown.len(), places.len());
     let point = |turn: f64, radius: f64| (radius * (TAU * turn).sin(), radius * (TAU * turn).cos());
-    let rest = (0..=CIRCLE).map(|i| point(i as f64 / CIRCLE as f64, 1.0)).unzip();
+    let rest = (0..=circle).map(|i| point(i as f64 / circle as f64, 1.0)).unzip();
     let (x, y): (Vec<f64>, Vec<f64>) = rest;
     let mut series = vec![Series::line("at rest", x, y, 0).reference()];
     for place in shown {
@@ -127,7 +127,7 @@ pub(in crate::kinds) fn panel(
     let first = series.iter().rev().find_map(|line| Some((*line.x.first()?, *line.y.first()?)))?;
     series.push(Series::marks("sector 0", vec![first.0], vec![first.1], 6));
     let title = join_title([title, left_out]);
-    let axis = || Axis::default().with_range(-HALF_WIDTH, HALF_WIDTH);
+    let axis = || Axis::default().with_range(-half_width, half_width);
     Some(Panel { title, x: axis(), y: axis(), series, equal_axes: true })
 }
 

@@ -32,9 +32,6 @@ const TIME: &str = "time_s";
 const FREQUENCY: ValueType = ValueType::Quantity(Dimension::FREQUENCY, Bounds::Positive);
 const DURATION: ValueType = ValueType::Quantity(Dimension::TIME, Bounds::Positive);
 
-/// Largest number of samples of one transient.
-const MAX_STEPS: f64 = 1e7;
-
 const RUN_UP: &[Key] = &[
     required("from", FREQUENCY, "excitation frequency at the start", "\"110 Hz\""),
     required("to", FREQUENCY, "excitation frequency at the end; it may be lower than `from`", "\"130 Hz\""),
@@ -146,6 +143,8 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
 }
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
+    // Largest number of samples of one transient.
+    let max_steps = 1e7;
     let free = ModelNames::free_displacements(model);
     for key in ["start", "start_velocity"] {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
@@ -189,8 +188,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
         let help = "add `time_step`, for example \"0.1 ms\"";
         return Err(KeyError::new("time_step", "a free decay has no period to divide into samples", help));
     };
-    if time / step > MAX_STEPS {
-        let message = format!("the study needs {:.3e} samples; the limit is {MAX_STEPS:e}", time / step);
+    if time / step > max_steps {
+        let message = format!("the study needs {:.3e} samples; the limit is {max_steps:e}", time / step);
         return Err(KeyError::new("duration", message, "shorten `duration` or use fewer samples"));
     }
     Ok(())
@@ -316,12 +315,6 @@ fn largest_range(decays: &[Decay]) -> Option<usize> {
     (0..decays.len()).max_by(|&a, &b| decays[a].extent().total_cmp(&decays[b].extent()))
 }
 
-/// Samples per cycle that turning points need.
-///
-/// With 20 the damping ratio has an error of 1e-3 of the decrement of a cycle; with 3 it is
-/// meaningless.
-const PER_CYCLE: f64 = 20.0;
-
 /// Writes frequency and damping, cycle by cycle, of the place that moves most.
 ///
 /// Returns the warning for too few samples.
@@ -335,7 +328,9 @@ fn write_decay(
     let displacements = (0..decays.len()).filter(|place| !prepared.system.place_axes()[*place].is_rotation());
     let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
-    if cycles.iter().any(|cycle| cycle.frequency * step * PER_CYCLE > 1.0) {
+    // Samples per cycle that turning points need. With 20 the damping ratio has an error of 1e-3
+    // of the decrement of a cycle; with 3 it is meaningless.
+    if cycles.iter().any(|cycle| cycle.frequency * step * 20.0 > 1.0) {
         return Some(
             "warning: the samples are too far apart to compute damping from the decay: use a `time_step` below a \
              twentieth of the period",

@@ -14,9 +14,6 @@ const EXCITATION_HELP: &str = "an expression cannot read the excitation frequenc
     f = \"100 Hz\" in [parameters], use `f` here, and set kind = \"orbit\", frequency = \"f\" and \
     vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
 
-/// Greatest depth of nested parentheses and powers.
-const MAX_DEPTH: usize = 64;
-
 pub(super) struct Parser<'a> {
     pub(super) text: &'a str,
     pub(super) position: usize,
@@ -51,9 +48,11 @@ impl Parser<'_> {
     }
 
     fn check_depth(&mut self) -> Result<(), TextError> {
+        // Greatest depth of nested parentheses and powers.
+        let max_depth: usize = 64;
         self.depth += 1;
-        if self.depth > MAX_DEPTH {
-            let message = format!("more than {MAX_DEPTH} nested parentheses or powers");
+        if self.depth > max_depth {
+            let message = format!("more than {max_depth} nested parentheses or powers");
             return Err(TextError::new(self.position..self.position, message)
                 .help("define parts of the expression as parameters"));
         }

@@ -20,14 +20,6 @@ pub const CLASSES: [&str; 6] = ["paper", "gallery", "random", "audit", "rows", "
 /// Class of the studies in a folder that the user names.
 pub const FILES: &str = "files";
 
-/// Number of random studies, systems, rows and loose dampers.
-const STUDIES: u64 = 1000;
-const SYSTEMS: u64 = 1000;
-const ROWS: u64 = 60;
-const DAMPERS: u64 = 60;
-/// Points of a random study above which it is skipped: it would take minutes.
-const MOST_POINTS: usize = 2000;
-
 /// One model or study of the corpus.
 pub struct Item {
     pub name: String,
@@ -54,10 +46,11 @@ pub fn items(class: &str, folder: Option<&Path>) -> Option<Vec<Item>> {
     let items = match class {
         "paper" => below(&studies.join("paper")),
         "gallery" => below(&studies.join("gallery")),
-        "random" => (1..=STUDIES).map(random_study).collect(),
-        "audit" => (0..SYSTEMS).map(audited).collect(),
-        "rows" => (0..ROWS).map(row).collect(),
-        "loose" => (0..DAMPERS).map(loose).collect(),
+        // Number of random studies, systems, rows and loose dampers.
+        "random" => (1..=1000).map(random_study).collect(),
+        "audit" => (0..1000).map(audited).collect(),
+        "rows" => (0..60).map(row).collect(),
+        "loose" => (0..60).map(loose).collect(),
         FILES => below(folder?),
         _ => return None,
     };
@@ -98,7 +91,8 @@ fn random_study(seed: u64) -> Item {
         let text = study_text(&mut Chance::new(seed));
         let study = read_study("random.toml", &text, &[]).map_err(|error| error.to_string())?;
         let points: usize = (0..study.cases()).filter_map(|k| Some(study.case(k).ok()?.frequencies?.len())).sum();
-        if points > MOST_POINTS {
+        // Points of a random study above which it is skipped: it would take minutes.
+        if points > 2000 {
             return Err(format!("{points} points"));
         }
         tables(study)

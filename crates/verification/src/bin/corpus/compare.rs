@@ -4,11 +4,6 @@ use crate::record::REFUSED;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Relative difference of a value, beyond the reported errors, that is always allowed.
-const ROUNDING: f64 = 1e-9;
-/// Number of the largest differences that are printed.
-const PRINTED: usize = 20;
-
 /// A table that was read back.
 struct Sheet {
     names: Vec<String>,
@@ -130,7 +125,9 @@ impl Differences {
             for row in 0..old.rows.len() {
                 let [Some(a), Some(b)] = [old, new].map(|sheet| sheet.number(row, column)) else { continue };
                 let excess = (a - b).abs() / size - old.error(row) - new.error(row);
-                if excess > ROUNDING {
+                // Relative difference of a value, beyond the reported errors, that is always
+                // allowed.
+                if excess > 1e-9 {
                     self.values.push((excess, format!("{place}, row {row}, {name}: {a:?} before, {b:?} now")));
                 }
             }
@@ -138,6 +135,8 @@ impl Differences {
     }
 
     fn print(mut self, class: &str) -> bool {
+        // Number of the largest differences that are printed.
+        let printed = 20;
         let Differences { tables, equal, points, .. } = self;
         let lost: usize = self
             .statuses
@@ -151,10 +150,10 @@ impl Differences {
             self.iterations[0], self.iterations[1], self.found_by
         );
         self.statuses.iter().for_each(|((old, new), count)| println!("  {count} points from {old} to {new}"));
-        self.shapes.iter().take(PRINTED).for_each(|line| println!("  {line}"));
+        self.shapes.iter().take(printed).for_each(|line| println!("  {line}"));
         self.values.sort_by(|a, b| b.0.total_cmp(&a.0));
         println!("  {} values beyond the reported errors", self.values.len());
-        self.values.iter().take(PRINTED).for_each(|(excess, line)| println!("  {excess:.1e}: {line}"));
+        self.values.iter().take(printed).for_each(|(excess, line)| println!("  {excess:.1e}: {line}"));
         equal == tables && self.shapes.is_empty()
     }
 }

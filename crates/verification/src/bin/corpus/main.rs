@@ -12,7 +12,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)] // a command
 
-#[path = "../../../../study/tests/random/mod.rs"]
+#[path = "../../../../study/tests/it/random/mod.rs"]
 mod random;
 
 mod classes;

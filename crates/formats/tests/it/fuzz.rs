@@ -1,30 +1,18 @@
-//! Damaged files of every format: no panic, bounded time, and memory bounded by the file.
+//! Damaged files of every format: no panic, and memory bounded by the file.
 
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
-use peak_alloc::PeakAlloc;
+use allocation_counter::measure;
 use stickslip_formats::{Matrix, MatrixReport, Symmetry, TABLE, list_bytes, names, read_bytes, write};
-
-#[global_allocator]
-static MEMORY: PeakAlloc = PeakAlloc;
-
-/// Memory peaks are those of the whole process, so one test runs at a time.
-static ALONE: Mutex<()> = Mutex::new(());
 
 /// Bytes of memory that reading may take beyond a multiple of the file.
 ///
 /// A damaged size may state a million rows without entries. The matrix and its
 /// report store some numbers for each row.
-const BASE_MEMORY: usize = 64 << 20;
+const BASE_MEMORY: u64 = 64 << 20;
 
 /// Bytes of memory for every byte of a damaged file.
-const MEMORY_PER_BYTE: usize = 100;
-
-/// Time limit for one damaged file of some kilobytes. A run takes milliseconds;
-/// the rest allows for other processes.
-const TIME_LIMIT: Duration = Duration::from_secs(5);
+const MEMORY_PER_BYTE: u64 = 100;
 
 /// Random numbers with the same sequence in every run (Marsaglia's xorshift).
 struct Random(u64);
@@ -118,9 +106,15 @@ fn read_all(bytes: &[u8], format: &str) -> usize {
     found.count()
 }
 
-/// Damages the files of one format, `count` times each or until `end`. Returns
-/// the numbers of runs and of matrices read.
-fn fuzz(format: &str, seed: u64, count: usize, end: Instant) -> (usize, usize) {
+/// Returns the largest memory that a function holds at one time, bytes. Allocations of other
+/// threads do not count.
+fn peak_memory(f: impl FnOnce()) -> u64 {
+    measure(f).bytes_max
+}
+
+/// Damages the files of one format, `count` times each. Returns the numbers of
+/// runs and of matrices read.
+fn fuzz(format: &str, seed: u64, count: usize) -> (usize, usize) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     let mut paths: Vec<_> =
         std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path()).collect();
@@ -136,19 +130,13 @@ fn fuzz(format: &str, seed: u64, count: usize, end: Instant) -> (usize, usize) {
             for _ in 0..1 + random.below(4) {
                 damage(&mut bytes, &mut random);
             }
-            MEMORY.reset_peak_usage();
-            let (before, start) = (MEMORY.current_usage(), Instant::now());
-            matrices += read_all(&bytes, format);
-            let (memory, time) = (MEMORY.peak_usage().saturating_sub(before), start.elapsed());
+            let memory = peak_memory(|| matrices += read_all(&bytes, format));
             runs += 1;
-            let path = std::env::temp_dir().join(format!("stickslip-damaged-{format}"));
-            if memory > BASE_MEMORY + MEMORY_PER_BYTE * bytes.len() || time > TIME_LIMIT {
+            if memory > BASE_MEMORY + MEMORY_PER_BYTE * bytes.len() as u64 {
+                let path = std::env::temp_dir().join(format!("stickslip-damaged-{format}"));
                 std::fs::write(&path, &bytes).expect("a file");
-                panic!("{memory} bytes and {time:?} for {} bytes, kept as {}", bytes.len(), path.display());
+                panic!("{memory} bytes of memory for {} bytes, kept as {}", bytes.len(), path.display());
             }
-        }
-        if Instant::now() > end {
-            break;
         }
     }
     (runs, matrices)
@@ -156,38 +144,32 @@ fn fuzz(format: &str, seed: u64, count: usize, end: Instant) -> (usize, usize) {
 
 #[test]
 fn damaged_files_of_every_format() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     for format in TABLE {
-        let end = Instant::now() + Duration::from_secs(60);
-        let (runs, matrices) = fuzz(format.name, 0x9e37_79b9_7f4a_7c15, 400, end);
+        let (runs, matrices) = fuzz(format.name, 0x9e37_79b9_7f4a_7c15, 400);
         // Most damaged numbers are still numbers. A reader that refuses all
         // damaged files would not be tested.
         assert!(matrices > 0 && runs >= 400, "{}: {matrices} matrices in {runs} runs", format.name);
     }
 }
 
-/// Runs for ten minutes per format: `cargo test -p stickslip-formats --test
-/// fuzz -- --ignored --nocapture`.
+/// Many damages: `cargo test -p stickslip-formats --test it fuzz -- --ignored --nocapture`.
 ///
-/// `STICKSLIP_FUZZ_SECONDS` and `STICKSLIP_FUZZ_SEED` set the time and the seed,
+/// `STICKSLIP_FUZZ_RUNS` and `STICKSLIP_FUZZ_SEED` set the damages of every file and the seed,
 /// `STICKSLIP_FUZZ_FORMAT` selects one format.
 #[test]
-#[ignore = "ten minutes for every format"]
-fn damaged_files_of_every_format_for_ten_minutes() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+#[ignore = "takes minutes for every format"]
+fn many_damaged_files_of_every_format() {
     let number = |name: &str, default| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default);
-    let (seconds, seed) = (number("STICKSLIP_FUZZ_SECONDS", 600), number("STICKSLIP_FUZZ_SEED", 0x1234_5678_9abc_def1));
+    let (count, seed) = (number("STICKSLIP_FUZZ_RUNS", 50_000), number("STICKSLIP_FUZZ_SEED", 0x1234_5678_9abc_def1));
     let only = std::env::var("STICKSLIP_FUZZ_FORMAT").ok();
     for format in TABLE.iter().filter(|format| only.as_ref().is_none_or(|only| only == format.name)) {
-        let end = Instant::now() + Duration::from_secs(seconds);
-        let (runs, matrices) = fuzz(format.name, seed.max(1), usize::MAX, end);
+        let (runs, matrices) = fuzz(format.name, seed.max(1), count as usize);
         eprintln!("{}: {runs} damaged files, {matrices} matrices in them", format.name);
     }
 }
 
 #[test]
 fn damaged_names_of_rows() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut random = Random(77);
     for good in [
         &b"row,name\n1,a\n2,\"b,c\"\n3,d\n"[..],
@@ -382,16 +364,19 @@ fn ansys_full() -> Vec<u8> {
 /// Memory is at most ten times the file, for every format.
 #[test]
 fn memory_follows_the_file() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     for format in TABLE {
         let bytes = large(format.name);
-        MEMORY.reset_peak_usage();
-        let before = MEMORY.current_usage();
-        let matrix = read_bytes(&bytes, None, None).unwrap_or_else(|error| panic!("{}: {error}", format.name));
-        let memory = MEMORY.peak_usage().saturating_sub(before);
+        let mut matrix = None;
+        let memory = peak_memory(|| matrix = Some(read_bytes(&bytes, None, None)));
+        let matrix = matrix.expect("a result").unwrap_or_else(|error| panic!("{}: {error}", format.name));
         assert_eq!(matrix.origin().format, format.name);
         assert!(bytes.len() >= 1_000_000 && matrix.entries().len() > 190_000, "{}: {}", format.name, bytes.len());
-        assert!(memory <= 10 * bytes.len(), "{}: {memory} bytes of memory for {} bytes", format.name, bytes.len());
+        assert!(
+            memory <= 10 * bytes.len() as u64,
+            "{}: {memory} bytes of memory for {} bytes",
+            format.name,
+            bytes.len()
+        );
         eprintln!("{}: {:.1} times its {} bytes", format.name, memory as f64 / bytes.len() as f64, bytes.len());
     }
 }
@@ -399,14 +384,13 @@ fn memory_follows_the_file() {
 /// One damaged index far beyond all others does not create rows.
 #[test]
 fn damaged_index_is_too_large() {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut text: String = (1..=100_000).map(|row| format!("{row} {row} 2.0\n")).collect();
     assert_eq!(read_bytes(text.as_bytes(), None, None).expect("a diagonal").rows(), 100_000);
     text += "14889400 14889400 1.0\n";
-    MEMORY.reset_peak_usage();
-    let before = MEMORY.current_usage();
-    let error = read_bytes(text.as_bytes(), None, None).expect_err("more rows than bytes").to_string();
-    let memory = MEMORY.peak_usage().saturating_sub(before);
+    let mut error = String::new();
+    let memory = peak_memory(|| {
+        error = read_bytes(text.as_bytes(), None, None).expect_err("more rows than bytes").to_string();
+    });
     assert!(error.contains("14889400 rows") && error.contains("damaged"), "{error}");
-    assert!(memory <= 10 * text.len(), "{memory} bytes of memory for {}", text.len());
+    assert!(memory <= 10 * text.len() as u64, "{memory} bytes of memory for {}", text.len());
 }

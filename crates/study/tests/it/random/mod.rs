@@ -3,28 +3,20 @@
 
 use std::fmt::Write;
 use stickslip::law;
+use stickslip_numerics::random::SplitMix64;
 use stickslip_study::{kinds, templates};
 
-/// Random numbers by splitmix64 (Steele, Lea, Flood 2014): a seed gives the same numbers on
-/// every machine.
-pub struct Chance(u64);
+/// Random numbers: a seed gives the same numbers on every machine.
+pub struct Chance(SplitMix64);
 
 impl Chance {
     pub fn new(seed: u64) -> Self {
-        Chance(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        Chance(SplitMix64::new(0).skip(seed))
     }
 
     /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+        self.0.next_unit()
     }
 
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -33,7 +25,7 @@ impl Chance {
 
     /// Returns a whole number from `low` to `high`, both included.
     pub fn count(&mut self, low: usize, high: usize) -> usize {
-        low + (self.next() % (high - low + 1) as u64) as usize
+        low + (self.0.next_u64() % (high - low + 1) as u64) as usize
     }
 
     /// Returns true with the probability `1/n`.

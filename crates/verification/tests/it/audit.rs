@@ -15,7 +15,6 @@
 #![allow(clippy::print_stdout)] // tests print measured values
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 use stickslip::method::TABLE as METHODS;
 use stickslip::model::System;
 use stickslip::orbit::Orbit;
@@ -47,8 +46,6 @@ const COMES: f64 = 0.5;
 const SETTLED: f64 = 1e-4;
 /// Tolerance of method `transient`.
 const WAITED: f64 = 1e-6;
-/// Seconds above which an orbit is printed.
-const SLOW: f64 = 5.0;
 /// In a long audit, method `transient` runs for one in this number of models with step laws.
 const RARELY: u64 = 8;
 /// Largest fraction of orbits without a judgement; one more orbit is allowed.
@@ -126,13 +123,7 @@ fn audit(made: &dyn Fn(u64) -> (System, f64), first: u64, models: u64, long: boo
                 }
             };
             tried += 1;
-            let begun = Instant::now();
-            let found = solver.orbit(omega);
-            let seconds = begun.elapsed().as_secs_f64();
-            if seconds > SLOW {
-                println!("{seed} {laws:?} {}: {seconds:.1} s", row.name);
-            }
-            let orbit = match found {
+            let orbit = match solver.orbit(omega) {
                 Ok(orbit) => orbit,
                 Err(error) => {
                     count(error.status().to_owned());

@@ -459,7 +459,7 @@ fn a_method_from_outside_makes_orbits_with_evidence() {
 /// Every Rust block of the book's page is code of this file.
 #[test]
 fn the_book_shows_the_code_of_this_file() {
-    let page = include_str!("../../../docs/src/extending.md");
+    let page = include_str!("../../../../docs/src/extending.md");
     let blocks: Vec<&str> = page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
     assert_eq!(blocks.len(), 3);
     for block in blocks {

@@ -1,6 +1,6 @@
 //! Compares reduced rings of different blades with all rows of all sectors.
 
-use crate::brick::Brick;
+use super::brick::Brick;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::collections::BTreeMap;
 use stickslip::model::{Disk, DiskPart, Model, Place, SectorDistribution, Substructure, SubstructureDamping, System};

@@ -7,9 +7,8 @@
 
 #![allow(clippy::print_stdout)] // tests print their measurements
 
-mod random;
-
-use random::{Chance, study_text};
+use crate::random::{Chance, study_text};
+use allocation_counter::measure;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -30,19 +29,12 @@ const SEED: u64 = 1;
 const STEPS: u64 = 10_000;
 /// Number of studies with the most steps that are printed.
 const LONGEST: usize = 8;
-/// Largest memory of the whole process, bytes.
+/// Largest memory of a study, bytes.
 const MEMORY: u64 = 500_000_000;
 /// Smallest percentage of accepted studies. The others test that refusals are errors.
 const ACCEPTED: usize = 60;
 /// Largest percentage of studies that end early.
 const ENDED_EARLY: usize = 25;
-
-/// Returns the peak memory of the process, bytes; `None` if the system does not provide it.
-fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-}
 
 /// Returns the error of a dataset, if there is one.
 fn fault(study: &Study, dataset: &Dataset) -> Option<String> {
@@ -95,6 +87,8 @@ struct Done {
     seed: u64,
     kind: &'static str,
     steps: u64,
+    /// Largest memory at one time, bytes.
+    memory: u64,
     /// Number of points by status; `None` if the study ended early.
     points: Option<BTreeMap<String, u64>>,
 }
@@ -112,9 +106,13 @@ fn one(seed: u64, text: &str) -> Result<Option<Done>, String> {
     let count = steps.clone();
     let stop = StopFlag::with_callback(move || count.fetch_add(1, Ordering::Relaxed) >= most);
     // the pool has one thread, so the flag reaches all units
-    let ran = catch_unwind(AssertUnwindSafe(|| stop.watch(|| run(&study, &Context::without_progress(1)))));
-    let done = |points| Done { seed, kind: study.kind().name, steps: steps.load(Ordering::Relaxed), points };
-    match ran {
+    let mut ran = None;
+    let memory = measure(|| {
+        ran = Some(catch_unwind(AssertUnwindSafe(|| stop.watch(|| run(&study, &Context::without_progress(1))))));
+    });
+    let (kind, memory) = (study.kind().name, memory.bytes_max);
+    let done = |points| Done { seed, kind, steps: steps.load(Ordering::Relaxed), memory, points };
+    match ran.expect("the study ran") {
         Err(panic) if panic.is::<Interrupted>() => Ok(Some(done(None))),
         Err(_) => Err("it panics".to_owned()),
         Ok(Err(error)) => Err(format!("accepted, and then refused: {error}")),
@@ -184,9 +182,9 @@ fn random_studies_end_without_faults() {
     for one in longest.iter().take(LONGEST) {
         println!("study {}, {}: {} steps", one.seed, one.kind, one.steps);
     }
-    if let Some(peak) = peak_memory() {
-        println!("{} MB", peak / 1_000_000);
-        assert!(peak <= MEMORY, "{peak} bytes");
+    if let Some(largest) = done.iter().max_by_key(|one| one.memory) {
+        println!("study {}, {}: {} MB", largest.seed, largest.kind, largest.memory / 1_000_000);
+        assert!(largest.memory <= MEMORY, "study {}: {} bytes", largest.seed, largest.memory);
     }
 }
 

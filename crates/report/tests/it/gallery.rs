@@ -2,7 +2,7 @@
 //! pictures.
 //!
 //! To write the page and the pictures again at full size (half a minute):
-//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test gallery`
+//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test it gallery`
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fs;
@@ -13,7 +13,7 @@ use stickslip_study::run::{Context, run};
 use stickslip_study::{Study, read_study};
 
 const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
-const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test gallery";
+const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test it gallery";
 
 /// The studies in the order of the page.
 const STUDIES: [&str; 30] = [
@@ -95,7 +95,7 @@ fn words(name: &str, text: &str) -> (String, String) {
 
 fn page() -> String {
     let mut page =
-        "<!-- Generated from studies/gallery/ by crates/report/tests/gallery.rs; do not edit. -->\n\n# Gallery\n\n\
+        "<!-- Generated from studies/gallery/ by crates/report/tests/it/gallery.rs; do not edit. -->\n\n# Gallery\n\n\
          I want to start from a similar problem. All studies of this page run in ten seconds:\n\n\
          ```sh\nstickslip run studies/gallery/*.toml --out gallery\n```\n\n\
          Copy the closest one from `studies/gallery/`, change the numbers, and run it.\n"

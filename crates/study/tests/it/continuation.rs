@@ -492,7 +492,7 @@ fn a_duffing_oscillator_has_both_folds_and_an_unstable_middle() {
 /// slow and long imposed motion, as the book advises.
 #[test]
 fn a_slow_motion_models_a_belt() {
-    let book = include_str!("../../../docs/src/laws.md");
+    let book = include_str!("../../../../docs/src/laws.md");
     let from = book.find("schema = 1\n[parameters]\nv =").unwrap();
     let text = &book[from..from + book[from..].find("```").unwrap()];
     let found = dataset(text);

@@ -3,7 +3,7 @@
 //!
 //! A change of the schema, a law, a method, a template or a study kind changes the generated
 //! parts. This command writes them again:
-//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book`.
+//! `STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test it book`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,7 +13,7 @@ use stickslip::{law, method};
 use stickslip_study::{book, read_study, run};
 
 const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
-const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test book";
+const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-study --test it book";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -82,7 +82,7 @@ fn every_study_in_the_book_checks() {
 
 #[test]
 fn the_reference_of_keys_is_up_to_date() {
-    let head = "<!-- Generated from the schema by crates/study/tests/book.rs; do not edit. -->\n\n# Every key\n\n\
+    let head = "<!-- Generated from the schema by crates/study/tests/it/book.rs; do not edit. -->\n\n# Every key\n\n\
                 The column *value* states what the key accepts. A quantity is a string with a unit, an expression over \
                 `[parameters]`, or a bare number in SI. The column *default* states the value that applies if the key is absent.\n\n";
     up_to_date(&root().join("docs/src/study_file_keys.md"), &format!("{head}{}", book::markdown()));

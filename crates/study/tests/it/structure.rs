@@ -4,7 +4,7 @@
 //! The tests cover files in several formats and units, added masses and joints, and every kind
 //! of wrong file.
 
-#[path = "../../stickslip/tests/reduction/brick.rs"]
+#[path = "../../../stickslip/tests/it/reduction/brick.rs"]
 #[allow(dead_code)] // other tests use the rest of it
 mod brick;
 

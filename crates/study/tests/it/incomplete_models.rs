@@ -7,14 +7,12 @@
 
 #![allow(clippy::print_stdout)] // tests print their measurements
 
-#[allow(dead_code)] // another test uses the studies of that file
-mod random;
-
-use random::Chance;
+use crate::random::Chance;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
+use stickslip_numerics::interrupt::{Interrupted, StopFlag};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, check, run};
@@ -23,8 +21,8 @@ use stickslip_study::summary::ModelSummary;
 /// Number of studies of a normal run, and the first seed.
 const STUDIES: u64 = 200;
 const SEED: u64 = 1;
-/// Time limit of a study, s; the studies have few masses and points.
-const LONGEST: u64 = 120;
+/// Largest number of solver steps of a study: Newton steps, switches, time steps.
+const STEPS: u64 = 10_000_000;
 
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
@@ -250,21 +248,18 @@ fn one(text: &str) -> Result<Ending, String> {
     lacks(&dataset).map_or(Ok(Ending::Ran), Err)
 }
 
-/// Runs [`one`] on another thread. A panic or a timeout is an error of the study.
+/// Runs [`one`] on one thread. A panic is an error of the study, and so are too many solver
+/// steps: the studies have few masses and points.
 fn watched(text: &str) -> Result<Ending, String> {
-    let (told, outcome) = channel();
-    let of_thread = text.to_owned();
-    let thread = std::thread::spawn(move || told.send(one(&of_thread)));
-    let ended = outcome.recv_timeout(Duration::from_secs(LONGEST));
-    match ended {
-        Ok(ending) => ending,
-        Err(RecvTimeoutError::Timeout) => Err(format!("it has not ended after {LONGEST} s")),
-        Err(RecvTimeoutError::Disconnected) => {
-            let panic = thread.join().err();
-            let words = panic.and_then(|panic| panic.downcast_ref::<String>().cloned());
-            Err(format!("it panics: {}", words.unwrap_or_default()))
-        }
-    }
+    let steps = AtomicU64::new(0);
+    let stop = StopFlag::with_callback(move || steps.fetch_add(1, Ordering::Relaxed) >= STEPS);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    // the pool has one thread, so the flag reaches all units
+    let ended = pool.install(|| catch_unwind(AssertUnwindSafe(|| stop.watch(|| one(text)))));
+    ended.unwrap_or_else(|panic| match panic.is::<Interrupted>() {
+        true => Err(format!("it has not ended after {STEPS} solver steps")),
+        false => Err(format!("it panics: {}", panic.downcast_ref::<String>().cloned().unwrap_or_default())),
+    })
 }
 
 #[test]

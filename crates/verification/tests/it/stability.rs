@@ -5,7 +5,6 @@
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use std::time::Instant;
 use stickslip::law::{Coulomb, CoulombArctan, Gap, Jenkins, JenkinsArctan, SharedLaw};
 use stickslip::method::event_driven::EventDriven;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -90,10 +89,8 @@ fn eigenvalues_of_nilpotent_return_maps_converge() {
         [("ten sliders", ten_sliders(), 14.35), ("ring that sticks", ring(12, 0.01, 0.0, 0.5), 116.0)]
     {
         for method in [&EventDriven as &dyn Method, &series(15)] {
-            let clock = Instant::now();
             let orbit = find(method, &system, TAU * hertz).unwrap();
             let found = orbit.multipliers().unwrap();
-            println!("{what}, {}: {:.3} s", orbit.method, clock.elapsed().as_secs_f64());
             assert_eq!(orbit.stability(), Stability::Proven);
             assert_eq!(found.len(), 2 * system.dofs() + system.joints().len());
             assert!(found[0].norm() <= 1.0 + 1e-6, "{what}: {}", found[0]);
@@ -249,7 +246,7 @@ fn extreme_numbers_end_without_hanging() {
     ];
     // mass, stiffness, stiffness of the joint, limit
     let usual = [1.0, 1e4, 200.0, 0.5];
-    let (mut orbits, mut errors, mut slowest) = (0, 0, (0.0, String::new()));
+    let (mut orbits, mut errors) = (0, 0);
     for (method, law) in pairs {
         for which in 0..4 {
             for value in [1e-300, 1e-150, 1e-20, 1e20, 1e23, 1e28, 1e150, 1e300] {
@@ -264,7 +261,6 @@ fn extreme_numbers_end_without_hanging() {
                     ..Model::default()
                 };
                 let system = model.assemble().unwrap();
-                let clock = Instant::now();
                 let found = method.solver(&system).map(|mut solver| solver.orbit(TAU * 14.0));
                 match found {
                     Ok(Ok(orbit)) => {
@@ -273,20 +269,10 @@ fn extreme_numbers_end_without_hanging() {
                     }
                     _ => errors += 1,
                 }
-                let what = format!("{}, {:?}", method.name(), model.joints[0].law);
-                let seconds = clock.elapsed().as_secs_f64();
-                if seconds > 1.0 {
-                    println!("{what}, number {which} is {value:e}: {seconds:.1} s");
-                }
-                if seconds > slowest.0 {
-                    slowest = (seconds, format!("{what}, number {which} is {value:e}"));
-                }
             }
         }
     }
-    println!("{orbits} orbits, {errors} errors; slowest {:.3} s: {}", slowest.0, slowest.1);
     assert!(orbits > 60 && errors > 0, "{orbits} {errors}");
-    assert!(slowest.0 < 30.0, "{slowest:?}"); // one second on an idle machine
 }
 
 /// A spring in series with a slider carries its load right up to the limit, together with a

@@ -1,0 +1,9 @@
+//! Tests of the command `stickslip`. One binary, so that linking is paid once.
+//!
+//! - `command_line`: exit status, files, messages and bits of the results;
+//! - `plot`: figures from stored results, and comparisons of runs;
+//! - `stream`: runs that are killed, sharded, or lose their disk.
+
+mod command_line;
+mod plot;
+mod stream;
