@@ -102,15 +102,22 @@ fn drawn_law(
     row.sample()
 }
 
+/// Returns the laws of random systems: those of the table when the corpus was frozen, so that a
+/// seed keeps its system. The conformance tests run every law of the table.
+fn laws_of_seeds() -> Vec<&'static LawInfo> {
+    TABLE.iter().copied().filter(|row| row.name != "coulomb-tanh").collect()
+}
+
 /// Returns a system with one to four degrees of freedom, full matrices and one or two joints,
 /// with an excitation frequency in rad/s. The joints have any laws of the table.
 pub fn random_system(seed: u64) -> (System, f64) {
-    random_system_of(seed, TABLE)
+    random_system_of(seed, &laws_of_seeds())
 }
 
 /// Returns such a system with law parameters from their whole ranges.
 pub fn random_system_of_any_parameters(seed: u64) -> (System, f64) {
-    system_with(seed, &|random| any_law(random, TABLE))
+    let laws = laws_of_seeds();
+    system_with(seed, &|random| any_law(random, &laws))
 }
 
 /// Returns such a system with joints of these laws.
@@ -181,7 +188,7 @@ pub fn random_row(seed: u64) -> (System, f64) {
         if random.unit() < 0.5 {
             continue;
         }
-        let law = random_law(&mut random, TABLE);
+        let law = random_law(&mut random, &laws_of_seeds());
         // the first direction of a law acts between the pair, the others against the ground
         let axis = |d: usize| match d {
             0 => Axis::new(vec![(i, 1.0), ((i + 1) % count, -1.0)]),

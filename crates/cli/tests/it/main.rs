@@ -1,9 +1,11 @@
 //! Tests of the command `stickslip`. One binary, so that linking is paid once.
 //!
 //! - `command_line`: exit status, files, messages and bits of the results;
+//! - `golden`: texts as users read them;
 //! - `plot`: figures from stored results, and comparisons of runs;
 //! - `stream`: runs that are killed, sharded, or lose their disk.
 
 mod command_line;
+mod golden;
 mod plot;
 mod stream;

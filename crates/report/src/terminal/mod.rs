@@ -404,23 +404,7 @@ mod tests {
     fn tables_have_engineering_units_and_sensible_digits() {
         let files = [PathBuf::from("results/fig02/loops_summary.csv"), PathBuf::from("results/fig02/figure.svg")];
         let text = Terminal::default().text(&samples::hysteresis(), &files);
-        let expected = "\
-Hysteresis loops of elastic dry friction
-Pust, Pesek, Radolfova (2015), Fig. 2
-
-loops_summary
-  kt  amplitude (mm)  dissipation (µJ)  equivalent stiffness (N/m)  equivalent damping (kg/s)
-   2             1.0               0.0                           0                    0.00000
-   2             1.5               4.0                           5                    0.01320
-   2             2.5              12.0                          15                    0.03960
-  10             1.0               6.4                           8                    0.02112
-  10             1.5              10.4                          13                    0.03432
-  10             2.5              18.4                          23                    0.06072
-
-fig02: 6 converged in 125 ms
-results/fig02/: loops_summary.csv, figure.svg
-";
-        assert_eq!(text, expected);
+        insta::assert_snapshot!(text);
     }
 
     #[test]

@@ -118,23 +118,10 @@ fn mean_of_arctangent(y: f64, e: f64) -> SampleMeans {
     if reach < 0.2 * (1.0 + y.abs()) {
         return SampleMeans::by_quadrature(y, e, |x| (x.atan(), 1.0 / (1.0 + x * x)));
     }
-    let (low, high) = (y - reach, y + reach);
-    let (low_value, high_value) = (low.atan(), high.atan());
-    let once = |x: f64, atan: f64| x * atan - 0.5 * (x * x).ln_1p();
-    let twice = |x: f64, atan: f64| 0.5 * (x * x - 1.0) * atan + 0.5 * x - 0.5 * x * (x * x).ln_1p();
-    let (low_1, high_1) = (once(low, low_value), once(high, high_value));
-    let zeroth = (high_1 - low_1) / (2.0 * reach);
-    let first =
-        (high_1 + low_1) / (2.0 * reach) - (twice(high, high_value) - twice(low, low_value)) / (2.0 * reach * reach);
-    let slope = (high_value - low_value) / (2.0 * reach);
-    let sign = e.signum();
-    SampleMeans {
-        zeroth,
-        first: first * sign,
-        slope,
-        slope_first: ((high_value + low_value) / (2.0 * reach) - zeroth / reach) * sign,
-        slope_second: slope - 2.0 * first / reach,
-    }
+    SampleMeans::by_antiderivatives(y, e, |x| {
+        let (atan, log) = (x.atan(), (x * x).ln_1p());
+        [atan, x * atan - 0.5 * log, 0.5 * (x * x - 1.0) * atan + 0.5 * x - 0.5 * x * log]
+    })
 }
 
 /// Returns `λ` and `dλ/dy` of `λ + w = y`, `λ = (2/π) atan(s w)`.

@@ -35,6 +35,7 @@ mod coulomb;
 mod coulomb_2d;
 mod coulomb_2d_arctan;
 mod coulomb_arctan;
+mod coulomb_tanh;
 mod cubic;
 mod dahl;
 mod friction_contact;
@@ -57,6 +58,7 @@ pub use coulomb::Coulomb;
 pub use coulomb_2d::Coulomb2d;
 pub use coulomb_2d_arctan::Coulomb2dArctan;
 pub use coulomb_arctan::CoulombArctan;
+pub use coulomb_tanh::CoulombTanh;
 pub use cubic::Cubic;
 pub use dahl::Dahl;
 pub use friction_contact::FrictionContact;
@@ -80,6 +82,7 @@ pub use valanis::Valanis;
 pub const TABLE: &[&LawInfo] = &[
     &coulomb::INFO,
     &coulomb_arctan::INFO,
+    &coulomb_tanh::INFO,
     &stribeck::INFO,
     &stribeck_arctan::INFO,
     &jenkins::INFO,

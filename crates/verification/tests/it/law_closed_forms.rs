@@ -5,8 +5,8 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::law::{
-    BoucWen, Cubic, Dahl, FrictionContact, Gap, IdealElement, Iwan, Jenkins, Jenkins2d, Law, LawInfo, LuGre, Stribeck,
-    Valanis,
+    BoucWen, CoulombTanh, Cubic, Dahl, FrictionContact, Gap, IdealElement, Iwan, Jenkins, Jenkins2d, Law, LawInfo,
+    LuGre, Stribeck, Valanis,
 };
 use stickslip_verification::law_driver::{Instant, View, dissipated, forces, steps};
 use stickslip_verification::{close, integral, near, zero};
@@ -608,5 +608,55 @@ fn stribecks_describing_function_is_a_mean_of_its_curve() {
         let found = law.describing_function(a, omega);
         close("damping", found.im, expected, 1e-3);
         near("stiffness", found.re, 0.0, 1e-3 * expected);
+    }
+}
+
+/// `tanh ln k = (k² - 1)/(k² + 1)`.
+#[test]
+fn coulomb_tanh_has_its_forces() {
+    let law = CoulombTanh { limit: 2.0, velocity: 0.03 };
+    for (k, share) in [(1.0f64, 0.0), (2.0, 0.6), (3.0, 0.8), (7.0, 0.96)] {
+        for (velocity, expected) in [(0.03 * k.ln(), 2.0 * share), (-0.03 * k.ln(), -2.0 * share)] {
+            let motion = move |time: f64| ([velocity * time, 0.0, 0.0], [velocity, 0.0, 0.0]);
+            for view in [View::Rate, View::Prox] {
+                let found = forces(&law, view, &motion, &[0.0, 1.0])[1][0];
+                // the driver asks the resolvent with a penalty of 1e6 N s/m, so its argument rounds
+                let argument = if view == View::Prox { 1e6 * velocity.abs() } else { 1.0 };
+                near(&format!("{view:?}"), found, expected, 16.0 * f64::EPSILON * argument.max(1.0));
+            }
+        }
+    }
+    // far beyond the limit there is no overflow
+    let fast = |time: f64| ([1e6 * time, 0.0, 0.0], [1e6, 0.0, 0.0]);
+    near("fast", forces(&law, View::Rate, &fast, &[0.0, 1.0])[1][0], 2.0, 0.0);
+}
+
+/// The loss of a cycle under `u = a cos Ωt`, `W = limit a ∮ tanh(z cos θ) cos θ dθ` with
+/// `z = aΩ/velocity`. Reference: `scipy.integrate.quad`. Limits: `π z limit a` for a small z, and
+/// `(4 - π²/(6 z²)) limit a` for a large one.
+#[test]
+fn coulomb_tanh_loses_the_integral_of_its_force() {
+    let (a, omega, limit) = (1e-3, 50.0, 2.0);
+    let integrals = [
+        (1e-3, 1e-3 * PI),
+        (0.5, 1.480_138_846_758_928_5),
+        (1.0, 2.549_954_369_506_768),
+        (3.0, 3.793_113_647_195_051_3),
+        (100.0, 4.0 - PI * PI / 6e4),
+    ];
+    for (z, integral) in integrals {
+        let law = CoulombTanh { limit, velocity: a * omega / z };
+        let motion = |time: f64| {
+            let (sine, cosine) = (omega * time).sin_cos();
+            ([a * cosine, 0.0, 0.0], [-a * omega * sine, 0.0, 0.0])
+        };
+        let times = steps(TAU / omega, 1, FINE);
+        for view in [View::Rate, View::Prox] {
+            let loss = dissipated(&motion, &times, &forces(&law, view, &motion, &times));
+            near(&format!("{z} {view:?}"), loss / (limit * a), integral, 1e-6);
+        }
+        // the work of the first harmonic is the loss: `W = π a² Im k`
+        let harmonic = PI * a * a * law.describing_function(a, omega).im;
+        near(&format!("{z} first harmonic"), harmonic / (limit * a), integral, 1e-2 * integral);
     }
 }
