@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("frequency (Hz)  tuned (mm)  worst blade, mistuned (mm)");
     for step in 0..=20 {
         let hertz = 120.0 + 0.2 * f64::from(step);
-        let [one, all] = [&mut tuned, &mut mistuned].map(|solver| solver.orbit(TAU * hertz, None));
+        let [one, all] = [&mut tuned, &mut mistuned].map(|solver| solver.orbit(TAU * hertz));
         let largest = |orbit: &stickslip::Orbit| orbit.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
         println!("{hertz:14.1}  {:10.4}  {:10.4}", 1e3 * largest(&one?), 1e3 * largest(&all?));
     }

@@ -42,13 +42,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let first = (modulus / density).sqrt() / 4.0;
     println!("first natural frequency without friction: {first:.1} Hz");
     let mut solver = Auto.solver(&system)?;
-    let mut start: Option<Vec<f64>> = None;
+    let mut seed = None;
     for step in 0..=10 {
         let hertz = first * (0.95 + 0.02 * f64::from(step));
-        let orbit = solver.orbit(std::f64::consts::TAU * hertz, start.as_deref())?;
+        let orbit = solver.orbit_near(std::f64::consts::TAU * hertz, seed.as_ref())?;
         let (tip, joint) = (&orbit.places[end], &orbit.joints[0]);
         println!("{hertz:7.1} Hz: {:.3} µm, {:.2e} J a period", 1e6 * tip.amplitude(), joint.dissipation);
-        start = Some(orbit.initial_state);
+        seed = Some(orbit.seed());
     }
     Ok(())
 }

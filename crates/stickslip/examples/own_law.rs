@@ -66,7 +66,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let omega = 100.0;
     let expected = (2.0 * 3.0 * std::f64::consts::PI / (8.0 * 5.0)).sqrt() / omega;
     for method in [&Shooting::default() as &dyn Method, &HarmonicBalance::default()] {
-        let orbit = method.solver(&system)?.orbit(omega, None)?;
+        let orbit = method.solver(&system)?.orbit(omega)?;
         println!(
             "{}: {:.4} mm; one harmonic would give {:.4} mm",
             method.name(),
