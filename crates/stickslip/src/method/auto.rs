@@ -27,24 +27,45 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     build: |_| Ok(Box::new(Auto)),
 };
 
-/// Most joints with smooth laws for shooting. The cost of its sensitivity grows with the cube
-/// of the state size; the cost of harmonic balance grows linearly.
-const SHOOTING_JOINTS: usize = 12;
-/// Most degrees of freedom for shooting. Measured on chains with two joints and 30, 60, 100 and
-/// 150 degrees of freedom: 0.014, 0.1, 0.5 and 2.3 s per point; harmonic balance takes 0.004 to
-/// 0.009 s. A chain of 60 given by matrices, with a `bouc-wen`, takes minutes; harmonic balance
-/// takes 1.3 s.
-const SHOOTING_DOFS: usize = 24;
-/// Most multiplications per orbit for event-driven, about one minute, whatever the other
-/// methods cost.
-const EVENT_DRIVEN_WORK: f64 = 3e11;
-/// Most multiplications for event-driven as the second method, a few seconds. Measured: a chain
-/// of 40 masses takes 1.2 s per point. A chain of 80 masses is above the bound and takes ten
-/// seconds or more.
-const FALLBACK_WORK: f64 = 1e10;
-/// Factor on the cost of an orbit with a close warm start. The spacing of the orbits is unknown
-/// here, so the factor lies between that cost and the cost without a warm start.
-const SPACING_FACTOR: f64 = 2.0;
+/// Limits at which `auto` prefers one method to another.
+#[derive(Debug, Clone, Copy)]
+struct AutoSettings {
+    /// Most joints with smooth laws for shooting. The cost of its sensitivity grows with the cube
+    /// of the state size; the cost of harmonic balance grows linearly.
+    shooting_joints: usize,
+    /// Most degrees of freedom for shooting. Measured on chains with two joints and 30, 60, 100
+    /// and 150 degrees of freedom: 0.014, 0.1, 0.5 and 2.3 s per point; harmonic balance takes
+    /// 0.004 to 0.009 s. A chain of 60 given by matrices, with a `bouc-wen`, takes minutes;
+    /// harmonic balance takes 1.3 s.
+    shooting_dofs: usize,
+    /// Most multiplications per orbit for event-driven, about one minute, whatever the other
+    /// methods cost.
+    event_driven_work: f64,
+    /// Most multiplications for event-driven as the second method, a few seconds. Measured: a
+    /// chain of 40 masses takes 1.2 s per point. A chain of 80 masses is above the bound and takes
+    /// ten seconds or more.
+    fallback_work: f64,
+    /// Factor on the cost of an orbit with a close warm start. The spacing of the orbits is
+    /// unknown here, so the factor lies between that cost and the cost without a warm start.
+    spacing_factor: f64,
+    /// Cost factor of an event-driven orbit without a warm start. Measured in rings of `coulomb`
+    /// with 24, 36 and 60 masses: 57 ms, 0.34 s and 4.8 s; 36 sectors of two masses 1.8 s, 100 of
+    /// one 6 to 17 s.
+    cold_start_factor: f64,
+}
+
+impl Default for AutoSettings {
+    fn default() -> Self {
+        AutoSettings {
+            shooting_joints: 12,
+            shooting_dofs: 24,
+            event_driven_work: 3e11,
+            fallback_work: 1e10,
+            spacing_factor: 2.0,
+            cold_start_factor: 3.0,
+        }
+    }
+}
 
 /// Picks a method by the laws and the number of joints.
 ///
@@ -77,10 +98,11 @@ impl Auto {
 
     /// Picks a method by the laws and sizes.
     fn pick_by_laws(system: &System) -> (Box<dyn Method>, String) {
+        let settings = AutoSettings::default();
         let joints = system.joints().len();
         let smooth = system.joints().iter().all(|joint| joint.law().rate().is_some());
         let massless = (0..system.dofs()).any(|dof| system.structure().diagonal_mass(dof) <= 0.0);
-        let events = event_driven::orbit_work(system).map(|work| SPACING_FACTOR * work);
+        let events = event_driven::orbit_work(system).map(|work| settings.spacing_factor * work);
         let balance =
             |because: String| -> (Box<dyn Method>, String) { (Box::new(HarmonicBalance::default()), because) };
         if joints > 0 && system.cyclic().is_some() {
@@ -90,7 +112,7 @@ impl Auto {
         } else if !system.structure().has_definite_mass() {
             balance("the mass matrix is singular".to_owned())
         } else if let Some(events) = events {
-            if events > EVENT_DRIVEN_WORK || events > harmonic_balance::orbit_work(system) {
+            if events > settings.event_driven_work || events > harmonic_balance::orbit_work(system) {
                 let sizes = format!("{} degrees of freedom and {joints} joints", system.dofs());
                 return balance(format!("faster than event-driven with {sizes}"));
             }
@@ -98,17 +120,21 @@ impl Auto {
             (Box::new(EventDriven), because.to_owned())
         } else if has_falling_friction(system)
             && IntegratorKind::of(system, None) == IntegratorKind::Switched
-            && system.dofs() <= SHOOTING_DOFS
-            && joints <= SHOOTING_JOINTS
+            && system.dofs() <= settings.shooting_dofs
+            && joints <= settings.shooting_joints
         {
             let because = "friction falls with velocity along a smooth curve; shooting locates its switches";
             (Box::new(Shooting::default()), because.to_owned())
         } else if !smooth {
             balance("the laws are neither all exact nor all smooth".to_owned())
-        } else if system.dofs() > SHOOTING_DOFS {
-            balance(format!("{} degrees of freedom exceed the limit of {SHOOTING_DOFS} for shooting", system.dofs()))
-        } else if joints > SHOOTING_JOINTS {
-            balance(format!("{joints} joints exceed the limit of {SHOOTING_JOINTS} for shooting"))
+        } else if system.dofs() > settings.shooting_dofs {
+            balance(format!(
+                "{} degrees of freedom exceed the limit of {} for shooting",
+                system.dofs(),
+                settings.shooting_dofs
+            ))
+        } else if joints > settings.shooting_joints {
+            balance(format!("{joints} joints exceed the limit of {} for shooting", settings.shooting_joints))
         } else {
             (Box::new(Shooting::default()), "the laws are smooth".to_owned())
         }
@@ -154,12 +180,17 @@ struct WithFallback<'a> {
 impl<'a> WithFallback<'a> {
     /// Returns the second method. It is never `transient`, which can take minutes.
     fn fallback(&self) -> Option<(&'static str, Box<dyn Solver + Send + 'a>)> {
+        let settings = AutoSettings::default();
         let (system, joints) = (self.system, self.system.joints().len());
         let cheap = |name: &str| match name {
             harmonic_balance::NAME => true,
             name if name == event_driven::INFO.name => event_driven::orbit_work(system)
-                .is_some_and(|work| event_driven::COLD_START_FACTOR * work <= FALLBACK_WORK),
-            name => name != transient::INFO.name && system.dofs() <= SHOOTING_DOFS && joints <= SHOOTING_JOINTS,
+                .is_some_and(|work| settings.cold_start_factor * work <= settings.fallback_work),
+            name => {
+                name != transient::INFO.name
+                    && system.dofs() <= settings.shooting_dofs
+                    && joints <= settings.shooting_joints
+            }
         };
         let methods = alternatives(system).methods;
         let name = methods.into_iter().find(|name| *name != self.chosen && cheap(name))?;

@@ -25,16 +25,15 @@ pub(super) const PERIOD: MethodOption = MethodOption {
     doc: "excitation periods after which the orbit repeats; the method also finds orbits that repeat earlier; default 1",
 };
 
-/// Upper bound of [`PERIOD`]; a longer motion does not count as periodic.
-const MOST_PERIODS: f64 = 100.0;
-
 /// Reads the option [`PERIOD`] of a method.
 pub(super) fn periods(method: &'static str, options: &Options) -> Result<usize, MethodError> {
+    // A motion with a longer period does not count as periodic.
+    let most_periods: f64 = 100.0;
     let periods = options.get(PERIOD.key).copied().unwrap_or(1.0);
-    if (1.0..=MOST_PERIODS).contains(&periods) {
+    if (1.0..=most_periods).contains(&periods) {
         return Ok(periods as usize);
     }
-    let message = format!("must lie between 1 and {MOST_PERIODS}, found {periods}");
+    let message = format!("must lie between 1 and {most_periods}, found {periods}");
     Err(MethodError::option(method, PERIOD.key, message))
 }
 

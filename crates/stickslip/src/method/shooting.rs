@@ -5,10 +5,10 @@
 //! for the transient to decay proves nothing. Newton's method with the exact derivative of the
 //! integrator's return map closes the orbit instead.
 
-use super::event_driven::GAP_PER_DISTANCE;
+use super::event_driven::EventDrivenSettings;
 use super::flow::Flow;
 use super::flow::assembly::{Assembly, NEAR_REST};
-use super::flow::average_acceleration::equal_steps::{AverageAccelerationFlow, INITIAL_STEPS, MAX_STEPS, estimate};
+use super::flow::average_acceleration::equal_steps::{AverageAccelerationFlow, EqualStepSettings, estimate};
 use super::flow::integrator_choice::IntegratorKind;
 use super::flow::radau::step_size_control::{RadauFlow, StepSizes};
 use super::flow::set_valued::located_switches::SetValuedFlow;
@@ -35,50 +35,79 @@ use std::sync::Arc;
 
 const NAME: &str = "shooting";
 
-/// Default relative error per step. Orbits of the paper's couple are then within 1e-7 (see the
-/// verification tests).
-const TOLERANCE: f64 = 1e-8;
-/// Largest ratio of successive steps that reuse the derivative of the search.
-const SHRINK_RATIO: f64 = 0.3;
-/// Residual of the first search. Every run chooses its own steps there, so the map is smooth
-/// only to about their error.
-const FREE_RESIDUAL: f64 = 1e-6;
-/// Smallest relative error per step, and residual, of the coarse search before orbits with
-/// shorter steps. Longer steps jump over the layers of a law and would still take two thirds of
-/// the time.
-const LONG_STEPS: f64 = 1e-8;
-const COARSE_RESIDUAL: f64 = 1e-5;
-/// Residual at which the orbit is closed on the fixed steps of the last free run; the map is
-/// smooth on them.
-const CLOSED: f64 = 1e-11;
-/// Residual at which an orbit between located switches is closed; every run chooses its own
-/// steps.
-const CLOSED_SWITCHED: f64 = 1e-10;
-/// Most meshes of steps for one orbit. The first is as good as the first search; the second is
-/// nearly always enough.
-const MESHES: usize = 6;
-/// Largest move, in errors per step, of the state when the orbit is closed on a good mesh. The
-/// choice of the steps alone moves the state by this much. When a settling motion changes by
-/// less per return, it keeps its steps.
-const SETTLED: f64 = 100.0;
-/// Largest relative energy gap of a converged orbit, and largest relative move on the last
-/// mesh.
-const ENERGY_GAP: f64 = 1e-5;
-/// Error of an orbit in equal steps, in errors per step of the stiff integration: 1e-5 of the
-/// motion by default.
-const EQUAL_STEPS: f64 = 1e3;
-/// Residual at which an orbit in equal steps is closed.
-const CLOSED_STEPS: f64 = 1e-10;
-/// Smallest relative error per step, and distance to the orbit, of the first phase of waiting,
-/// which needs no accuracy.
-const COARSE: f64 = 1e-5;
-/// Most returns of this phase. If it fails, the motion is integrated accurately from the start.
-const COARSE_RETURNS: usize = 1024;
-/// Largest distance between the same orbit in steps of length h and 2h, relative to the motion.
-/// 256 steps per period have an error of 1e-3 at a Q of ten; the error is proportional to Q.
-const SAME_ORBIT: f64 = 0.1;
-/// Instants of a return at which such orbits are compared.
-const INSTANTS: usize = 8;
+/// Settings of the search for an orbit by time integration.
+#[derive(Debug, Clone, Copy)]
+struct ShootingSettings {
+    /// Largest ratio of successive steps that reuse the derivative of the search.
+    shrink_ratio: f64,
+    /// Residual of the first search. Every run chooses its own steps there, so the map is smooth
+    /// only to about their error.
+    free_residual: f64,
+    /// Smallest relative error per step of the coarse search before orbits with shorter steps.
+    /// Longer steps jump over the layers of a law and would still take two thirds of the time.
+    long_steps: f64,
+    /// Residual of this coarse search.
+    coarse_residual: f64,
+    /// Residual at which the orbit is closed on the fixed steps of the last free run; the map is
+    /// smooth on them.
+    closed: f64,
+    /// Residual at which an orbit between located switches is closed; every run chooses its own
+    /// steps.
+    closed_switched: f64,
+    /// Most meshes of steps for one orbit. The first is as good as the first search; the second is
+    /// nearly always enough.
+    meshes: usize,
+    /// Largest move, in errors per step, of the state when the orbit is closed on a good mesh. The
+    /// choice of the steps alone moves the state by this much. When a settling motion changes by
+    /// less per return, it keeps its steps.
+    settled: f64,
+    /// Largest relative energy gap of a converged orbit, and largest relative move on the last
+    /// mesh.
+    energy_gap: f64,
+    /// Error of an orbit in equal steps, in errors per step of the stiff integration: 1e-5 of the
+    /// motion by default.
+    equal_steps: f64,
+    /// Residual at which an orbit in equal steps is closed.
+    closed_steps: f64,
+    /// Smallest relative error per step, and distance to the orbit, of the first phase of waiting,
+    /// which needs no accuracy.
+    coarse_settling: f64,
+    /// Most returns of the first phase of waiting. If it fails, the motion is integrated
+    /// accurately from the start.
+    coarse_returns: usize,
+    /// Largest distance between the same orbit in equal steps of length h and 2h, relative to the
+    /// motion. 256 steps per period have an error of 1e-3 at a Q of ten; the error is proportional
+    /// to Q.
+    same_orbit: f64,
+    /// Instants of a return at which orbits in equal steps are compared.
+    instants: usize,
+    /// Fraction of the vibration in its state below which an energy imbalance is attributed to
+    /// lost digits.
+    small_vibration: f64,
+}
+
+impl Default for ShootingSettings {
+    fn default() -> Self {
+        ShootingSettings {
+            shrink_ratio: 0.3,
+            free_residual: 1e-6,
+            long_steps: 1e-8,
+            coarse_residual: 1e-5,
+            closed: 1e-11,
+            closed_switched: 1e-10,
+            meshes: 6,
+            settled: 100.0,
+            energy_gap: 1e-5,
+            equal_steps: 1e3,
+            closed_steps: 1e-10,
+            coarse_settling: 1e-5,
+            coarse_returns: 1024,
+            same_orbit: 0.1,
+            instants: 8,
+            small_vibration: 1e-3,
+        }
+    }
+}
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -100,7 +129,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         PERIOD,
     ],
     build: |options| {
-        let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
+        let tolerance = options.get("tolerance").copied().unwrap_or(Shooting::default().tolerance);
         if !(1e-13..=1e-3).contains(&tolerance) {
             let message = format!("must lie between 1e-13 and 1e-3, found {tolerance}");
             return Err(MethodError::option(NAME, "tolerance", message));
@@ -134,7 +163,8 @@ pub struct Shooting {
 
 impl Default for Shooting {
     fn default() -> Self {
-        Shooting { tolerance: TOLERANCE, width: None, period: 1 }
+        // Orbits of the couple are within 1e-7 (see the verification tests).
+        Shooting { tolerance: 1e-8, width: None, period: 1 }
     }
 }
 
@@ -183,6 +213,7 @@ impl StepIntegrator {
 
 /// Finds orbits by time integration, by Newton's method or by waiting until the motion settles.
 pub(super) struct ShootingSolver<'a> {
+    settings: ShootingSettings,
     system: &'a System,
     shared: Arc<System>,
     /// Name of the method that uses this solver.
@@ -216,7 +247,7 @@ impl ReturnMap for ShootingSolver<'_> {
     }
     fn report_change(&mut self, change: f64) {
         if let StepIntegrator::Smooth(flow) = &mut self.stepping {
-            let apart = change > SETTLED * flow.tolerance;
+            let apart = change > self.settings.settled * flow.tolerance;
             flow.lengths = if apart { StepSizes::Chosen } else { StepSizes::Halved };
         }
     }
@@ -264,6 +295,7 @@ impl<'a> ShootingSolver<'a> {
             }
         };
         Ok(ShootingSolver {
+            settings: ShootingSettings::default(),
             system,
             shared: Arc::new(system.clone()),
             name,
@@ -330,10 +362,10 @@ impl<'a> ShootingSolver<'a> {
         let search = self.search;
         self.set_lengths(StepSizes::Chosen);
         if let ClosingMethod::Settle { tolerance, returns } = search {
-            let fine = self.set_tolerance(self.tolerance.max(COARSE * self.vibration_fraction));
+            let fine = self.set_tolerance(self.tolerance.max(self.settings.coarse_settling * self.vibration_fraction));
             let coarse = ClosingMethod::Settle {
-                tolerance: tolerance.max(COARSE * self.vibration_fraction),
-                returns: returns.min(COARSE_RETURNS),
+                tolerance: tolerance.max(self.settings.coarse_settling * self.vibration_fraction),
+                returns: returns.min(self.settings.coarse_returns),
             };
             let near = coarse.find(self, start, |shooter| shooter.first_state(aim.omega), aim);
             self.set_tolerance(fine);
@@ -350,7 +382,7 @@ impl<'a> ShootingSolver<'a> {
         let near = self.coarse_search(start, aim, &mut iterations);
         let start = near.as_ref().map(|near| near.state.as_slice()).or(start);
         let (near, fine) = match near {
-            Some(near) if near.residual <= COARSE_RESIDUAL => (near, self.long_steps() == self.tolerance),
+            Some(near) if near.residual <= self.settings.coarse_residual => (near, self.long_steps() == self.tolerance),
             _ => {
                 let near = search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
                 iterations += near.iterations;
@@ -372,17 +404,20 @@ impl<'a> ShootingSolver<'a> {
             }
             self.set_lengths(StepSizes::Repeated);
             self.stepping.flow().set_recording(true);
-            let closed = close(self, &state, ClosingTargets { residual: CLOSED, ..aim });
+            let residual = self.settings.closed;
+            let closed = close(self, &state, ClosingTargets { residual, ..aim });
             self.stepping.flow().set_recording(false);
             let closed = closed?;
             iterations += closed.iterations;
             let moved: Vec<f64> = closed.state.iter().zip(&state).map(|(a, b)| a - b).collect();
             let moved = norm(&self.weights, &moved) / self.size(&closed.state, aim);
-            if moved <= SETTLED * self.tolerance || (mesh == MESHES && moved <= ENERGY_GAP) {
+            if moved <= self.settings.settled * self.tolerance
+                || (mesh == self.settings.meshes && moved <= self.settings.energy_gap)
+            {
                 // the last run was that of the closed state
                 return Ok(ClosedState { iterations, ..closed });
             }
-            if mesh == MESHES {
+            if mesh == self.settings.meshes {
                 return Err(OrbitError::not_converged(NAME, aim.omega, iterations, moved));
             }
             (state, fits) = (closed.state, false);
@@ -392,7 +427,7 @@ impl<'a> ShootingSolver<'a> {
     /// Finds the orbit between located switches. The return map is smooth to the error of its
     /// steps.
     fn switched_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
-        let aim = ClosingTargets { residual: CLOSED_SWITCHED * self.vibration_fraction, ..aim };
+        let aim = ClosingTargets { residual: self.settings.closed_switched * self.vibration_fraction, ..aim };
         let closed = self.search.find(self, start, |shooter| shooter.first_state(aim.omega), aim)?;
         self.record(&closed)?;
         Ok(closed)
@@ -400,7 +435,7 @@ impl<'a> ShootingSolver<'a> {
 
     /// Returns the relative error per step of the coarse search.
     fn long_steps(&self) -> f64 {
-        self.tolerance.max(LONG_STEPS * self.vibration_fraction)
+        self.tolerance.max(self.settings.long_steps * self.vibration_fraction)
     }
 
     /// Approaches the orbit with long steps; returns `None` if they fail.
@@ -415,13 +450,9 @@ impl<'a> ShootingSolver<'a> {
             None => self.first_state(aim.omega),
         };
         let fine = self.set_tolerance(self.long_steps());
-        let near = newton_with_line_search(
-            self,
-            &first,
-            ClosingTargets { residual: COARSE_RESIDUAL, ..aim },
-            LargeIncrease::Ends,
-            iterations,
-        );
+        let residual = self.settings.coarse_residual;
+        let near =
+            newton_with_line_search(self, &first, ClosingTargets { residual, ..aim }, LargeIncrease::Ends, iterations);
         self.set_tolerance(fine);
         near.ok()
     }
@@ -439,7 +470,7 @@ impl<'a> ShootingSolver<'a> {
     ) -> Option<Vec<f64>> {
         let (mut state, mut before) = (near.state.clone(), f64::INFINITY);
         let mut known = fine.then(|| near.gap.clone());
-        for _ in 0..MESHES {
+        for _ in 0..self.settings.meshes {
             *iterations += 1;
             let gap = match known.take() {
                 Some(gap) => gap,
@@ -452,10 +483,10 @@ impl<'a> ShootingSolver<'a> {
             let step = newton_step(&near.derivative, &gap, aim.sign, &self.weights);
             state.iter_mut().zip(step.iter()).for_each(|(z, d)| *z += d);
             let moved = norm(&self.weights, step.as_slice()) / self.size(&state, aim);
-            if moved <= SETTLED * self.tolerance {
+            if moved <= self.settings.settled * self.tolerance {
                 return Some(state);
             }
-            if moved.is_nan() || moved > SHRINK_RATIO * before {
+            if moved.is_nan() || moved > self.settings.shrink_ratio * before {
                 return None;
             }
             before = moved;
@@ -507,10 +538,11 @@ impl<'a> ShootingSolver<'a> {
     /// Finds the orbit in equal steps, and halves the steps until the estimated error is below
     /// the tolerance.
     fn stepped_orbit(&mut self, start: Option<&[f64]>, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
-        let tolerance = EQUAL_STEPS * self.tolerance;
-        let aim = ClosingTargets { residual: CLOSED_STEPS, ..aim };
+        let steps = EqualStepSettings::default();
+        let tolerance = self.settings.equal_steps * self.tolerance;
+        let aim = ClosingTargets { residual: self.settings.closed_steps, ..aim };
         let search = self.search;
-        let mut count = INITIAL_STEPS * self.periods;
+        let mut count = steps.initial_steps * self.periods;
         self.set_count(count);
         // steps too long for the states of a law are not a failure: halve them
         let mut coarse = loop {
@@ -518,7 +550,7 @@ impl<'a> ShootingSolver<'a> {
                 Err(OrbitError::Breakdown {
                     cause: IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. },
                     ..
-                }) if count < MAX_STEPS => {
+                }) if count < steps.max_steps => {
                     count *= 2;
                     self.set_count(count);
                 }
@@ -543,7 +575,7 @@ impl<'a> ShootingSolver<'a> {
                 let missing = Some(error.max(fine.distance.unwrap_or(0.0)));
                 return Ok(ClosedState { iterations, distance: missing, ..fine });
             }
-            if count >= MAX_STEPS {
+            if count >= steps.max_steps {
                 let cause = IntegrationError::Unresolved { steps: count, estimate: error, tolerance };
                 return Err(OrbitError::Breakdown { method: self.name, omega: aim.omega, cause });
             }
@@ -560,10 +592,10 @@ impl<'a> ShootingSolver<'a> {
         self.record(closed)?;
         let path = self.stepping.path(&self.shared, Symmetry::FullPeriod, self.duration);
         let at = |k: usize| {
-            let sample = path.sample(self.duration * k as f64 / INSTANTS as f64);
+            let sample = path.sample(self.duration * k as f64 / self.settings.instants as f64);
             sample.displacement.into_iter().chain(sample.velocity).collect()
         };
-        Ok((0..INSTANTS).map(at).collect())
+        Ok((0..self.settings.instants).map(at).collect())
     }
 
     /// Finds the settled orbit in finer steps by Newton's method; returns `None` if that fails
@@ -573,7 +605,7 @@ impl<'a> ShootingSolver<'a> {
             return None;
         }
         let fine = close(self, &settled.state, aim).ok()?;
-        (self.relative_distance(&fine.state, &settled.state, aim) <= SAME_ORBIT).then_some(fine)
+        (self.relative_distance(&fine.state, &settled.state, aim) <= self.settings.same_orbit).then_some(fine)
     }
 
     /// Returns the distance of two states, or of their displacements and velocities, relative
@@ -594,8 +626,8 @@ impl<'a> ShootingSolver<'a> {
         let at_its_limit =
             measured.joints.iter().any(|joint| joint.slip_fraction > 0.0 && measured.stuck.contains(&joint.name));
         // the residual of the closed state may do work on a vibration as small as rest
-        let left = CLOSED * norm(&self.weights, &closed.state) * self.rest;
-        let least = f64::max(CONSERVATIVE_WORK * self.rest * self.rest, left / ENERGY_GAP);
+        let left = self.settings.closed * norm(&self.weights, &closed.state) * self.rest;
+        let least = f64::max(CONSERVATIVE_WORK * self.rest * self.rest, left / self.settings.energy_gap);
         Orbit {
             method: self.name,
             omega,
@@ -630,6 +662,7 @@ impl<'a> ShootingSolver<'a> {
 
 impl Solver for ShootingSolver<'_> {
     fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let steps = EqualStepSettings::default();
         let (omega, start) = (request.omega, request.seed.map(|seed| &seed.state[..]));
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
@@ -645,13 +678,19 @@ impl Solver for ShootingSolver<'_> {
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.omega = omega;
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
-        let aim =
-            ClosingTargets { method: self.name, omega, residual: FREE_RESIDUAL, distance: f64::INFINITY, sign, rest };
+        let aim = ClosingTargets {
+            method: self.name,
+            omega,
+            residual: self.settings.free_residual,
+            distance: f64::INFINITY,
+            sign,
+            rest,
+        };
         let near;
         let known = start.filter(|state| state.len() == self.weights.len());
         let start = if self.periods > 1 && known.is_none() {
             self.set_lengths(StepSizes::Chosen);
-            self.set_count(INITIAL_STEPS * self.periods);
+            self.set_count(steps.initial_steps * self.periods);
             let first = self.first_state(omega);
             near = iterate_map(self, first, sign);
             Some(near.as_slice())
@@ -679,14 +718,15 @@ impl Solver for ShootingSolver<'_> {
         if self.search == ClosingMethod::Newton {
             let system = self.system;
             let equilibrium = self.equilibrium.clone();
-            let aim = ClosingTargets { residual: CLOSED_STEPS, ..aim };
+            let aim = ClosingTargets { residual: self.settings.closed_steps, ..aim };
             orbit = select_equilibrium_orbit(self, (system, equilibrium.as_ref()), orbit, aim);
         }
         let share = self.share_in(&orbit, rest);
         vibration_share::rescale_evidence(&mut orbit.evidence, share);
-        let allowed = ENERGY_GAP + GAP_PER_DISTANCE * orbit.evidence.error_estimate.unwrap_or(0.0);
+        let allowed = self.settings.energy_gap
+            + EventDrivenSettings::default().gap_per_distance * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
-            if share < vibration_share::SMALL {
+            if share < self.settings.small_vibration {
                 return Err(self.too_few_digits(omega, share));
             }
             return Err(OrbitError::Evidence { method: self.name, omega, energy_gap: orbit.evidence.energy_gap });

@@ -15,11 +15,6 @@ use std::sync::Arc;
 
 const NAME: &str = "transient";
 
-/// Relative error per step for smooth laws.
-const TOLERANCE: f64 = 1e-9;
-/// Samples per interval of a free decay.
-const SAMPLES_PER_INTERVAL: usize = 64;
-
 /// The excitation of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Excitation {
@@ -78,11 +73,6 @@ pub enum TimeHistoryError {
 fn good(last: Option<f64>) -> String {
     last.map_or("no sample is valid".to_owned(), |last| format!("the samples up to t = {last:.6e} s are valid"))
 }
-
-/// Most attempts to recompute an interval in which the motion broke down. Each attempt ends
-/// where the last one broke down, or at half of its length if the cause names no time. This is
-/// enough to find one of [`SAMPLES_PER_INTERVAL`] samples.
-const RECOMPUTE_ATTEMPTS: usize = 6;
 
 /// The motion in an interval that starts at `begin` (s).
 struct TimeInterval {
@@ -173,7 +163,8 @@ impl TimeHistory {
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             let omega = self.frequency(begin);
-            let length = if omega > 0.0 { TAU / omega } else { SAMPLES_PER_INTERVAL as f64 * self.step };
+            // A free decay has 64 samples per interval.
+            let length = if omega > 0.0 { TAU / omega } else { 64.0 * self.step };
             // shorten a cycle that outlasts the motion
             let length = if length > self.duration { self.duration + self.step } else { length };
             flow.set_excitation(system, omega);
@@ -227,7 +218,10 @@ impl TimeHistory {
     ) -> Option<TimeInterval> {
         let since = |sample: usize| sample as f64 * self.step - begin;
         let mut cause = cause.clone();
-        for _ in 0..RECOMPUTE_ATTEMPTS {
+        // Most attempts to recompute an interval in which the motion broke down. Each attempt ends
+        // where the last one broke down, or at half of its length if the cause names no time. This
+        // is enough to find one of the 64 samples of an interval.
+        for _ in 0..6 {
             let reached = cause.time().unwrap_or(0.5 * since(last + 1));
             last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
             // a sample at the very start needs a short motion behind it
@@ -257,7 +251,8 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        integrator_choice::integrator(system, width, TOLERANCE, NAME)
+        // Relative error per step for smooth laws.
+        integrator_choice::integrator(system, width, 1e-9, NAME)
             .map_err(|error| error.with_alternatives(alternatives(system)))
     }
 

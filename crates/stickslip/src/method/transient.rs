@@ -20,11 +20,6 @@ use crate::model::System;
 
 const NAME: &str = "transient";
 
-/// Default distance to the orbit, relative to the orbit, at which a motion counts as settled.
-const TOLERANCE: f64 = 1e-7;
-/// Default for the most periods: ten times the need of a structure with a Q of 700.
-const PERIODS: usize = 50_000;
-
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
@@ -51,12 +46,13 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         PERIOD,
     ],
     build: |options| {
-        let tolerance = options.get("tolerance").copied().unwrap_or(TOLERANCE);
+        let default = Transient::default();
+        let tolerance = options.get("tolerance").copied().unwrap_or(default.tolerance);
         if !(1e-12..=1e-2).contains(&tolerance) {
             let message = format!("must lie between 1e-12 and 1e-2, found {tolerance}");
             return Err(MethodError::option(NAME, "tolerance", message));
         }
-        let most = options.get("periods").map_or(PERIODS, |periods| *periods as usize);
+        let most = options.get("periods").map_or(default.periods, |periods| *periods as usize);
         let (width, period) = (width(NAME, options)?, periods(NAME, options)?);
         Ok(Box::new(Transient { tolerance, periods: most, width, period }))
     },
@@ -87,7 +83,8 @@ pub struct Transient {
 
 impl Default for Transient {
     fn default() -> Self {
-        Transient { tolerance: TOLERANCE, periods: PERIODS, width: None, period: 1 }
+        // 50,000 periods are ten times the need of a structure with a Q of 700.
+        Transient { tolerance: 1e-7, periods: 50_000, width: None, period: 1 }
     }
 }
 

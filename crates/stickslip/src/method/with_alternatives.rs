@@ -36,10 +36,6 @@ pub fn solver_with_alternatives<'a>(
     Ok(Box::new(WithAlternatives { solver, system }))
 }
 
-/// A width (m/s) with which to test for smoothing. Laws can be smoothed over every width or
-/// over none.
-const ANY_WIDTH: f64 = 1e-3;
-
 /// Returns the methods of the list that take a system.
 pub fn alternatives(system: &System) -> Alternatives {
     alternatives_among(system, |_| true)
@@ -50,7 +46,9 @@ fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Alternat
     let mut alternatives = Alternatives::default();
     for row in LIST.iter().filter(|row| asked(row.name)) {
         let plain = Options::new();
-        let smoothed = Options::from([(WIDTH.to_owned(), ANY_WIDTH)]);
+        // A width (m/s) with which to test for smoothing. Laws can be smoothed over every width or
+        // over none.
+        let smoothed = Options::from([(WIDTH.to_owned(), 1e-3)]);
         let smooths = row.options.iter().any(|option| option.key == WIDTH);
         // the refusal of smoothed laws names the real obstacle
         let last = if smooths { &smoothed } else { &plain };
@@ -84,13 +82,11 @@ impl Solver for WithAlternatives<'_> {
     }
 }
 
-/// Errors of larger systems name no alternatives: no other method is fast enough there, and
-/// testing all methods takes 0.1 s.
-const MAX_DOFS_FOR_ALTERNATIVES: usize = 200;
-
 /// Adds alternative methods to an error.
 fn with_alternatives(mut error: OrbitError, system: &System) -> OrbitError {
-    if system.dofs() > MAX_DOFS_FOR_ALTERNATIVES {
+    // Errors of larger systems name no alternatives: no other method is fast enough there, and
+    // testing all methods takes 0.1 s.
+    if system.dofs() > 200 {
         return error;
     }
     let words = |asked: &dyn Fn(&str) -> bool| {

@@ -4,25 +4,6 @@ use super::mechanics::supports;
 use crate::law::IdealElement;
 use crate::model::System;
 
-/// Multiplications for the decomposition of a pattern, per cube of the number of degrees of
-/// freedom. Without sliders and stops, there is one pattern. Measured: 8 and 29 ms for 60 and
-/// 100 masses, 13 s and more for 900.
-const DECOMPOSITION_COST: f64 = 100.0;
-/// Multiplications for every slider in series with a spring, per place and pair of states;
-/// `RIGID_SLIDER_COST` is that of every rigid slider and stop.
-///
-/// Each switches some times in each of several returns. New patterns are decomposed, and the
-/// sensitivity is carried through all of them. Rigid sticking reduces the size of the
-/// decomposition. Measured in sweeps of rings with joints between adjacent masses: `jenkins`
-/// 11, 97 and 440 ms for 12, 24 and 36 masses, `iwan` with six sliders 67 and 490 ms for 8 and
-/// 16, `coulomb` 19, 68 and 800 ms for 24, 36 and 60.
-const ELASTIC_SLIDER_COST: f64 = 150.0;
-const RIGID_SLIDER_COST: f64 = 50.0;
-
-/// Cost factor of an orbit without a warm start. Measured in the same rings of `coulomb`: 57
-/// ms, 0.34 s and 4.8 s; 36 sectors of two masses 1.8 s, 100 of one 6 to 17 s.
-pub const COLD_START_FACTOR: f64 = 3.0;
-
 /// Returns the number of multiplications for an orbit with a warm start; `None` if a law does
 /// not consist of sliders and stops.
 ///
@@ -49,10 +30,16 @@ pub fn orbit_work(system: &System) -> Option<f64> {
     }
     let n = system.dofs() as f64;
     let states = 2.0 * n + springs;
-    Some(
-        DECOMPOSITION_COST * n.powi(3)
-            + (ELASTIC_SLIDER_COST * springs + RIGID_SLIDER_COST * others) * n * states * states,
-    )
+    // Decomposition of a pattern. Without sliders and stops, there is one pattern. Measured: 8 and
+    // 29 ms for 60 and 100 masses, 13 s and more for 900.
+    let decomposition = 100.0 * n.powi(3);
+    // Each slider and stop switches some times in each of several returns. New patterns are
+    // decomposed, and the sensitivity is carried through all of them. Rigid sticking reduces the
+    // size of the decomposition. Measured in sweeps of rings with joints between adjacent masses:
+    // `jenkins` 11, 97 and 440 ms for 12, 24 and 36 masses, `iwan` with six sliders 67 and 490 ms
+    // for 8 and 16, `coulomb` 19, 68 and 800 ms for 24, 36 and 60.
+    let switches = (150.0 * springs + 50.0 * others) * n * states * states;
+    Some(decomposition + switches)
 }
 
 #[cfg(test)]
@@ -74,7 +61,7 @@ mod tests {
     fn cost_counts_sliders_and_stops() {
         let rigid = work(Arc::new(Coulomb { limit: 1.0 })).unwrap();
         assert!(work(Arc::new(Jenkins { stiffness: 1e4, limit: 1.0 })).unwrap() > 2.0 * rigid);
-        assert_eq!(work(Arc::new(Coulomb { limit: 0.0 })), Some(DECOMPOSITION_COST * 27.0));
+        assert_eq!(work(Arc::new(Coulomb { limit: 0.0 })), Some(100.0 * 27.0));
         assert_eq!(work(Arc::new(Cubic { stiffness: 1e4 })), None);
     }
 }

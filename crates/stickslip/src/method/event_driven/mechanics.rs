@@ -6,6 +6,7 @@
 //! them different contacts, and the friction problem would not have a unique solution. Each
 //! joint receives a [`PartShare`] of the part's force.
 
+use super::settings::EventDrivenSettings;
 use crate::law::{Contact, IdealElement, Law};
 use crate::method::{MethodError, Refusal};
 use crate::model::{CollinearAxis, System};
@@ -13,16 +14,6 @@ use crate::structure::Matrices;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Deref;
 use std::sync::Arc;
-
-/// Relative velocity, as a fraction of the largest one, that counts as zero. Switch times are
-/// accurate to 1e-15 of the velocity scale. Joints that switch together by symmetry differ by
-/// the rounding of the whole orbit, about 1e-12.
-pub(crate) const ZERO_VELOCITY: f64 = 1e-10;
-
-/// Largest mass ratio at a place between rigid sliders. Accelerations below 1e-9 of those that
-/// the limits cause at the lightest mass count as zero. At this ratio, that is a tenth of those
-/// at the heaviest mass. Measured: correct up to 1e8, chatter from 1e9, wrong orbits from 1e12.
-const MAX_MASS_RATIO: f64 = 1e8;
 
 /// The kind of a part of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -267,15 +258,19 @@ pub(crate) struct Mechanics {
 /// adjacent mass.
 fn light_place_error(system: &System, parts: &[JointPart], method: &'static str) -> Option<MethodError> {
     let rigid = || parts.iter().filter(|part| matches!(part.kind, PartKind::Rigid { .. }));
+    // Largest mass ratio at a place between rigid sliders. Accelerations below 1e-9 of those that
+    // the limits cause at the lightest mass count as zero. At this ratio, that is a tenth of those
+    // at the heaviest mass. Measured: correct up to 1e8, chatter from 1e9, wrong orbits from 1e12.
+    let most: f64 = 1e8;
     let mass = |row: usize| system.structure().diagonal_mass(row);
     rigid().find_map(|part| {
         let lightest = part.rows().min_by(|&a, &b| mass(a).total_cmp(&mass(b)))?;
         let ratio = part.rows().map(mass).fold(0.0, f64::max) / mass(lightest);
         let several = rigid().filter(|part| part.direction[lightest] != 0.0).nth(1).is_some();
-        (several && ratio > MAX_MASS_RATIO).then(|| {
+        (several && ratio > most).then(|| {
             let place = system.structure().places()[lightest].clone();
             let joint = system.joints()[part.joint].name().to_owned();
-            Refusal::NegligibleMass { method, place, joint, ratio, least: MAX_MASS_RATIO.recip() }.into()
+            Refusal::NegligibleMass { method, place, joint, ratio, least: most.recip() }.into()
         })
     })
 }
@@ -379,10 +374,11 @@ impl Mechanics {
     /// Returns the distance within which a stop counts as touching, m. `velocity_scale` is the
     /// largest relative velocity of the motion, m/s.
     pub fn contact_tolerance(&self, stop: &JointPart, omega: f64, velocity_scale: f64) -> f64 {
+        let settings = EventDrivenSettings::default();
         let PartKind::Stop { stiffness, gap } = stop.kind else { return 0.0 };
         let own = || (stiffness * self.inverse_mass.amax()).sqrt();
         let rate = Some(omega.max(self.fastest)).filter(|rate| *rate > 0.0).unwrap_or_else(own);
-        ZERO_VELOCITY * (velocity_scale / rate).max(gap.abs())
+        settings.zero_velocity * (velocity_scale / rate).max(gap.abs())
     }
 
     /// Returns the joint of every part; for several sliders along one line, the first.

@@ -8,7 +8,7 @@
 //! - `segments`: segments joined at the switches, with exact sensitivities
 //! - `postprocess`: results of an orbit from its segments
 //! - `cost_model`: cost estimate of an orbit
-//! - `tolerances`: tolerances that several files use
+//! - `settings`: tolerances and limits
 //!
 //! Newton's method on the return map finds the periodic orbit. If the excitation has only odd
 //! harmonics, the solver uses the half period `x(t + T/2) = -x(t)`. This halves the work, and
@@ -20,16 +20,16 @@ mod pattern;
 mod pattern_cache;
 mod postprocess;
 mod segments;
-mod tolerances;
+mod settings;
 mod transition;
 
-pub use cost_model::{COLD_START_FACTOR, orbit_work};
+pub use cost_model::orbit_work;
 use mechanics::PartKind;
 pub(crate) use mechanics::{Mechanics, supports};
 pub(crate) use postprocess::ExactPath;
 pub(crate) use segments::SegmentedMotion;
-pub(crate) use tolerances::GAP_PER_DISTANCE;
-use tolerances::{ENERGY_GAP, NAME, RESIDUAL_TOLERANCE, REST_FRACTION};
+pub(crate) use settings::EventDrivenSettings;
+use settings::NAME;
 
 use super::flow::excitation::HarmonicExcitation;
 use super::options::{PERIOD, periods};
@@ -56,16 +56,6 @@ pub(super) const INFO: MethodInfo = MethodInfo {
         period => Ok(Box::new(SubharmonicEventDriven { period })),
     },
 };
-
-/// Estimated distance to the orbit, relative to its state, above which a converged orbit
-/// receives one more Newton step. Near a resonance, the distance is dozens of times the
-/// residual. Measured amplitude errors of the couple: at most 3e-11 with this step, 6e-11
-/// without it. One orbit in fifty takes the step.
-const REFINEMENT_DISTANCE: f64 = 7e-12;
-/// Relative stiffness below which a direction counts as unsupported, and relative residual force
-/// below which a load counts as supported. It covers rounding of a stiffness matrix that lost
-/// some digits in its assembly.
-const SUPPORT_TOLERANCE: f64 = 1e-12;
 
 /// The exact event-driven method.
 ///
@@ -198,13 +188,14 @@ impl<'a> ExactSolver<'a> {
 
     /// Returns whether only friction balances the constant forces.
     fn is_held_by_friction(&self) -> bool {
+        let settings = EventDrivenSettings::default();
         let (mechanics, force) = (&self.flow.mechanics, &self.flow.excitation.constant);
         if force.amax() == 0.0 || mechanics.parts.iter().any(|part| !part.is_slider()) {
             return false;
         }
         let at_rest = eigen::svd(mechanics.stiffness.clone())
-            .and_then(|svd| svd.solve(force, SUPPORT_TOLERANCE * svd.singular_values.amax()).ok());
-        at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > SUPPORT_TOLERANCE * force.amax())
+            .and_then(|svd| svd.solve(force, settings.support * svd.singular_values.amax()).ok());
+        at_rest.is_some_and(|x| (force - &mechanics.stiffness * x).amax() > settings.support * force.amax())
     }
 
     /// Runs a search and returns its orbit.
@@ -241,6 +232,7 @@ impl<'a> ExactSolver<'a> {
 
 impl Solver for ExactSolver<'_> {
     fn solve(&mut self, request: &Request<'_>, _budget: &mut Budget) -> Result<Orbit, OrbitError> {
+        let settings = EventDrivenSettings::default();
         let (omega, start) = (request.omega, request.seed.map(|seed| &seed.state[..]));
         if !(omega.is_finite() && omega > 0.0) {
             return Err(OrbitError::Frequency { omega });
@@ -252,12 +244,12 @@ impl Solver for ExactSolver<'_> {
         let (sign, share) = if symmetry == Symmetry::HalfPeriod { (-1.0, 0.5) } else { (1.0, 1.0) };
         self.duration = share * self.periods as f64 * std::f64::consts::TAU / omega;
         let (name, search) = (self.name, self.search);
-        let rest = REST_FRACTION * self.flow.energy_scale;
+        let rest = settings.rest_fraction * self.flow.energy_scale;
         let aim = ClosingTargets {
             method: name,
             omega,
-            residual: RESIDUAL_TOLERANCE,
-            distance: REFINEMENT_DISTANCE,
+            residual: settings.residual,
+            distance: settings.refinement_distance,
             sign,
             rest,
         };
@@ -289,7 +281,7 @@ impl Solver for ExactSolver<'_> {
             }
         }
         // an estimated distance from the settled motion causes a proportional energy gap
-        let allowed = ENERGY_GAP + GAP_PER_DISTANCE * orbit.evidence.error_estimate.unwrap_or(0.0);
+        let allowed = settings.energy_gap + settings.gap_per_distance * orbit.evidence.error_estimate.unwrap_or(0.0);
         if orbit.evidence.energy_gap > allowed {
             return Err(OrbitError::Evidence { method: name, omega, energy_gap: orbit.evidence.energy_gap });
         }
@@ -471,7 +463,11 @@ mod tests {
                 // cancellation in the denominator loses as many digits as the relative distance
                 // to the resonance
                 assert!(error < 1e-14 * 10f64.powf(0.25 * f64::from(exponent)) * 100.0, "{omega}: {error:e}");
-                assert!(orbit.evidence.energy_gap < ENERGY_GAP, "{omega}: {:e}", orbit.evidence.energy_gap);
+                assert!(
+                    orbit.evidence.energy_gap < EventDrivenSettings::default().energy_gap,
+                    "{omega}: {:e}",
+                    orbit.evidence.energy_gap
+                );
             }
         }
     }

@@ -21,18 +21,29 @@ use stickslip_numerics::signal::ExponentialBasis;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Relative eigenvalue of the Delassus matrix below which directions of stuck sliders are
-/// redundant.
-const REDUNDANT: f64 = 1e-11;
-/// Relative eigenvalue below which a mode has frequency zero: the rounding of `QuadraticModes`.
-const ZERO_MODE: f64 = 1e-13;
-/// Relative distance of a harmonic to a mode below which they are integrated as a resonant
-/// pair. At smaller distances, the ordinary particular solution would lose more than five
-/// digits.
-const RESONANT: f64 = 1e-5;
-/// Number of states from which the sensitivity is carried joint by joint, in a product that is
-/// blocked for the cache.
-const BLOCKED_STATES: usize = 24;
+/// Thresholds of the linear motion in a pattern.
+#[derive(Debug, Clone, Copy)]
+struct PatternSettings {
+    /// Relative eigenvalue of the Delassus matrix below which directions of stuck sliders are
+    /// redundant.
+    redundant: f64,
+    /// Relative eigenvalue below which a mode has frequency zero: the rounding of
+    /// `QuadraticModes`.
+    zero_mode: f64,
+    /// Relative distance of a harmonic to a mode below which they are integrated as a resonant
+    /// pair. At smaller distances, the ordinary particular solution would lose more than five
+    /// digits.
+    resonant: f64,
+    /// Number of states from which the sensitivity is carried joint by joint, in a product that is
+    /// blocked for the cache.
+    blocked_states: usize,
+}
+
+impl Default for PatternSettings {
+    fn default() -> Self {
+        PatternSettings { redundant: 1e-11, zero_mode: 1e-13, resonant: 1e-5, blocked_states: 24 }
+    }
+}
 
 /// The closed-form motion of one pattern.
 #[derive(Debug, Clone)]
@@ -131,6 +142,7 @@ impl ForcedResponse {
 
 impl Pattern {
     pub fn new(mechanics: &Mechanics, stuck: &[bool]) -> Result<Self, DefectiveModes> {
+        let settings = PatternSettings::default();
         let n = mechanics.n;
         let held: Vec<usize> =
             (0..stuck.len()).filter(|&s| stuck[s] && mechanics.parts[s].stiffness().is_none()).collect();
@@ -143,7 +155,7 @@ impl Pattern {
         .ok_or(out_of_range)?;
         let redundant = !held.is_empty() && {
             let values = eigen::svd(inverse_delassus.clone()).ok_or(out_of_range)?.singular_values;
-            let least = REDUNDANT * inverse_delassus.amax();
+            let least = settings.redundant * inverse_delassus.amax();
             values.iter().filter(|value| **value > least).count() < held.len()
         };
         let hold = &mechanics.inverse_mass * &w * &inverse_delassus;
@@ -180,7 +192,7 @@ impl Pattern {
             .iter()
             .map(|part| {
                 let moves = (basis.transpose() * &part.direction).amax();
-                part.stiffness().is_some() && moves <= REDUNDANT.sqrt() * basis.amax() * part.direction.amax()
+                part.stiffness().is_some() && moves <= settings.redundant.sqrt() * basis.amax() * part.direction.amax()
             })
             .collect();
         let project = basis.transpose(); // forces to modal forces
@@ -190,7 +202,7 @@ impl Pattern {
         let fastest = modes.lambda.iter().map(|l| l.norm()).fold(0.0, f64::max);
         let mut lambda = modes.lambda.clone();
         let drifting: Vec<usize> =
-            (0..count).filter(|&k| lambda[k].norm() <= ZERO_MODE * fastest || fastest == 0.0).collect();
+            (0..count).filter(|&k| lambda[k].norm() <= settings.zero_mode * fastest || fastest == 0.0).collect();
         for &k in &drifting {
             lambda[k] = ZERO;
         }
@@ -282,6 +294,7 @@ impl Pattern {
 
     /// Computes the steady response and the basis at one excitation frequency.
     pub fn excitation(&self, mechanics: &Mechanics, excitation: &HarmonicExcitation) -> ForcedResponse {
+        let settings = PatternSettings::default();
         let n = mechanics.n;
         let mut driven = ForcedResponse { modes: self.lambda.len(), ..ForcedResponse::default() };
         driven.basis.drifts = self.drifts();
@@ -303,7 +316,7 @@ impl Pattern {
             for (k, &lambda) in self.lambda.iter().enumerate() {
                 let forward: Complex64 = (0..n).map(|i| self.input[(k, i)] * force[i]).sum::<Complex64>() * 0.5;
                 let backward: Complex64 = (0..n).map(|i| self.input[(k, i)] * force[i].conj()).sum::<Complex64>() * 0.5;
-                let near = (s - lambda).norm() <= RESONANT * rate;
+                let near = (s - lambda).norm() <= settings.resonant * rate;
                 if near && forward != ZERO {
                     driven.resonant.push((k, h, forward));
                     driven.basis.resonant.push((lambda, s - lambda));
@@ -467,6 +480,7 @@ impl Pattern {
         sensitivity: &mut DMatrix<f64>,
         work: &mut PatternScratch,
     ) {
+        let settings = PatternSettings::default();
         let (n, count, states) = (mechanics.n, self.lambda.len(), mechanics.states());
         if states == 0 {
             return;
@@ -480,7 +494,7 @@ impl Pattern {
                 (imaginary[row], imaginary[n + row]) = (now.im, rate.im);
             }
         }
-        if states >= BLOCKED_STATES {
+        if states >= settings.blocked_states {
             self.carry_by_joints(mechanics, length, sensitivity, work);
             return;
         }
@@ -688,8 +702,9 @@ struct JointSprings {
 
 impl PatternScratch {
     pub fn new(mechanics: &Mechanics, harmonics: usize) -> Self {
+        let settings = PatternSettings::default();
         let n = mechanics.n;
-        let small = if mechanics.states() < BLOCKED_STATES { mechanics.states() } else { 0 };
+        let small = if mechanics.states() < settings.blocked_states { mechanics.states() } else { 0 };
         PatternScratch {
             force: vec![0.0; n],
             held: Vec::with_capacity(mechanics.parts.len()),
@@ -719,6 +734,7 @@ fn complex_vector(v: &DVector<f64>) -> DVector<Complex64> {
 
 /// Returns an M-orthonormal basis of the null space of `Wᵀ`.
 fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let settings = PatternSettings::default();
     let n = mass.nrows();
     if n == 0 {
         return Some(DMatrix::zeros(0, 0));
@@ -730,13 +746,14 @@ fn free_directions(mass: &DMatrix<f64>, w: &DMatrix<f64>) -> Option<DMatrix<f64>
     let scaled = &l_inverse * w;
     let eigen = eigen::symmetric(&scaled * scaled.transpose())?;
     let largest = eigen.eigenvalues.amax();
-    let null: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] <= REDUNDANT * largest).collect();
+    let null: Vec<usize> = (0..n).filter(|&i| eigen.eigenvalues[i] <= settings.redundant * largest).collect();
     Some(l_inverse.transpose() * eigen.eigenvectors.select_columns(&null))
 }
 
 /// Returns the inverse of the Delassus matrix. If stuck contacts are redundant, it distributes
 /// the load in proportion to their limits.
 fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> Option<DMatrix<f64>> {
+    let settings = PatternSettings::default();
     let s = delassus.nrows();
     if s == 0 {
         return Some(DMatrix::zeros(0, 0));
@@ -744,7 +761,7 @@ fn weighted_inverse(delassus: &DMatrix<f64>, limits: &[f64]) -> Option<DMatrix<f
     let weight = DMatrix::from_fn(s, s, |i, j| if i == j { limits[i].sqrt() } else { 0.0 });
     let eigen = eigen::symmetric(&weight * delassus * &weight)?;
     let largest = eigen.eigenvalues.amax();
-    let inverse = eigen.eigenvalues.map(|value| if value > REDUNDANT * largest { 1.0 / value } else { 0.0 });
+    let inverse = eigen.eigenvalues.map(|value| if value > settings.redundant * largest { 1.0 / value } else { 0.0 });
     Some(&weight * &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose() * &weight)
 }
 

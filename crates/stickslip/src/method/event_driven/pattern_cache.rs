@@ -13,10 +13,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::quadratic_modes::DefectiveModes;
 
-/// Memory limit of the cache, bytes, for each of the flows that run in parallel. A return of a
-/// ring of 48 blades uses one to two hundred patterns of a quarter of a megabyte.
-const LIMIT: usize = 64 << 20;
-
 struct CachedPattern {
     pattern: Arc<Pattern>,
     /// Response to the present excitation, computed at the first use of the pattern under it.
@@ -38,7 +34,9 @@ pub(super) struct PatternCache {
 
 impl Default for PatternCache {
     fn default() -> Self {
-        PatternCache { slots: BTreeMap::new(), bytes: 0, limit: LIMIT, uses: 0, stuck: Vec::new() }
+        // Memory limit in bytes, for each of the flows that run in parallel. A return of a ring of
+        // 48 blades uses one to two hundred patterns of a quarter of a megabyte.
+        PatternCache { slots: BTreeMap::new(), bytes: 0, limit: 64 << 20, uses: 0, stuck: Vec::new() }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::mechanics::{JointPart, PartShare};
 use super::segments::{Segment, SegmentedMotion};
-use super::tolerances::{ENERGY_GAP, NAME, RESIDUAL_TOLERANCE, REST_FRACTION};
+use super::settings::{EventDrivenSettings, NAME};
 use crate::law::Contact;
 use crate::method::IntegrationError;
 use crate::method::orbit_search::return_map::{ClosedState, norm};
@@ -17,11 +17,6 @@ use stickslip_numerics::signal::{ExponentialBasis, FourierIntegrals, ProductInte
 use stickslip_numerics::signal_range::{RangeScratch, SignalSegment, ValueRange};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-
-/// Fraction of the stored energy below which the work is not a suitable reference for the
-/// energy gap. An orbit with a residual of `RESIDUAL_TOLERANCE` can have gained or lost that much
-/// energy, and the resulting gap must stay below the tolerance.
-const STORED_ENERGY_FRACTION: f64 = RESIDUAL_TOLERANCE / ENERGY_GAP;
 
 /// The closed-form segments of one return, with the data for their evaluation.
 #[derive(Debug, Clone)]
@@ -54,11 +49,15 @@ pub(super) fn orbit(
     symmetry: Symmetry,
     (closed, weights): (ClosedState, &[f64]),
 ) -> Result<Orbit, IntegrationError> {
+    let settings = EventDrivenSettings::default();
     let period = periods as f64 * std::f64::consts::TAU / omega;
     let path = ExactPath::new(system.clone(), flow, symmetry, period);
     let measured = results(system, &ExactMeasurement::new(&path), omega, (symmetry, period))?;
-    let rest = REST_FRACTION * flow.energy_scale;
+    let rest = settings.rest_fraction * flow.energy_scale;
     let share = vibration_share::fraction(&path, (symmetry, period), &closed.state, (weights, rest));
+    // An orbit with the residual of a converged orbit can have gained or lost this fraction of the
+    // stored energy. Below it, the work is not a suitable reference for the energy gap.
+    let unresolved = settings.residual / settings.energy_gap;
     let stored = share * norm(weights, &closed.state).powi(2);
     let mut orbit = Orbit {
         method: NAME,
@@ -68,7 +67,7 @@ pub(super) fn orbit(
         initial_state: closed.state,
         evidence: Evidence {
             residual: closed.residual,
-            energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, STORED_ENERGY_FRACTION * stored)),
+            energy_gap: measured.energy_gap(f64::max(CONSERVATIVE_WORK * rest * rest, unresolved * stored)),
             switches: measured.joints.iter().map(|joint| joint.switches).sum(),
             iterations: closed.iterations,
             harmonics: None,

@@ -1,11 +1,11 @@
 //! The motion over a time interval: closed-form segments joined at the switches, with exact
 //! sensitivity.
 
-use super::mechanics::{JointPart, Mechanics, PartKind, ZERO_VELOCITY};
+use super::mechanics::{JointPart, Mechanics, PartKind};
 use super::pattern::{ForcedResponse, Pattern, PatternScratch, SegmentStart};
 use super::pattern_cache::PatternCache;
-use super::tolerances::REST_FRACTION;
-use super::transition::{AT_LIMIT, Transition};
+use super::settings::EventDrivenSettings;
+use super::transition::Transition;
 use crate::law::Contact;
 use crate::method::IntegrationError;
 use crate::method::flow::excitation::HarmonicExcitation;
@@ -16,21 +16,6 @@ use stickslip_numerics::interrupt;
 use stickslip_numerics::signal::{ExponentialBasis, FirstZero, InitialSign, ZeroScratch, real_dot};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-
-/// Number of switches in one run above which the motion counts as chatter. Den Hartog's
-/// oscillator at a fiftieth of its natural frequency has about 200.
-pub(crate) const SWITCH_LIMIT: usize = 20_000;
-/// Memory of the segments of one run, bytes, above which the motion also counts as chatter. A
-/// return of a ring of 48 blades has a few hundred switches, and a segment takes a tenth of a
-/// megabyte.
-const SEGMENT_LIMIT: usize = 256 << 20;
-/// Number of switches without motion, per part, after which rounding makes the decision and the
-/// signals contradict each other. This occurs for a motion that creeps towards a border and has
-/// reached it up to rounding.
-const MAX_IDLE_SWITCHES: usize = 2;
-/// Number of switches at the same instant, per part, above which the decision cycles. Every
-/// part can change once per derivative that decides.
-const MAX_SIMULTANEOUS_SWITCHES: usize = 8;
 
 /// One closed-form segment of the motion.
 #[derive(Debug, Clone, Default)]
@@ -97,10 +82,6 @@ pub(crate) struct SegmentedMotion {
     rate: Vec<Complex64>,
 }
 
-/// Upper bound of the energy scale of springs in series with sliders, as a multiple of that of
-/// the loads. Structures that slip at all have a ratio below 10.
-const PRELOADED: f64 = 10.0;
-
 impl SegmentedMotion {
     pub fn new(mechanics: Mechanics, excitation: HarmonicExcitation) -> Self {
         let (work, decision) = (PatternScratch::new(&mechanics, excitation.rates.len()), Transition::new(&mechanics));
@@ -147,6 +128,7 @@ impl SegmentedMotion {
         duration: f64,
         mut sensitivity: Option<&mut DMatrix<f64>>,
     ) -> Result<(), IntegrationError> {
+        let settings = EventDrivenSettings::default();
         self.used = 0;
         self.switches = 0;
         let n = self.mechanics.n;
@@ -173,7 +155,7 @@ impl SegmentedMotion {
                     _ => IntegrationError::OutOfRange { time },
                 })?;
             self.start_segment(time, &pattern, driven, state);
-            let eased = idle > MAX_IDLE_SWITCHES * (1 + self.mechanics.parts.len());
+            let eased = idle > settings.idle_switches * (1 + self.mechanics.parts.len());
             self.set_event_signals(&pattern, &state[2 * n..], velocity_scale, eased);
             self.from.copy_from_slice(&state[..2 * n]);
             let rest = end - time;
@@ -189,10 +171,10 @@ impl SegmentedMotion {
             time += length;
             self.switches += 1;
             at_once = if length <= f64::EPSILON * end.abs() { at_once + 1 } else { 0 };
-            idle = if self.moved(state) <= ZERO_VELOCITY * velocity_scale { idle + 1 } else { 0 };
+            idle = if self.moved(state) <= settings.zero_velocity * velocity_scale { idle + 1 } else { 0 };
             bytes += self.segments[self.used - 1].bytes();
-            let many = self.switches > SWITCH_LIMIT || bytes > SEGMENT_LIMIT;
-            if many || at_once > MAX_SIMULTANEOUS_SWITCHES * (1 + self.mechanics.parts.len()) {
+            let many = self.switches > settings.switches || bytes > settings.segment_memory;
+            if many || at_once > settings.simultaneous_switches * (1 + self.mechanics.parts.len()) {
                 let joint = self.mechanics.names[self.mechanics.parts[part].joint].clone();
                 if pattern.redundant {
                     return Err(IntegrationError::Redundant { time, joint });
@@ -229,6 +211,7 @@ impl SegmentedMotion {
 
     /// Changes the excitation; patterns stay.
     pub fn set_excitation(&mut self, excitation: HarmonicExcitation) {
+        let settings = EventDrivenSettings::default();
         self.work.set_harmonics(excitation.rates.len());
         let mechanics = &self.mechanics;
         let springs = mechanics.parts.iter().filter_map(|part| match part.kind {
@@ -239,10 +222,10 @@ impl SegmentedMotion {
         });
         let loads = excitation.energy_scale(&mechanics.mass, &mechanics.stiffness);
         // a limit that the loads never reach does not affect the motion
-        let most = if loads > 0.0 { PRELOADED * loads } else { f64::INFINITY };
+        let most = if loads > 0.0 { settings.preload_ratio * loads } else { f64::INFINITY };
         self.energy_scale = loads + springs.map(|energy| energy.min(most)).sum::<f64>();
         let mobility = if mechanics.n == 0 { 0.0 } else { mechanics.inverse_mass.amax().sqrt() };
-        self.moving = excitation.imposed_velocity().max(REST_FRACTION * self.energy_scale * mobility);
+        self.moving = excitation.imposed_velocity().max(settings.rest_fraction * self.energy_scale * mobility);
         self.excitation = excitation;
         self.memory.change_drive();
     }
@@ -335,6 +318,7 @@ impl SegmentedMotion {
     /// open one. If `eased`, signals that begin at zero may change sign within the tolerance of
     /// zero.
     fn set_event_signals(&mut self, shape: &Pattern, springs: &[f64], velocity_scale: f64, eased: bool) {
+        let settings = EventDrivenSettings::default();
         let segment = &self.segments[self.used];
         monitored_parts(&self.mechanics.parts, &segment.contacts, springs, &mut self.nearest);
         let driven = &segment.driven;
@@ -359,7 +343,7 @@ impl SegmentedMotion {
                     self.signals.extend(force.iter().map(|f| f * -side));
                     self.signals[at + constant].re += limit;
                     let signal = &mut self.signals[at + constant];
-                    self.begins.push(begin(signal, limit - side * now, AT_LIMIT * limit, eased));
+                    self.begins.push(begin(signal, limit - side * now, settings.at_limit * limit, eased));
                     self.watched.push(i);
                 }
                 continue;
@@ -385,7 +369,7 @@ impl SegmentedMotion {
                         self.mechanics.contact_tolerance(part, self.excitation.omega, velocity_scale),
                     )
                 }
-                _ => (&self.velocity, contact.sign(), 1, ZERO_VELOCITY * velocity_scale),
+                _ => (&self.velocity, contact.sign(), 1, settings.zero_velocity * velocity_scale),
             };
             for k in 0..n {
                 add(signal, &motion[k * nb..(k + 1) * nb], sign * part.direction[k]);

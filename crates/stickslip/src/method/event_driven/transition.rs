@@ -19,19 +19,12 @@
 //!
 //! Source: Glocker, "Set-Valued Force Laws" (2001), Ch. 10; Leine and Nijmeijer (2004), Ch. 6.
 
-use super::mechanics::{JointPart, Mechanics, PartKind, ZERO_VELOCITY};
+use super::mechanics::{JointPart, Mechanics, PartKind};
+use super::settings::EventDrivenSettings;
 use crate::law::Contact;
 use crate::method::flow::excitation::HarmonicExcitation;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::complementarity;
-
-/// A force within this fraction of its limit counts as at the limit. The reason is that of
-/// [`ZERO_VELOCITY`].
-pub(crate) const AT_LIMIT: f64 = 1e-10;
-/// An acceleration or higher derivative below this fraction of its terms counts as zero.
-const ZERO_ACCELERATION: f64 = 1e-9;
-/// Number of derivatives after which contacts exactly at the border remain in stick.
-const MAX_DERIVATIVES: u32 = 4;
 
 /// The contacts after a transition, with the accelerations.
 #[derive(Debug, Clone)]
@@ -118,6 +111,7 @@ impl ContactProblem {
 
 impl Transition {
     pub fn new(mechanics: &Mechanics) -> Self {
+        let settings = EventDrivenSettings::default();
         let count = mechanics.parts.len();
         let mut response = DMatrix::zeros(mechanics.n, count);
         for (i, part) in mechanics.parts.iter().enumerate() {
@@ -136,7 +130,7 @@ impl Transition {
             dropped: Vec::new(),
             undecided: Vec::new(),
             problem: ContactProblem::default(),
-            derivatives: vec![DVector::zeros(mechanics.n); MAX_DERIVATIVES as usize + 3],
+            derivatives: vec![DVector::zeros(mechanics.n); settings.derivatives as usize + 3],
         }
     }
 
@@ -154,9 +148,10 @@ impl Transition {
         state: &[f64],
         velocity_scale: f64,
     ) -> bool {
+        let settings = EventDrivenSettings::default();
         let n = mechanics.n;
         let (x, v) = (&state[..n], &state[n..2 * n]);
-        let still = ZERO_VELOCITY * velocity_scale;
+        let still = settings.zero_velocity * velocity_scale;
         self.resting.clear();
         self.dropped.clear();
         let mut springs_undecided = false;
@@ -170,7 +165,7 @@ impl Transition {
                 }
                 PartKind::Elastic { limit, state: s, .. } => {
                     let force = state[2 * n + s];
-                    if force.abs() < limit * (1.0 - AT_LIMIT) {
+                    if force.abs() < limit * (1.0 - settings.at_limit) {
                         Contact::Stick
                     } else if velocity.abs() > still {
                         if velocity * force > 0.0 { Contact::slip(force) } else { Contact::Stick }
@@ -236,6 +231,7 @@ impl Transition {
     /// Moves sliders whose force drops from `resting` to `dropped`, or returns one slider that
     /// is driven backwards. Returns whether anything changed.
     fn release(&mut self, mechanics: &Mechanics, excitation: &HarmonicExcitation, time: f64) -> bool {
+        let settings = EventDrivenSettings::default();
         let lets_go = |i: usize| self.contacts[i] != Contact::Stick && mechanics.parts[i].force_drops();
         if self.dropped.is_empty() && !self.resting.iter().any(|&i| lets_go(i)) {
             return false;
@@ -243,7 +239,7 @@ impl Transition {
         let terms = self.terms(mechanics, excitation);
         let back = self.dropped.iter().position(|&i| {
             let relative = mechanics.parts[i].direction.dot(&self.acceleration) + excitation.imposed_at(i, time, 2);
-            relative * self.contacts[i].sign() < -ZERO_ACCELERATION * terms.size(i, &self.response, 2)
+            relative * self.contacts[i].sign() < -settings.zero_acceleration * terms.size(i, &self.response, 2)
         });
         let contacts = &mut self.contacts;
         if let Some(back) = back {
@@ -277,6 +273,7 @@ impl Transition {
         time: f64,
         state: &[f64],
     ) -> bool {
+        let settings = EventDrivenSettings::default();
         if self.at_rest.is_empty() {
             return true;
         }
@@ -297,10 +294,10 @@ impl Transition {
             let own = problem.delassus.column(k);
             let held: f64 = own.iter().zip(&problem.high).map(|(d, limit)| d.abs() * limit).sum();
             let size = problem.push[k].abs() + held;
-            if relative.abs() > ZERO_ACCELERATION * size {
+            if relative.abs() > settings.zero_acceleration * size {
                 // a joint that only imposed motion moves has no force here
                 self.contacts[i] = Contact::slip(relative);
-            } else if lambda.abs() >= problem.high[k] * (1.0 - AT_LIMIT) {
+            } else if lambda.abs() >= problem.high[k] * (1.0 - settings.at_limit) {
                 self.undecided.push((i, lambda.signum()));
             }
             self.acceleration.axpy(-lambda, &self.response.column(i), 1.0);
@@ -361,9 +358,10 @@ impl Transition {
     /// Decides on sliders exactly at their limit with zero acceleration. `undecided` contains
     /// them with the sign of their force.
     fn settle_derivatives(&mut self, mechanics: &Mechanics, excitation: &HarmonicExcitation, time: f64, state: &[f64]) {
+        let settings = EventDrivenSettings::default();
         self.begin_derivatives(mechanics.n, state);
         let terms = self.terms(mechanics, excitation);
-        for level in 1..MAX_DERIVATIVES {
+        for level in 1..settings.derivatives {
             self.at_rest.retain(|i| self.contacts[*i] == Contact::Stick);
             self.free_derivative(mechanics, excitation, time, level);
             let next = level as usize + 2;
@@ -383,11 +381,11 @@ impl Transition {
             self.undecided.retain(|&(i, sign)| {
                 let Some(k) = at_rest.iter().position(|&rest| rest == i) else { return false };
                 let size = problem.push[k].abs().max(problem.held[k].abs()).max(terms.size(i, response, level + 2));
-                if problem.relative[k] * sign > ZERO_ACCELERATION * size && size > 0.0 {
+                if problem.relative[k] * sign > settings.zero_acceleration * size && size > 0.0 {
                     contacts[i] = Contact::slip(sign);
                     return false;
                 }
-                problem.lambda[k] * sign * problem.delassus[(k, k)] > -ZERO_ACCELERATION * size
+                problem.lambda[k] * sign * problem.delassus[(k, k)] > -settings.zero_acceleration * size
             });
             for (k, &i) in self.at_rest.iter().enumerate() {
                 self.derivatives[next].axpy(-problem.lambda[k], &self.response.column(i), 1.0);
@@ -424,8 +422,9 @@ impl Transition {
         state: &[f64],
         velocity_scale: f64,
     ) {
+        let settings = EventDrivenSettings::default();
         let n = mechanics.n;
-        let still = ZERO_VELOCITY * velocity_scale;
+        let still = settings.zero_velocity * velocity_scale;
         let mut undecided: Vec<(usize, f64)> = (0..mechanics.parts.len())
             .filter_map(|i| {
                 let part = &mechanics.parts[i];
@@ -434,7 +433,7 @@ impl Transition {
                     PartKind::Rigid { .. } => return None,
                     PartKind::Elastic { limit, state: s, .. } => {
                         let force = state[2 * n + s];
-                        (force.abs() >= limit * (1.0 - AT_LIMIT), force.signum())
+                        (force.abs() >= limit * (1.0 - settings.at_limit), force.signum())
                     }
                     PartKind::Stop { gap, .. } => {
                         let depth = part.along(&state[..n]) + excitation.imposed_at(i, time, 0) - gap;
@@ -446,14 +445,14 @@ impl Transition {
             .collect();
         self.begin_derivatives(n, state);
         let terms = self.terms(mechanics, excitation);
-        for level in 1..=MAX_DERIVATIVES {
+        for level in 1..=settings.derivatives {
             let order = level + 1;
             undecided.retain(|&(i, sign)| {
                 let size = terms.size(i, &self.response, order);
                 let part = &mechanics.parts[i];
                 let slope =
                     part.direction.dot(&self.derivatives[order as usize]) + excitation.imposed_at(i, time, order);
-                if slope.abs() <= ZERO_ACCELERATION * size {
+                if slope.abs() <= settings.zero_acceleration * size {
                     return true;
                 }
                 if slope * sign > 0.0 {
@@ -461,7 +460,7 @@ impl Transition {
                 }
                 false
             });
-            if undecided.is_empty() || level == MAX_DERIVATIVES {
+            if undecided.is_empty() || level == settings.derivatives {
                 return;
             }
             // the next derivative with the present contacts: rigid sliders at zero velocity

@@ -12,13 +12,6 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use stickslip_numerics::radau::quintic;
 
-/// Fraction of a law's scale by which rounding may exceed it.
-const ROUNDED: f64 = 1e-9;
-
-/// Halvings of the interval between two nodes with different contact states; a millionth
-/// remains.
-const BISECTIONS: usize = 20;
-
 pub(crate) struct Trajectory {
     steps: StepRecord,
     assembly: Assembly,
@@ -93,7 +86,8 @@ impl Trajectory {
             value(i) * others.map(|k| (s - node(k)) / (node(i) - node(k))).product::<f64>()
         });
         let (between, largest) = (sum.sum::<f64>(), (0..=count).map(|i| value(i).abs()).fold(0.0, f64::max));
-        if largest > scale * (1.0 + ROUNDED) { between } else { between.clamp(-scale, scale) }
+        // Rounding may exceed the scale of a law by a fraction of 1e-9.
+        if largest > scale * (1.0 + 1e-9) { between } else { between.clamp(-scale, scale) }
     }
 
     /// Returns the forces of a joint at `s` in [0, 1] of a step with the given relative motion.
@@ -133,7 +127,9 @@ impl Trajectory {
     /// of `from`.
     fn contact_change(&self, joint: usize, step: usize, from: (f64, Contact), to: f64) -> f64 {
         let (mut low, mut high) = (from.0, to);
-        for _ in 0..BISECTIONS {
+        // Halvings of the interval between two nodes with different contact states; a millionth
+        // remains.
+        for _ in 0..20 {
             let between = 0.5 * (low + high);
             if self.contact(joint, (step, between)) == from.1 { low = between } else { high = between }
         }

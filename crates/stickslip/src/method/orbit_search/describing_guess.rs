@@ -10,11 +10,6 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
-/// Most rounds of the fixed-point iteration; a rough result is enough.
-const ROUNDS: usize = 60;
-/// The iteration stops when no amplitude of a joint changes by more than this fraction.
-const SETTLED: f64 = 1e-3;
-
 /// Displacements by harmonic, and the stiffness of each joint.
 pub(crate) struct DescribingGuess {
     /// Pairs of the frequency hΩ and the complex displacements.
@@ -85,7 +80,8 @@ impl DescribingGuess {
         let mut amplitudes = vec![f64::INFINITY; system.joints().len()];
         let none = |d: usize| DMatrix::from_element(d, d, Complex64::new(0.0, 0.0));
         let mut guess = DescribingGuess { harmonics: Vec::new(), joints: Vec::new() };
-        for _ in 0..ROUNDS {
+        // Most rounds of the fixed-point iteration; a rough result is enough.
+        for _ in 0..60 {
             let joints = system.joints().iter().zip(&amplitudes);
             guess.joints =
                 joints
@@ -120,7 +116,9 @@ impl DescribingGuess {
                     .sum();
                 let old = amplitudes[j];
                 amplitudes[j] = if old.is_finite() && size > 0.0 { (old * size).sqrt() } else { size };
-                settled &= (amplitudes[j] - old).abs() <= SETTLED * old && old.is_finite();
+                // The iteration stops when no amplitude of a joint changes by more than this
+                // fraction.
+                settled &= (amplitudes[j] - old).abs() <= 1e-3 * old && old.is_finite();
             }
             if settled {
                 break;

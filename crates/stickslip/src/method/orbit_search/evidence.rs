@@ -23,29 +23,48 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
 
-/// Most degrees of freedom for which every orbit is checked. The return map is dense, and its
-/// cost grows with the cube of the size. In larger systems one period of integration takes ten
-/// times as long as the orbit by harmonic balance. [`crate::orbit::Orbit::return_defect`]
-/// integrates those on request.
-const LARGEST: usize = 24;
-/// Most joints for which the return is integrated although stability is proven.
-const JOINTS: usize = 12;
-/// Factor on the limits of permanently stuck joints while the derivative of the return is
-/// computed. A power of two avoids rounding.
-const LIMIT_FACTOR: f64 = 2.0;
-/// Distance of the largest multiplier from one, in return defects, below which its side of one
-/// is uncertain. With stops that open and close, multipliers err by two to three times the
-/// error of the motion.
-const MARGIN: f64 = 10.0;
-/// Newton steps from the given state to the orbit of the time integration; convergence is
-/// quadratic.
-const NEWTON_STEPS: usize = 3;
-/// Largest ratio of the distances from the return after and before such a step.
-const LARGEST_RATIO: f64 = 0.5;
-/// Relative error per step of the integration of smooth laws.
-const TOLERANCE: f64 = 1e-8;
-/// Equal steps per return for laws with a step only; they follow the motion to about 1e-6.
-const STEPS: usize = 4096;
+/// Settings of the check of an orbit by time integration.
+#[derive(Debug, Clone, Copy)]
+struct OrbitCheckSettings {
+    /// Most degrees of freedom for which every orbit is checked. The return map is dense, and its
+    /// cost grows with the cube of the size. In larger systems one period of integration takes ten
+    /// times as long as the orbit by harmonic balance. [`crate::orbit::Orbit::return_defect`]
+    /// integrates those on request.
+    dofs: usize,
+    /// Most joints for which the return is integrated although stability is proven.
+    joints: usize,
+    /// Factor on the limits of permanently stuck joints while the derivative of the return is
+    /// computed. A power of two avoids rounding.
+    limit_factor: f64,
+    /// Distance of the largest multiplier from one, in return defects, below which its side of one
+    /// is uncertain. With stops that open and close, multipliers err by two to three times the
+    /// error of the motion.
+    margin: f64,
+    /// Newton steps from the given state to the orbit of the time integration; convergence is
+    /// quadratic.
+    newton_steps: usize,
+    /// Largest ratio of the distances from the return after and before a Newton step.
+    largest_ratio: f64,
+    /// Relative error per step of the integration of smooth laws.
+    tolerance: f64,
+    /// Equal steps per return for laws with a step only; they follow the motion to about 1e-6.
+    steps: usize,
+}
+
+impl Default for OrbitCheckSettings {
+    fn default() -> Self {
+        OrbitCheckSettings {
+            dofs: 24,
+            joints: 12,
+            limit_factor: 2.0,
+            margin: 10.0,
+            newton_steps: 3,
+            largest_ratio: 0.5,
+            tolerance: 1e-8,
+            steps: 4096,
+        }
+    }
+}
 
 /// Integrates a system over one return and compares the end with the start.
 pub(crate) struct OrbitCheck {
@@ -67,8 +86,9 @@ pub(crate) struct ReturnEvidence {
 
 impl OrbitCheck {
     pub fn new(system: &System) -> Self {
+        let settings = OrbitCheckSettings::default();
         let proven = system.is_incrementally_stable();
-        if system.dofs() > LARGEST || (proven && system.joints().len() > JOINTS) {
+        if system.dofs() > settings.dofs || (proven && system.joints().len() > settings.joints) {
             return OrbitCheck { flow: None, proven };
         }
         OrbitCheck { proven, ..OrbitCheck::of_any_size(system) }
@@ -77,17 +97,18 @@ impl OrbitCheck {
     /// Makes an [`OrbitCheck`] for any system, even where stability is proven or the integration
     /// is slow.
     pub fn of_any_size(system: &System) -> Self {
+        let settings = OrbitCheckSettings::default();
         let name = "the judge of stability"; // this name appears in no message
         let flow: Option<Box<dyn Flow>> = match IntegratorKind::of(system, None) {
             _ if system.dofs() == 0 => None,
             IntegratorKind::Incremental => {
                 AverageAccelerationFlow::new(system, None, name).ok().map(|mut flow| -> Box<dyn Flow> {
-                    flow.count = STEPS;
+                    flow.count = settings.steps;
                     Box::new(flow)
                 })
             }
             IntegratorKind::Exact | IntegratorKind::Smooth | IntegratorKind::Switched => {
-                integrator_choice::integrator(system, None, TOLERANCE, name).ok()
+                integrator_choice::integrator(system, None, settings.tolerance, name).ok()
             }
         };
         OrbitCheck { flow, proven: false }
@@ -158,12 +179,13 @@ impl OrbitCheck {
         start: &[f64],
         sensitive: Option<&[usize]>,
     ) -> ReturnEvidence {
+        let settings = OrbitCheckSettings::default();
         let Some(flow) = &mut self.flow else { return ReturnEvidence::default() };
         let back = ReturnSymmetry::of(system, symmetry);
         flow.set_excitation(system, omega);
         let (weights, rest) = (flow.weights(), NEAR_REST * flow.energy_scale());
         let share = vibration_share::fraction(path, (symmetry, TAU / omega), start, (&weights, rest));
-        flow.set_tolerance(share * TOLERANCE);
+        flow.set_tolerance(share * settings.tolerance);
         let states = flow.states();
         let mut state = start.to_vec();
         state.resize(states, 0.0);
@@ -180,9 +202,9 @@ impl OrbitCheck {
         if !stuck.is_empty() {
             let mut again = start.to_vec();
             again.resize(states, 0.0);
-            flow.scale_limits(stuck, LIMIT_FACTOR);
+            flow.scale_limits(stuck, settings.limit_factor);
             let run = flow.run(&mut again, duration, derivative.as_mut());
-            flow.scale_limits(stuck, 1.0 / LIMIT_FACTOR);
+            flow.scale_limits(stuck, 1.0 / settings.limit_factor);
             derivative = derivative.filter(|_| run.is_ok());
         }
         // internal states that the method does not compute start wrong; their return does not
@@ -200,7 +222,7 @@ impl OrbitCheck {
         let mut of_return = derivative.map(|derivative| back.derivative(&derivative, system.dofs()));
         if let (Some(defect), Some(of_series), true) = (defect, &of_return, stuck.is_empty())
             && eigen::largest_modulus(of_series)
-                .is_some_and(|modulus| (modulus.powi(back.times as i32) - 1.0).abs() <= MARGIN * defect)
+                .is_some_and(|modulus| (modulus.powi(back.times as i32) - 1.0).abs() <= settings.margin * defect)
         {
             let near = derivative_at_nearby_orbit(
                 &mut **flow,
@@ -307,8 +329,9 @@ fn derivative_at_nearby_orbit(
     (back, dofs): (&ReturnSymmetry, usize),
     (duration, weights): (f64, &[f64]),
 ) -> Option<DMatrix<f64>> {
+    let settings = OrbitCheckSettings::default();
     let (mut state, mut nearer) = (start.to_vec(), None);
-    for _ in 0..NEWTON_STEPS {
+    for _ in 0..settings.newton_steps {
         let step = newton_step(nearer.as_ref().unwrap_or(of_series), &gap, back.sign, weights);
         let from: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
         let (mut end, mut derivative) = (from.clone(), DMatrix::identity(from.len(), from.len()));
@@ -316,7 +339,7 @@ fn derivative_at_nearby_orbit(
         let end = back.returned(&end, dofs);
         let left = DVector::from_iterator(from.len(), from.iter().zip(&end).map(|(z, end)| z - end));
         let share = norm(weights, left.as_slice()) / norm(weights, gap.as_slice());
-        if share.is_nan() || share > LARGEST_RATIO {
+        if share.is_nan() || share > settings.largest_ratio {
             break;
         }
         (state, gap, nearer) = (from, left, Some(back.derivative(&derivative, dofs)));

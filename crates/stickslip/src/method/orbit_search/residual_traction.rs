@@ -21,19 +21,28 @@ use crate::orbit::{IntegrationError, Orbit, Symmetry};
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::eigen;
 
-/// Most rounds of the iteration for the relaxed places. One or two are enough without gaps, a
-/// few more with gaps.
-const ROUNDS: usize = 40;
-/// Tolerance on the force of a spring, in slip limits: 100 times the residual of orbits in
-/// equal steps.
-const RELAXED: f64 = 1e-8;
-/// Most earlier rounds for the extrapolation; more are useless with few gaps that open and
-/// close.
-const LOOK_BACK: usize = 4;
-/// Differences between rounds below this fraction of the largest count as zero.
-const SAME: f64 = 1e-8;
-/// Factor on the limit of a held slider, which may pass its limit during the iteration.
-const LIMIT_FACTOR: f64 = 1e3;
+/// Settings of the iteration for the relaxed places.
+#[derive(Debug, Clone, Copy)]
+struct ResidualTractionSettings {
+    /// Most rounds of the iteration. One or two are enough without gaps, a few more with gaps.
+    rounds: usize,
+    /// Tolerance on the force of a spring, in slip limits: 100 times the residual of orbits in
+    /// equal steps.
+    tolerance: f64,
+    /// Most earlier rounds for the extrapolation; more are useless with few gaps that open and
+    /// close.
+    look_back: usize,
+    /// Differences between rounds below this fraction of the largest count as zero.
+    equal: f64,
+    /// Factor on the limit of a held slider, which may pass its limit during the iteration.
+    limit_factor: f64,
+}
+
+impl Default for ResidualTractionSettings {
+    fn default() -> Self {
+        ResidualTractionSettings { rounds: 40, tolerance: 1e-8, look_back: 4, equal: 1e-8, limit_factor: 1e3 }
+    }
+}
 
 /// A slider in series with a spring, in a flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,10 +144,14 @@ fn iterate(
     (springs, equilibrium): (&[ElasticSlider], &[f64]),
     aim: ClosingTargets,
 ) -> Option<Orbit> {
+    let settings = ResidualTractionSettings::default();
     let (mut orbit, mut rounds) = (first.clone(), AndersonHistory::default());
-    for _ in 0..ROUNDS {
+    for _ in 0..settings.rounds {
         let held = held(&orbit, springs, equilibrium);
-        if held.iter().all(|slider| slider.gap().abs() <= RELAXED * slider.spring.limit / slider.spring.stiffness) {
+        if held
+            .iter()
+            .all(|slider| slider.gap().abs() <= settings.tolerance * slider.spring.limit / slider.spring.stiffness)
+        {
             return Some(orbit);
         }
         let places = rounds.next(&held);
@@ -157,7 +170,7 @@ fn iterate(
         let mut limits = springs.to_vec();
         for spring in &mut limits {
             if pins.iter().any(|pin| pin.spring.state == spring.state) {
-                spring.limit *= LIMIT_FACTOR;
+                spring.limit *= settings.limit_factor;
             }
         }
         map.limit(&limits);
@@ -198,6 +211,7 @@ fn place(system: &System, equilibrium: Option<&StaticEquilibrium>, spring: &Elas
 }
 
 fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<StuckSlider> {
+    let settings = ResidualTractionSettings::default();
     let begin = orbit.sample(0.0);
     springs
         .iter()
@@ -209,7 +223,7 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<St
                 return None;
             }
             // rounding makes a slider slip that is exactly at its limit
-            let reach = (reach * (1.0 - 2.0 * RELAXED)).max(0.5 * (high - low));
+            let reach = (reach * (1.0 - 2.0 * settings.tolerance)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
             let is = begin - orbit.initial_state[spring.state] / spring.stiffness;
             Some(StuckSlider { spring, begin, actual: is, required: place.max(high - reach).min(low + reach) })
@@ -230,6 +244,7 @@ impl AndersonHistory {
     ///
     /// Source: Walker and Ni (2011), "Anderson acceleration for fixed-point iterations".
     fn next(&mut self, held: &[StuckSlider]) -> DVector<f64> {
+        let settings = ResidualTractionSettings::default();
         let states: Vec<usize> = held.iter().map(|slider| slider.spring.state).collect();
         if states != self.states {
             *self = AndersonHistory { states, ..AndersonHistory::default() };
@@ -239,12 +254,12 @@ impl AndersonHistory {
         let mut next = &place + &gap;
         let count = self.places.len();
         if count > 0 {
-            let back = count.min(LOOK_BACK);
+            let back = count.min(settings.look_back);
             let column = |list: &[DVector<f64>], now: &DVector<f64>, k: usize| now - &list[count - 1 - k];
             let gaps = DMatrix::from_columns(&(0..back).map(|k| column(&self.gaps, &gap, k)).collect::<Vec<_>>());
             let moved = DMatrix::from_columns(&(0..back).map(|k| column(&self.places, &place, k)).collect::<Vec<_>>());
-            let share =
-                eigen::svd(gaps.clone()).and_then(|svd| svd.solve(&gap, SAME * svd.singular_values.amax()).ok());
+            let share = eigen::svd(gaps.clone())
+                .and_then(|svd| svd.solve(&gap, settings.equal * svd.singular_values.amax()).ok());
             if let Some(share) = share {
                 next -= (moved + gaps) * share;
             }

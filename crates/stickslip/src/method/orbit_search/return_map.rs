@@ -107,6 +107,7 @@ impl ClosingMethod {
         guess: impl FnOnce(&M) -> Vec<f64>,
         aim: ClosingTargets,
     ) -> Result<ClosedState, OrbitError> {
+        let settings = ClosingSettings::default();
         let states = map.weights().len();
         if let Some(start) = neighbour.filter(|state| state.len() == states)
             && let Ok(closed) = self.close(map, start, aim)
@@ -115,7 +116,7 @@ impl ClosingMethod {
         }
         let first = guess(map);
         let found = self.close(map, &first, aim);
-        let far = aim.rest > 0.0 && norm(map.weights(), &first) > RESONANT_GUESS * aim.rest;
+        let far = aim.rest > 0.0 && norm(map.weights(), &first) > settings.resonant_guess * aim.rest;
         match found {
             Err(error) if far => self.close(map, &vec![0.0; states], aim).map_err(|_| error),
             found => found,
@@ -147,18 +148,45 @@ pub(crate) fn iterate_map(map: &mut dyn ReturnMap, mut state: Vec<f64>, sign: f6
     state
 }
 
-/// Most returns over which the decay is measured; beats of neighbouring modes average out.
-const DECAY_WINDOW: usize = 256;
-/// The first window, so that a fast decay ends the search early. Beats do not average out over
-/// it, so the derivative of the return is checked too.
-const FIRST_WINDOW: usize = 8;
+/// Settings of the search that iterates the return map until the transient has decayed.
+#[derive(Debug, Clone, Copy)]
+struct SettlingSearchSettings {
+    /// Most returns over which the decay is measured; beats of neighbouring modes average out.
+    window: usize,
+    /// The first window, so that a fast decay ends the search early. Beats do not average out over
+    /// it, so the derivative of the return is checked too.
+    first_window: usize,
+    /// Number of returns before the first check for progress; later checks follow whenever it
+    /// doubles. Beats of neighbouring modes rise and fall, but not over growing windows.
+    first_progress_check: usize,
+    /// Number of negative checks in a row after which the search fails.
+    failed_checks: usize,
+    /// Most periods of a repeating motion that the check detects.
+    repeats: usize,
+    /// Largest distance of two repetitions relative to the change of one return.
+    repeat_distance: f64,
+}
+
+impl Default for SettlingSearchSettings {
+    fn default() -> Self {
+        SettlingSearchSettings {
+            window: 256,
+            first_window: 8,
+            first_progress_check: 1024,
+            failed_checks: 3,
+            repeats: 8,
+            repeat_distance: 1e-3,
+        }
+    }
+}
 
 /// Iterates the return map until the transient has decayed.
 ///
 /// A small change per return proves nothing if the motion creeps. With the decay rate `ρ` per
 /// return, measured over a window, a change `d` leaves a distance of about `d ρ / (1 - ρ)`.
-/// This distance must be small. Windows grow up to [`DECAY_WINDOW`]. The estimate of a shorter
-/// window must agree with that of the derivative of the return, which covers beats and creep.
+/// This distance must be small. Windows grow up to [`SettlingSearchSettings::window`]. The estimate
+/// of a shorter window must agree with that of the derivative of the return, which covers beats and
+/// creep.
 fn settle(
     map: &mut dyn ReturnMap,
     start: &[f64],
@@ -166,12 +194,15 @@ fn settle(
     tolerance: f64,
     returns: usize,
 ) -> Result<ClosedState, OrbitError> {
+    let settings = SettlingSearchSettings::default();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let n = start.len();
     let mut state = start.to_vec();
     let mut changes = Vec::new(); // relative change of the state in every return
-    let mut last_states = VecDeque::with_capacity(MOST_REPEATS + 1);
+    let mut last_states = VecDeque::with_capacity(settings.repeats + 1);
     let mut hopeless = 0;
+    // A change per return below this value is rounding.
+    let rounding = 1e-14;
     let mut smallest = f64::INFINITY;
     map.report_change(f64::INFINITY);
     for count in 1..=returns {
@@ -195,17 +226,18 @@ fn settle(
         smallest = f64::min(smallest, residual);
         changes.push(residual);
         last_states.push_front(before);
-        last_states.truncate(MOST_REPEATS);
-        if count >= FIRST_PROGRESS_CHECK && count.is_power_of_two() {
+        last_states.truncate(settings.repeats);
+        if count >= settings.first_progress_check && count.is_power_of_two() {
             let distance = |earlier: &Vec<f64>| {
                 let apart: Vec<f64> = state.iter().zip(earlier).map(|(a, b)| a - aim.sign * b).collect();
                 norm(map.weights(), &apart) / size
             };
             // the first of these states is one return old
-            let repeats = last_states.iter().position(|earlier| distance(earlier) <= REPEATS * residual);
+            let repeats =
+                last_states.iter().position(|earlier| distance(earlier) <= settings.repeat_distance * residual);
             let needed = returns_needed(&changes, tolerance);
             hopeless = if needed <= (returns - count) as f64 { 0 } else { hopeless + 1 };
-            if residual > tolerance && (repeats.is_some() || hopeless == FAILED_CHECKS) {
+            if residual > tolerance && (repeats.is_some() || hopeless == settings.failed_checks) {
                 let (method, omega) = (aim.method, aim.omega);
                 let repeats = repeats.map(|back| back + 1);
                 return Err(OrbitError::Unsettled {
@@ -225,13 +257,13 @@ fn settle(
         // decay over a whole window; all later changes form a geometric series
         let decay: f64 = if earlier > 0.0 { last / earlier } else { 0.0 };
         let mut missing = if decay < 1.0 { last * decay / (1.0 - decay) } else { f64::INFINITY };
-        let at_rounding = last <= window as f64 * ROUNDING;
+        let at_rounding = last <= window as f64 * rounding;
         if !at_rounding && (missing.is_nan() || missing > tolerance) {
             continue;
         }
         let mut derivative = DMatrix::identity(n, n);
         let gap = evaluate(map, &state, aim, &mut derivative).map_err(broke)?;
-        if window < DECAY_WINDOW && !at_rounding {
+        if window < settings.window && !at_rounding {
             let to_go = newton_step(&derivative, &gap, aim.sign, map.weights());
             missing = missing.max(norm(map.weights(), to_go.as_slice()) / size);
             if missing.is_nan() || missing > tolerance {
@@ -239,30 +271,21 @@ fn settle(
             }
         }
         let residual = norm(map.weights(), gap.as_slice()) / size;
-        let missing = if at_rounding { ROUNDING } else { missing };
+        let missing = if at_rounding { rounding } else { missing };
         return Ok(ClosedState { state, gap, derivative, residual, iterations: count, distance: Some(missing) });
     }
     Err(OrbitError::not_converged(aim.method, aim.omega, returns, smallest))
 }
 
 /// Returns the window for the decay after this number of returns: half of them at first, then
-/// [`DECAY_WINDOW`].
+/// [`SettlingSearchSettings::window`].
 fn window(count: usize) -> Option<usize> {
-    if count >= 2 * DECAY_WINDOW {
-        return count.is_multiple_of(DECAY_WINDOW).then_some(DECAY_WINDOW);
+    let settings = SettlingSearchSettings::default();
+    if count >= 2 * settings.window {
+        return count.is_multiple_of(settings.window).then_some(settings.window);
     }
-    count.is_multiple_of(2 * FIRST_WINDOW).then_some(count / 2)
+    count.is_multiple_of(2 * settings.first_window).then_some(count / 2)
 }
-
-/// Number of returns before the first check for progress; later checks follow whenever it
-/// doubles. The search fails after [`FAILED_CHECKS`] negative checks in a row. Beats of
-/// neighbouring modes rise and fall, but not over growing windows.
-const FIRST_PROGRESS_CHECK: usize = 1024;
-const FAILED_CHECKS: usize = 3;
-/// Most periods of a repeating motion that the check detects, and the largest distance of two
-/// repetitions relative to the change of one return.
-const MOST_REPEATS: usize = 8;
-const REPEATS: f64 = 1e-3;
 
 /// Returns the number of further returns to the tolerance if the changes keep their decay over
 /// the last half of all returns. Infinite if they do not decay.
@@ -281,46 +304,86 @@ fn returns_needed(changes: &[f64], tolerance: f64) -> f64 {
     (window as f64 * (missing / tolerance).ln() / -decay.ln()).max(0.0)
 }
 
-/// A change per return below this value is rounding.
-const ROUNDING: f64 = 1e-14;
+/// Settings of Newton's method on the return map.
+#[derive(Debug, Clone)]
+struct ClosingSettings {
+    /// Most Newton iterations. A search takes 2 to 4 with a warm start and 5 to 15 without.
+    iterations: usize,
+    /// Most phases of iterating the map before the search fails.
+    decay_phases: usize,
+    /// Most halvings of a Newton step before a phase of iterating the map.
+    halvings: i32,
+    /// Number of returns in the first phase; each later phase is longer by half.
+    returns: usize,
+    /// A state larger than rest by this factor (10^7 times the static response) cannot be checked.
+    largest: f64,
+    /// An initial guess larger than rest by this factor (10^3 times the static response) may be a
+    /// resonance that friction suppresses.
+    resonant_guess: f64,
+    /// A Newton step must leave at most this fraction of the residual.
+    decrease: f64,
+    /// Singular values below this fraction of the largest belong to the continuum of stick
+    /// offsets.
+    continuum: f64,
+    /// Largest factor by which one full step may increase the residual. Beyond a kink the next
+    /// step mostly converges, where shortened steps would creep up to the kink. Where shortened
+    /// steps succeed, the full steps increase the residual less than twofold.
+    largest_increase: f64,
+    /// Range of the residual ratio of a full step near a double root: 1/4 where the distance
+    /// halves, 1/3 where the period begins in slip.
+    ///
+    /// Such a root is the edge of a continuum of stick offsets. A motion that creeps towards it
+    /// slips by the square of its distance. The residual reaches rounding when only half of the
+    /// digits are correct, and the remaining slip fails the energy balance.
+    double_root_ratio: std::ops::Range<f64>,
+    /// Number of full steps taken at once after two such steps in a row: two lead to the root, the
+    /// rest into the range where the contact sticks. The return from there is at rest.
+    double_root_step: f64,
+    /// Largest ratio of the residuals after and before this step. A stuck contact leaves no
+    /// residual; a contact that slips on the other side leaves some thousandths.
+    double_root_decrease: f64,
+}
 
-/// Most Newton iterations. A search takes 2 to 4 with a warm start and 5 to 15 without.
-const ITERATIONS: usize = 60;
-/// Most phases of iterating the map before the search fails.
-const DECAY_PHASES: usize = 6;
-/// Most halvings of a Newton step before a phase of iterating the map.
-const HALVINGS: i32 = 4;
-/// Number of returns in the first phase; each later phase is longer by half.
-const RETURNS: usize = 40;
-/// A state larger than rest by this factor (10^7 times the static response) cannot be checked.
-const LARGEST: f64 = 1e10;
-/// An initial guess larger than rest by this factor (10^3 times the static response) may be a
-/// resonance that friction suppresses.
-const RESONANT_GUESS: f64 = 1e6;
+impl Default for ClosingSettings {
+    fn default() -> Self {
+        ClosingSettings {
+            iterations: 60,
+            decay_phases: 6,
+            halvings: 4,
+            returns: 40,
+            largest: 1e10,
+            resonant_guess: 1e6,
+            decrease: 0.95,
+            continuum: 1e-10,
+            largest_increase: 3.0,
+            double_root_ratio: 0.2..0.4,
+            double_root_step: 2.125,
+            double_root_decrease: 1e-3,
+        }
+    }
+}
 
 /// Returns true if the state of an undamped resonance is so large that the work of the loads is
 /// lost in rounding.
 fn too_large(size: f64, aim: ClosingTargets) -> bool {
-    aim.rest > 0.0 && size > LARGEST * aim.rest
+    let settings = ClosingSettings::default();
+    aim.rest > 0.0 && size > settings.largest * aim.rest
 }
-/// A Newton step must leave at most this fraction of the residual.
-const DECREASE: f64 = 0.95;
-/// Singular values below this fraction of the largest belong to the continuum of stick offsets.
-const CONTINUUM: f64 = 1e-10;
 
 /// Closes an orbit by Newton's method. Where it stalls, lets the transient decay before the
 /// next attempt.
 pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
+    let settings = ClosingSettings::default();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
-    let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, RETURNS);
+    let (mut iterations, mut smallest, mut returns) = (0, f64::INFINITY, settings.returns);
     let mut state = start.to_vec();
-    for rescue in 0..=DECAY_PHASES {
+    for rescue in 0..=settings.decay_phases {
         let end = newton_with_line_search(map, &state, aim, LargeIncrease::Shortens, &mut iterations)?;
         if end.residual <= aim.residual {
             return polish(map, end, aim);
         }
         smallest = smallest.min(end.residual);
-        if rescue == DECAY_PHASES || iterations >= ITERATIONS {
+        if rescue == settings.decay_phases || iterations >= settings.iterations {
             break;
         }
         state = end.state;
@@ -342,7 +405,8 @@ pub(crate) fn close(map: &mut dyn ReturnMap, start: &[f64], aim: ClosingTargets)
 /// Near a resonance the residual is a small fraction of that distance, and the result would
 /// depend on the path of the iteration.
 fn polish(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> Result<ClosedState, OrbitError> {
-    if closed.residual <= ROUNDING || aim.distance == f64::INFINITY {
+    // A residual below 1e-14 is rounding.
+    if closed.residual <= 1e-14 || aim.distance == f64::INFINITY {
         return Ok(closed);
     }
     let step = newton_step(&closed.derivative, &closed.gap, aim.sign, map.weights());
@@ -372,26 +436,8 @@ fn polish(map: &mut dyn ReturnMap, closed: ClosedState, aim: ClosingTargets) -> 
     Ok(closed)
 }
 
-/// Largest factor by which one full step may increase the residual. Beyond a kink the next step
-/// mostly converges, where shortened steps would creep up to the kink. Where shortened steps
-/// succeed, the full steps increase the residual less than twofold.
-const LARGEST_INCREASE: f64 = 3.0;
-
-/// Range of the residual ratio of a full step near a double root: 1/4 where the distance
-/// halves, 1/3 where the period begins in slip.
-///
-/// Such a root is the edge of a continuum of stick offsets. A motion that creeps towards it
-/// slips by the square of its distance. The residual reaches rounding when only half of the
-/// digits are correct, and the remaining slip fails the energy balance.
-const DOUBLE_ROOT_RATIO: std::ops::Range<f64> = 0.2..0.4;
-/// Number of full steps taken at once after two such steps in a row: two lead to the root, the
-/// rest into the range where the contact sticks. The return from there is at rest.
-const DOUBLE_ROOT_STEP: f64 = 2.125;
-/// Largest ratio of the residuals after and before this step. A stuck contact leaves no
-/// residual; a contact that slips on the other side leaves some thousandths.
-const DOUBLE_ROOT_DECREASE: f64 = 1e-3;
-
-/// Reaction to a full step that increases the residual by more than [`LARGEST_INCREASE`].
+/// Reaction to a full step that increases the residual by more than
+/// [`ClosingSettings::largest_increase`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LargeIncrease {
     /// The solver shortens the step.
@@ -404,8 +450,8 @@ pub(crate) enum LargeIncrease {
 /// Takes Newton steps, shortened where they fail, and returns the last state.
 ///
 /// It stops when the orbit is closed, when no step reduces the residual enough, when a step
-/// goes too far for `beyond`, or after [`ITERATIONS`]. One full step may increase the residual
-/// by [`LARGEST_INCREASE`].
+/// goes too far for `beyond`, or after [`ClosingSettings::iterations`]. One full step may increase
+/// the residual by [`ClosingSettings::largest_increase`].
 pub(crate) fn newton_with_line_search(
     map: &mut dyn ReturnMap,
     start: &[f64],
@@ -413,6 +459,7 @@ pub(crate) fn newton_with_line_search(
     beyond: LargeIncrease,
     iterations: &mut usize,
 ) -> Result<ClosedState, OrbitError> {
+    let settings = ClosingSettings::default();
     let n = start.len();
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     // a single increase is allowed only for cheap maps: an integration may take forever from a
@@ -434,13 +481,13 @@ pub(crate) fn newton_with_line_search(
             return Err(OrbitError::not_converged(aim.method, aim.omega, *iterations, 1.0));
         }
         let mut accepted = false;
-        if residual > aim.residual && *iterations < ITERATIONS {
+        if residual > aim.residual && *iterations < settings.iterations {
             let step = newton_step(&derivative, &gap, aim.sign, map.weights());
             let onto = shares
                 .iter()
-                .all(|share| DOUBLE_ROOT_RATIO.contains(share))
-                .then_some((DOUBLE_ROOT_STEP, DOUBLE_ROOT_DECREASE));
-            let shorter = (0..=HALVINGS).map(|halvings| (0.5f64.powi(halvings), DECREASE));
+                .all(|share| settings.double_root_ratio.contains(share))
+                .then_some((settings.double_root_step, settings.double_root_decrease));
+            let shorter = (0..=settings.halvings).map(|halvings| (0.5f64.powi(halvings), settings.decrease));
             for (fraction, enough) in onto.into_iter().chain(shorter) {
                 let mut trial: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + fraction * d).collect();
                 if fraction > 1.0 {
@@ -453,7 +500,7 @@ pub(crate) fn newton_with_line_search(
                 if let Ok(trial_gap) = evaluate(map, &trial, aim, &mut trial_derivative) {
                     let after = norm(map.weights(), trial_gap.as_slice());
                     let less = after <= enough * before;
-                    if less || (may_increase && fraction == 1.0 && after <= LARGEST_INCREASE * before) {
+                    if less || (may_increase && fraction == 1.0 && after <= settings.largest_increase * before) {
                         if !less {
                             (may_increase, before_increase) = (false, Some((state, before, gap, derivative)));
                         } else if before_increase.as_ref().is_some_and(|(_, least, ..)| after <= *least) {
@@ -464,7 +511,7 @@ pub(crate) fn newton_with_line_search(
                         accepted = true;
                         break;
                     }
-                    if beyond == LargeIncrease::Ends && fraction <= 1.0 && after > LARGEST_INCREASE * before {
+                    if beyond == LargeIncrease::Ends && fraction <= 1.0 && after > settings.largest_increase * before {
                         break;
                     }
                 }
@@ -473,7 +520,7 @@ pub(crate) fn newton_with_line_search(
         if !accepted {
             // undo the single increase, since no later step improved on it
             if residual > aim.residual
-                && *iterations < ITERATIONS
+                && *iterations < settings.iterations
                 && beyond == LargeIncrease::Shortens
                 && let Some((from, _, its_gap, its_derivative)) = before_increase.take()
             {
@@ -502,6 +549,7 @@ fn evaluate(
 
 /// Returns `-(I - sign · R')⁻¹ gap`, of least energy norm if the matrix is singular.
 pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f64, weights: &[f64]) -> DVector<f64> {
+    let settings = ClosingSettings::default();
     let n = gap.len();
     // energy coordinates give the singular values and the least norm a meaning
     let scaled = || {
@@ -514,12 +562,12 @@ pub(crate) fn newton_step(derivative: &DMatrix<f64>, gap: &DVector<f64>, sign: f
     let lu = scaled().lu();
     let pivots = || (0..n).map(|i| lu.lu_internal()[(i, i)].abs());
     let (least, most) = (pivots().fold(f64::INFINITY, f64::min), pivots().fold(0.0, f64::max));
-    let solution = if n > 0 && least > CONTINUUM * most {
+    let solution = if n > 0 && least > settings.continuum * most {
         lu.solve(&right)
     } else {
         // values out of range have no singular value decomposition; the step is then one
         // iteration of the map
-        eigen::svd(scaled()).and_then(|svd| svd.solve(&right, CONTINUUM * svd.singular_values.amax()).ok())
+        eigen::svd(scaled()).and_then(|svd| svd.solve(&right, settings.continuum * svd.singular_values.amax()).ok())
     };
     let mut step = solution.unwrap_or_else(|| right.clone());
     for i in 0..n {

@@ -13,34 +13,58 @@ use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// Limits of the systems that are integrated; each step multiplies full matrices.
-const LARGEST: usize = 100;
-const JOINTS: usize = 60;
-/// Steps per period. With 256 steps the ringing of stuck contacts keeps motions from settling that
-/// settle with 1024.
-const STEPS: usize = 1024;
-/// Periods over which the excitation grows from zero. An excitation that starts at once excites
-/// vibrations of stuck contacts, which hardly anything damps.
-const GROWTH: usize = 160;
-/// Periods until the first classification. While the motion has not settled, the number doubles
-/// up to [`MOST_PERIODS`]. This is ten times the decay time of a mode with 0.1 % of critical
-/// damping.
-const PERIODS: usize = 80;
-const MOST_PERIODS: usize = 1280;
-/// Number of last returns that the classification uses.
-const WINDOW: usize = 33;
-/// Largest number of periods after which a motion may repeat.
-const REPEATS: usize = 8;
-/// Relative distance, in amplitudes, below which two returns count as equal. It covers the end
-/// of a transient and the error of the steps.
-const EQUAL_DISTANCE: f64 = 2e-3;
-/// Largest ratio of the distances between returns, half a window apart, of a settling motion.
-/// Beats exceed it now and then; the test applies it twice to make errors rare.
-const SETTLING_RATIO: f64 = 0.9;
-/// Displacement over the window, in amplitudes, above which a place drifts.
-const DRIFT_DISTANCE: f64 = 2.0;
-/// Instants of the last period at which the contacts are sampled.
-const INSTANTS: usize = 128;
+/// Settings of the integration and of the classification.
+#[derive(Debug, Clone, Copy)]
+struct SettlingSettings {
+    /// Most degrees of freedom of systems that are integrated; each step multiplies full matrices.
+    dofs: usize,
+    /// Most joints of systems that are integrated.
+    joints: usize,
+    /// Steps per period. With 256 steps the ringing of stuck contacts keeps motions from settling
+    /// that settle with 1024.
+    steps: usize,
+    /// Periods over which the excitation grows from zero. An excitation that starts at once
+    /// excites vibrations of stuck contacts, which hardly anything damps.
+    growth: usize,
+    /// Periods until the first classification. While the motion has not settled, the number
+    /// doubles.
+    periods: usize,
+    /// Most periods. This is ten times the decay time of a mode with 0.1 % of critical damping.
+    most_periods: usize,
+    /// Number of last returns that the classification uses.
+    window: usize,
+    /// Largest number of periods after which a motion may repeat.
+    repeats: usize,
+    /// Relative distance, in amplitudes, below which two returns count as equal. It covers the end
+    /// of a transient and the error of the steps.
+    equal_distance: f64,
+    /// Largest ratio of the distances between returns, half a window apart, of a settling motion.
+    /// Beats exceed it now and then; the test applies it twice to make errors rare.
+    settling_ratio: f64,
+    /// Displacement over the window, in amplitudes, above which a place drifts.
+    drift_distance: f64,
+    /// Instants of the last period at which the contacts are sampled.
+    instants: usize,
+}
+
+impl Default for SettlingSettings {
+    fn default() -> Self {
+        SettlingSettings {
+            dofs: 100,
+            joints: 60,
+            steps: 1024,
+            growth: 160,
+            periods: 80,
+            most_periods: 1280,
+            window: 33,
+            repeats: 8,
+            equal_distance: 2e-3,
+            settling_ratio: 0.9,
+            drift_distance: 2.0,
+            instants: 128,
+        }
+    }
+}
 
 /// A motion that was integrated: its behaviour, its last period, and its state at the end.
 type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
@@ -49,32 +73,33 @@ type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
 ///
 /// Returns `None` if no integration in equal steps takes the system, or if it breaks down.
 pub(crate) fn classify_motion(system: &System, omega: f64, mut start: Vec<f64>) -> Option<Followed> {
-    if system.dofs() > LARGEST
-        || system.joints().len() > JOINTS
+    let settings = SettlingSettings::default();
+    if system.dofs() > settings.dofs
+        || system.joints().len() > settings.joints
         || IntegratorKind::of(system, None) != IntegratorKind::Incremental
     {
         return None;
     }
     let mut flow = AverageAccelerationFlow::new(system, None, "what follows a motion").ok()?;
-    flow.count = STEPS;
+    flow.count = settings.steps;
     let (n, period) = (system.dofs(), TAU / omega);
     start.resize(flow.states(), 0.0);
     let mut state = start;
     flow.set_excitation(system, omega);
     let excitation = flow.excitation.clone();
-    for grown in 1..GROWTH {
-        let share = 0.5 - 0.5 * (PI * grown as f64 / GROWTH as f64).cos();
+    for grown in 1..settings.growth {
+        let share = 0.5 - 0.5 * (PI * grown as f64 / settings.growth as f64).cos();
         flow.excitation = excitation.scaled(share);
         flow.run(&mut state, period, None).ok()?;
     }
     flow.excitation = excitation;
-    let mut returns = VecDeque::with_capacity(WINDOW);
-    let (mut count, mut next) = (0, PERIODS);
+    let mut returns = VecDeque::with_capacity(settings.window);
+    let (mut count, mut next) = (0, settings.periods);
     loop {
         count += 1;
         flow.set_recording(count == next);
         flow.run(&mut state, period, None).ok()?;
-        if returns.len() == WINDOW {
+        if returns.len() == settings.window {
             returns.pop_front();
         }
         returns.push_back(state[..2 * n].to_vec());
@@ -82,10 +107,11 @@ pub(crate) fn classify_motion(system: &System, omega: f64, mut start: Vec<f64>) 
             continue;
         }
         let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
-        let samples: Vec<_> = (0..INSTANTS).map(|i| path.sample(period * i as f64 / INSTANTS as f64)).collect();
+        let samples: Vec<_> =
+            (0..settings.instants).map(|i| path.sample(period * i as f64 / settings.instants as f64)).collect();
         let course = classified(system, omega, (count, returns.make_contiguous()), &samples);
         let may_settle = matches!(course, ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. });
-        if !may_settle || 2 * next > MOST_PERIODS {
+        if !may_settle || 2 * next > settings.most_periods {
             return Some((course, path, state));
         }
         next *= 2;
@@ -98,6 +124,7 @@ fn classified(
     (periods, returns): (usize, &[Vec<f64>]),
     samples: &[Sample],
 ) -> ObservedMotion {
+    let settings = SettlingSettings::default();
     let n = system.dofs();
     // displacements, and velocities over Ω
     let unit = |i: usize| if i < n { 1.0 } else { omega };
@@ -105,16 +132,16 @@ fn classified(
     let swing = velocities.fold(0.0, |m: f64, v| m.max(v.abs() / omega));
     let last = returns.len() - 1;
     let apart_at = |end: usize, p: usize| {
-        let pairs = (0..=REPEATS).map(|k| (&returns[end - k], &returns[end - k - p]));
+        let pairs = (0..=settings.repeats).map(|k| (&returns[end - k], &returns[end - k - p]));
         let each = pairs.flat_map(|(a, b)| a.iter().zip(b).enumerate().map(|(i, (a, b))| (a - b).abs() / unit(i)));
         each.fold(0.0, f64::max)
     };
     let apart = |p: usize| apart_at(last, p);
-    if let Some(periods) = (1..=REPEATS).find(|p| apart(*p) <= EQUAL_DISTANCE * swing) {
+    if let Some(periods) = (1..=settings.repeats).find(|p| apart(*p) <= settings.equal_distance * swing) {
         return if periods == 1 { ObservedMotion::Settles } else { ObservedMotion::Repeats { periods } };
     }
-    if apart(1) <= SETTLING_RATIO * apart_at(last / 2, 1)
-        && apart_at(last / 2, 1) <= SETTLING_RATIO * apart_at(REPEATS + 1, 1)
+    if apart(1) <= settings.settling_ratio * apart_at(last / 2, 1)
+        && apart_at(last / 2, 1) <= settings.settling_ratio * apart_at(settings.repeats + 1, 1)
     {
         return ObservedMotion::Settling { periods };
     }
@@ -135,7 +162,7 @@ fn classified(
         (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, place)
     });
     let farthest = farthest.fold((0.0, ""), |a, (way, place)| if way > a.0 { (way, place.as_str()) } else { a });
-    if farthest.0 > DRIFT_DISTANCE * swing {
+    if farthest.0 > settings.drift_distance * swing {
         let (way, place) = (farthest.0, farthest.1.to_owned());
         return ObservedMotion::Drifts { place, drift: way, periods: last, joint, open_fraction: share };
     }
@@ -191,15 +218,17 @@ mod tests {
     /// settling and from an irregular one.
     #[test]
     fn what_repeats_is_told_from_what_does_not() {
+        let settings = SettlingSettings::default();
         let system = block([0.0, 10.0]);
-        let returns = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
+        let returns =
+            |of: &dyn Fn(usize) -> f64| (0..settings.window).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
         let path = classify_motion(&system, OMEGA, Vec::new()).unwrap().1;
         let samples = [path.sample(0.0)];
-        let third = classified(&system, OMEGA, (PERIODS, &returns(&|k| (k % 3) as f64)), &samples);
+        let third = classified(&system, OMEGA, (settings.periods, &returns(&|k| (k % 3) as f64)), &samples);
         assert_eq!(third, ObservedMotion::Repeats { periods: 3 });
-        let slow = classified(&system, OMEGA, (PERIODS, &returns(&|k| (-0.02 * k as f64).exp())), &samples);
-        assert_eq!(slow, ObservedMotion::Settling { periods: PERIODS });
-        let none = classified(&system, OMEGA, (PERIODS, &returns(&|k| ((k * k) as f64).sin())), &samples);
-        assert!(matches!(none, ObservedMotion::Irregular { periods: PERIODS, .. }), "{none}");
+        let slow = classified(&system, OMEGA, (settings.periods, &returns(&|k| (-0.02 * k as f64).exp())), &samples);
+        assert_eq!(slow, ObservedMotion::Settling { periods: settings.periods });
+        let none = classified(&system, OMEGA, (settings.periods, &returns(&|k| ((k * k) as f64).sin())), &samples);
+        assert!(matches!(none, ObservedMotion::Irregular { periods, .. } if periods == settings.periods), "{none}");
     }
 }

@@ -9,18 +9,6 @@ use super::return_map::norm;
 use crate::method::IntegrationError;
 use crate::orbit::{Evidence, Path, Symmetry};
 
-/// Instants per period at which the motion is sampled. The energy oscillates between
-/// displacement and velocity; the largest sample is accurate to some percent.
-const INSTANTS: usize = 32;
-/// A search is repeated if it assumed a fraction larger than the actual one by more than this
-/// factor.
-const FRACTION_FACTOR: f64 = 2.0;
-/// Smallest fraction. It leaves the vibration at least the nine digits that its search needs,
-/// of the sixteen of the state.
-const LEAST: f64 = 1e-6;
-/// Fraction below which an energy imbalance is attributed to lost digits.
-pub(crate) const SMALL: f64 = 1e-3;
-
 /// Returns the size of the vibration over the size of the state `start`, in the energy norm
 /// with `weights` (displacements, velocities, states of the joints). Sizes below `rest` (√J)
 /// count as `rest`.
@@ -33,12 +21,15 @@ pub(crate) fn fraction(
     if symmetry == Symmetry::HalfPeriod {
         return 1.0; // the mean of this motion is zero
     }
-    let instants: Vec<_> = (0..INSTANTS).map(|k| path.sample(period * k as f64 / INSTANTS as f64)).collect();
+    // Instants per period at which the motion is sampled. The energy oscillates between
+    // displacement and velocity; the largest sample is accurate to some percent.
+    let count = 32;
+    let instants: Vec<_> = (0..count).map(|k| path.sample(period * k as f64 / count as f64)).collect();
     let n = instants[0].displacement.len();
     if n == 0 {
         return 1.0; // no structure: the states of the joints follow the imposed motion
     }
-    let mean = |row: usize| instants.iter().map(|at| at.displacement[row]).sum::<f64>() / INSTANTS as f64;
+    let mean = |row: usize| instants.iter().map(|at| at.displacement[row]).sum::<f64>() / count as f64;
     let mean: Vec<f64> = (0..n).map(mean).collect();
     let about = |at: &crate::orbit::Sample| {
         let moved = at.displacement.iter().zip(&mean).map(|(x, mean)| x - mean);
@@ -55,9 +46,13 @@ pub(crate) fn fraction(
 /// # Errors
 /// Fails if the vibration has too few digits of its state.
 pub(crate) fn next_fraction(taken: f64, found: f64) -> Result<Option<f64>, IntegrationError> {
-    match taken <= FRACTION_FACTOR * found {
+    // A search is repeated if it assumed a fraction larger than the actual one by more than this
+    // factor.
+    match taken <= 2.0 * found {
         true => Ok(None),
-        false if found < LEAST => Err(IntegrationError::Offset { share: found }),
+        // Smallest fraction. It leaves the vibration at least the nine digits that its search
+        // needs, of the sixteen of the state.
+        false if found < 1e-6 => Err(IntegrationError::Offset { share: found }),
         false => Ok(Some(found)),
     }
 }

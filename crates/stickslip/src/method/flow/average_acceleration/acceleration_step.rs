@@ -80,16 +80,26 @@ pub(super) struct AccelerationStep {
     z: Vec<f64>,
 }
 
-/// Largest number of Newton iterations of a step; 2 to 5 are typical, kinks need a few more.
-const ITERATIONS: usize = 60;
-/// Number of iterations after which the Newton step is halved, which ends a cycle between two
-/// sides of a kink.
-const FULL_STEPS: usize = 20;
-/// Correction relative to the velocity scale that ends the iteration: it is at the level of
-/// rounding.
-const SMALL: f64 = 1e-13;
-/// Relative correction that is accepted if rounding prevents further convergence.
-const ACCEPTED_CORRECTION: f64 = 1e-9;
+/// Settings of Newton's method for a step.
+#[derive(Debug, Clone, Copy)]
+struct AccelerationStepSettings {
+    /// Largest number of Newton iterations of a step; 2 to 5 are typical, kinks need a few more.
+    iterations: usize,
+    /// Number of iterations after which the Newton step is halved, which ends a cycle between two
+    /// sides of a kink.
+    full_steps: usize,
+    /// Correction relative to the velocity scale that ends the iteration: it is at the level of
+    /// rounding.
+    tolerance: f64,
+    /// Relative correction that is accepted if rounding prevents further convergence.
+    accepted_correction: f64,
+}
+
+impl Default for AccelerationStepSettings {
+    fn default() -> Self {
+        AccelerationStepSettings { iterations: 60, full_steps: 20, tolerance: 1e-13, accepted_correction: 1e-9 }
+    }
+}
 
 impl AccelerationStep {
     pub fn new(assembly: &Assembly) -> Self {
@@ -136,6 +146,7 @@ impl AccelerationStep {
         (time, state): (f64, &mut [f64]),
         scale: f64,
     ) -> bool {
+        let settings = AccelerationStepSettings::default();
         let (n, j, h) = (assembly.n, assembly.axes.len(), eliminated.length);
         // the end of the last step is the start of this one
         std::mem::swap(&mut self.before, &mut self.force);
@@ -159,7 +170,7 @@ impl AccelerationStep {
         }
         let mut converged = j == 0;
         let mut previous = f64::INFINITY;
-        for iteration in 0..ITERATIONS {
+        for iteration in 0..settings.iterations {
             interrupt::check();
             if !self.evaluate(assembly, eliminated, excitation, (time, &state[n..2 * n])) || !self.lu.factor() {
                 return false;
@@ -172,9 +183,9 @@ impl AccelerationStep {
             if !self.residual.iter().all(|r| r.is_finite()) {
                 return false;
             }
-            let share = if iteration < FULL_STEPS { 1.0 } else { 0.5 };
+            let share = if iteration < settings.full_steps { 1.0 } else { 0.5 };
             self.unknown.iter_mut().zip(&self.residual).for_each(|(w, step)| *w -= share * step);
-            converged = size <= SMALL || (size <= ACCEPTED_CORRECTION && size >= previous);
+            converged = size <= settings.tolerance || (size <= settings.accepted_correction && size >= previous);
             previous = size;
         }
         if !converged {

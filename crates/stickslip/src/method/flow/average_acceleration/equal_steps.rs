@@ -17,19 +17,35 @@ use crate::orbit::{Path, Symmetry};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Initial number of steps of an interval.
-pub(crate) const INITIAL_STEPS: usize = 256;
-/// Largest number of steps of an interval. Linear motion then has an error below 1e-9, and a
-/// run takes about 0.1 s for one joint.
-pub(crate) const MAX_STEPS: usize = 1 << 16;
-/// Relative error of an interval of a transient: the change of the extrapolated limit from two
-/// step sizes when both are halved.
-const TOLERANCE: f64 = 1e-6;
-/// Fraction of the tolerance below which the next interval tries half as many steps. Halving
-/// the steps reduces the error to a sixteenth without kinks, and to a quarter with kinks.
-const COARSENING_FRACTION: f64 = 0.05;
-/// Smallest number of steps of an interval of a transient.
-const MIN_STEPS: usize = 64;
+/// Settings of the integration in equal steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EqualStepSettings {
+    /// Initial number of steps of an interval.
+    pub initial_steps: usize,
+    /// Largest number of steps of an interval. Linear motion then has an error below 1e-9, and a
+    /// run takes about 0.1 s for one joint.
+    pub max_steps: usize,
+    /// Relative error of an interval of a transient: the change of the extrapolated limit from two
+    /// step sizes when both are halved.
+    pub tolerance: f64,
+    /// Fraction of the tolerance below which the next interval tries half as many steps. Halving
+    /// the steps reduces the error to a sixteenth without kinks, and to a quarter with kinks.
+    pub coarsening_fraction: f64,
+    /// Smallest number of steps of an interval of a transient.
+    pub min_steps: usize,
+}
+
+impl Default for EqualStepSettings {
+    fn default() -> Self {
+        EqualStepSettings {
+            initial_steps: 256,
+            max_steps: 1 << 16,
+            tolerance: 1e-6,
+            coarsening_fraction: 0.05,
+            min_steps: 64,
+        }
+    }
+}
 
 /// Reason for rejecting a law without a smooth approximation.
 const DROPS: &str =
@@ -66,6 +82,7 @@ impl AverageAccelerationFlow {
     /// # Errors
     /// A law with neither a step nor a rate view, a rigid slider, or a place without mass.
     pub fn new(system: &System, width: Option<f64>, method: &'static str) -> Result<Self, MethodError> {
+        let settings = EqualStepSettings::default();
         let assembly = Assembly::new(system, method, |joint| {
             let regular = width.and_then(|width| joint.regularised(width));
             let chosen = regular.unwrap_or_else(|| joint.clone());
@@ -83,7 +100,7 @@ impl AverageAccelerationFlow {
         })?;
         Ok(AverageAccelerationFlow {
             excitation: HarmonicExcitation::default(),
-            count: INITIAL_STEPS,
+            count: settings.initial_steps,
             share: 1.0,
             keep: false,
             steps: StepRecord::new(vec![(1.0, 1.0)], &assembly),
@@ -219,12 +236,13 @@ impl Flow for AverageAccelerationFlow {
     }
 
     fn run_accurately(&mut self, state: &mut [f64], duration: f64) -> Result<(), IntegrationError> {
+        let settings = EqualStepSettings::default();
         let (weights, rest) = (self.weights(), NEAR_REST * self.energy_scale());
         let mut coarse = loop {
             match self.trial(state, duration) {
                 // steps that are too large for the states of a law are halved
                 Err(IntegrationError::Stalled { .. } | IntegrationError::NotFinite { .. })
-                    if self.count < MAX_STEPS =>
+                    if self.count < settings.max_steps =>
                 {
                     self.count *= 2
                 }
@@ -241,20 +259,21 @@ impl Flow for AverageAccelerationFlow {
                 let change: Vec<f64> = end.iter().zip(&before).map(|(a, b)| a - b).collect();
                 let size = norm(&weights, &end).max(norm(&weights, state)).max(rest).max(f64::MIN_POSITIVE);
                 let error = norm(&weights, &change) / size;
-                if error <= TOLERANCE {
+                if error <= settings.tolerance {
                     state.copy_from_slice(&end);
                     self.steps = coarse.1.extrapolated(&fine.1);
                     // the next interval begins with the same number of steps, or with half of
                     // it
-                    self.count =
-                        (self.count / if error < COARSENING_FRACTION * TOLERANCE { 8 } else { 4 }).max(MIN_STEPS);
+                    self.count = (self.count
+                        / if error < settings.coarsening_fraction * settings.tolerance { 8 } else { 4 })
+                    .max(settings.min_steps);
                     return Ok(());
                 }
-                if self.count >= MAX_STEPS {
+                if self.count >= settings.max_steps {
                     return Err(IntegrationError::Unresolved {
                         steps: self.count,
                         estimate: error,
-                        tolerance: TOLERANCE,
+                        tolerance: settings.tolerance,
                     });
                 }
             }

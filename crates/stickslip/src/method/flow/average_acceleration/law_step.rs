@@ -75,7 +75,9 @@ pub(crate) fn states_after_motion(
         state_scale,
     };
     let mut follower = LawIntegrator::new(&placed);
-    let steps = if follower.view == View::Rate { SLOW_STEPS } else { 1 };
+    // Number of steps of a slow motion for a law with a rate view. The trapezoidal rule then has a
+    // relative error below 1e-6.
+    let steps = if follower.view == View::Rate { 2000 } else { 1 };
     let at = |step: usize| RelativeMotion {
         displacement: std::array::from_fn(|a| from[a] + (to[a] - from[a]) * step as f64 / steps as f64),
         velocity: std::array::from_fn(|a| to[a] - from[a]),
@@ -91,10 +93,6 @@ pub(crate) fn states_after_motion(
     }
     z
 }
-
-/// Number of steps of a slow motion for a law with a rate view. The trapezoidal rule then has a
-/// relative error below 1e-6.
-const SLOW_STEPS: usize = 2000;
 
 /// Returns the number of states of a law in this method, and their scale.
 pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
@@ -139,15 +137,25 @@ pub(super) struct LawIntegrator {
     change: Vec<f64>,
 }
 
-/// Largest number of Newton iterations for the states at the end of a step.
-const ITERATIONS: usize = 60;
-/// Largest change of a state per iteration, in units of its scale. Without this limit, a law
-/// that is exponential in its states would diverge.
-const MAX_STATE_CHANGE: f64 = 2.0;
-/// Relative change of the states that ends the iteration.
-const SMALL: f64 = 1e-13;
-/// Relative change that is accepted if rounding prevents further convergence.
-const ACCEPTED_CHANGE: f64 = 1e-9;
+/// Settings of Newton's method for the states at the end of a step.
+#[derive(Debug, Clone, Copy)]
+struct LawStepSettings {
+    /// Largest number of iterations.
+    iterations: usize,
+    /// Largest change of a state per iteration, in units of its scale. Without this limit, a law
+    /// that is exponential in its states would diverge.
+    max_state_change: f64,
+    /// Relative change of the states that ends the iteration.
+    tolerance: f64,
+    /// Relative change that is accepted if rounding prevents further convergence.
+    accepted_change: f64,
+}
+
+impl Default for LawStepSettings {
+    fn default() -> Self {
+        LawStepSettings { iterations: 60, max_state_change: 2.0, tolerance: 1e-13, accepted_change: 1e-9 }
+    }
+}
 
 impl LawIntegrator {
     /// Creates it for a law with [`states`].
@@ -347,11 +355,12 @@ impl LawIntegrator {
 
     /// Solves `z₁ = z₀ + h/2 (g₀ + g₁)` by Newton's method, and computes the derivatives.
     fn integrate(&mut self, law: &SharedLaw, from: LawInstant, to: &RelativeMotion<f64>, h: f64) -> bool {
+        let settings = LawStepSettings::default();
         let (directions, states, width) = (self.directions, self.states, self.arguments());
         let Some(rate) = law.rate() else { return false };
         let half = 0.5 * h;
         let (mut found, mut previous) = (states == 0, f64::INFINITY);
-        for _ in 0..ITERATIONS {
+        for _ in 0..settings.iterations {
             rate.evaluate_with_derivatives(directions, to, &self.state, &mut self.after);
             let matrix = self.lu.zeros(states);
             for s in 0..states {
@@ -369,14 +378,14 @@ impl LawIntegrator {
             }
             self.lu.solve(&mut self.change);
             let size = self.change.iter().fold(0.0f64, |size, c| size.max(c.abs() / self.state_scale));
-            let share = if size > MAX_STATE_CHANGE { MAX_STATE_CHANGE / size } else { 1.0 };
+            let share = if size > settings.max_state_change { settings.max_state_change / size } else { 1.0 };
             self.state.iter_mut().zip(&self.change).for_each(|(z, change)| *z += share * change);
             if !self.state.iter().all(|z| z.is_finite()) {
                 self.state.copy_from_slice(from.z);
                 return false;
             }
             let largest = self.state.iter().fold(self.state_scale, |size, z| size.max(z.abs())) / self.state_scale;
-            found = size <= SMALL * largest || (size <= ACCEPTED_CHANGE && size >= previous);
+            found = size <= settings.tolerance * largest || (size <= settings.accepted_change && size >= previous);
             previous = size;
         }
         if !found {

@@ -173,13 +173,6 @@ pub(crate) struct RadauStep {
     filter: Filter,
 }
 
-/// Largest number of Newton iterations per step. With the extrapolated initial guess, 2 to 4
-/// are typical; a step that needs more is halved.
-const ITERATIONS: usize = 12;
-/// Relative correction of the unknowns that ends the iteration: the next correction would be at
-/// the level of rounding.
-const SMALL: f64 = 1e-9;
-
 /// Subtracts `by(gain)` for each gain from the first rows of one column of a matrix, row by
 /// row.
 fn subtract(matrix: &mut [f64], columns: usize, column: usize, gains: &[f64], by: impl Fn(f64) -> f64) {
@@ -241,7 +234,9 @@ impl RadauStep {
             *structural = axis.component(&state[..n]);
         }
         let mut previous = f64::INFINITY;
-        for iteration in 0..ITERATIONS {
+        // Largest number of Newton iterations per step. With the extrapolated initial guess, 2 to
+        // 4 are typical; a step that needs more is halved.
+        for iteration in 0..12 {
             interrupt::check();
             self.evaluate(assembly, eliminated, loads);
             self.linearise(assembly, eliminated, state);
@@ -267,7 +262,9 @@ impl RadauStep {
             if !size.is_finite() || self.residual.iter().any(|r| !r.is_finite()) {
                 return false;
             }
-            if size <= SMALL {
+            // Relative correction of the unknowns that ends the iteration: the next correction
+            // would be at the level of rounding.
+            if size <= 1e-9 {
                 self.evaluate(assembly, eliminated, loads);
                 if derivatives {
                     self.linearise(assembly, eliminated, state);

@@ -18,26 +18,45 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::radau::{BUTCHER_MATRIX, ERROR_WEIGHTS, ESTIMATE_ORDER, NODES, REAL_EIGENVALUE, STAGES};
 
-/// The time interval has `2^LEVELS` ticks. The finest layers of the arctan law need about
-/// `2^20` steps per half period.
-const LEVELS: usize = 44;
-/// The largest step is the interval divided by `2^MIN_LEVEL`.
-const MIN_LEVEL: usize = 4;
-/// The first step of a run is the interval divided by `2^FIRST_LEVEL`. The step size control
-/// corrects it at once.
-const FIRST_LEVEL: usize = 12;
-/// Largest number of steps of one run, including rejected ones. The returns of the verification
-/// tests take 300 on average, at most 6900. This limit takes a second for one mass.
-const STEP_LIMIT: usize = 200_000;
-/// Ratio of the velocity to the initial scale above which a motion without an acceptable step
-/// size counts as unbounded. Errors are relative to the initial scale and vanish in rounding at
-/// a ratio of 1e7. Contacts that are too stiff fail at ratios of a few.
-const UNBOUNDED_RATIO: f64 = 1e5;
-/// Fraction of the tolerance for the error of the next step.
-const SAFETY: f64 = 0.8;
-/// Growth of the number of steps at which halved steps are replaced by newly chosen ones.
-/// Layers move and leave short steps behind.
-const RECHOICE_RATIO: usize = 2;
+/// Settings of the step size control.
+#[derive(Debug, Clone, Copy)]
+struct RadauSettings {
+    /// The time interval has `2^levels` ticks. The finest layers of the arctan law need about
+    /// `2^20` steps per half period.
+    levels: usize,
+    /// The largest step is the interval divided by `2^min_level`.
+    min_level: usize,
+    /// The first step of a run is the interval divided by `2^first_level`. The step size control
+    /// corrects it at once.
+    first_level: usize,
+    /// Largest number of steps of one run, including rejected ones. The returns of the
+    /// verification tests take 300 on average, at most 6900. This limit takes a second for one
+    /// mass.
+    step_limit: usize,
+    /// Ratio of the velocity to the initial scale above which a motion without an acceptable step
+    /// size counts as unbounded. Errors are relative to the initial scale and vanish in rounding
+    /// at a ratio of 1e7. Contacts that are too stiff fail at ratios of a few.
+    unbounded_ratio: f64,
+    /// Fraction of the tolerance for the error of the next step.
+    safety: f64,
+    /// Growth of the number of steps at which halved steps are replaced by newly chosen ones.
+    /// Layers move and leave short steps behind.
+    rechoice_ratio: usize,
+}
+
+impl Default for RadauSettings {
+    fn default() -> Self {
+        RadauSettings {
+            levels: 44,
+            min_level: 4,
+            first_level: 12,
+            step_limit: 200_000,
+            unbounded_ratio: 1e5,
+            safety: 0.8,
+            rechoice_ratio: 2,
+        }
+    }
+}
 
 /// The source of the step sizes of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,6 +75,7 @@ pub(crate) enum StepSizes {
 
 /// Flow of a structure with smooth laws.
 pub(crate) struct RadauFlow {
+    settings: RadauSettings,
     pub assembly: Assembly,
     pub excitation: HarmonicExcitation,
     /// Relative error per step.
@@ -100,7 +120,9 @@ impl RadauFlow {
     pub fn new(assembly: Assembly, tolerance: f64) -> Self {
         let (states, n, j) = (assembly.states(), assembly.n, assembly.axes.len());
         let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
+        let settings = RadauSettings::default();
         RadauFlow {
+            settings,
             excitation: HarmonicExcitation::default(),
             tolerance,
             keep: false,
@@ -112,11 +134,11 @@ impl RadauFlow {
             rejected: 0,
             again: false,
             interval: 0.0,
-            eliminated: vec![None; LEVELS + 1],
-            onward: vec![None; 2 * LEVELS + 1],
+            eliminated: vec![None; settings.levels + 1],
+            onward: vec![None; 2 * settings.levels + 1],
             step: RadauStep::new(&assembly),
             loads: StageLoads::default(),
-            level: FIRST_LEVEL,
+            level: settings.first_level,
             laws: evaluation_points(&assembly),
             slope: vec![0.0; states],
             next: vec![0.0; states],
@@ -166,7 +188,7 @@ impl RadauFlow {
             }
             return;
         };
-        let onward = self.onward[LEVELS + self.level - level]
+        let onward = self.onward[self.settings.levels + self.level - level]
             .get_or_insert_with(|| NODES.map(|c| extrapolation_weights(1.0 + c * h / length)));
         for (i, weights) in onward.iter().enumerate() {
             for (offset, count) in [(0, j), (STAGES * j, internal)] {
@@ -311,7 +333,7 @@ impl RadauFlow {
 
     /// Returns the size of a step of the present level, s.
     fn length(&self, tick: f64) -> f64 {
-        (1u64 << (LEVELS - self.level)) as f64 * tick
+        (1u64 << (self.settings.levels - self.level)) as f64 * tick
     }
 
     /// Returns the reason why no step is small enough.
@@ -322,7 +344,7 @@ impl RadauFlow {
     fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> IntegrationError {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
-        if fastest > UNBOUNDED_RATIO * speed {
+        if fastest > self.settings.unbounded_ratio * speed {
             return IntegrationError::Unbounded { time, place: self.assembly.farthest(state) };
         }
         match self.step.joint_with_nan(&self.assembly) {
@@ -339,7 +361,7 @@ impl RadauFlow {
             self.level = self.mesh[self.accepted];
         }
         let h = self.length(tick);
-        if self.accepted + self.rejected >= STEP_LIMIT {
+        if self.accepted + self.rejected >= self.settings.step_limit {
             return None;
         }
         if self.eliminated[self.level].is_none() {
@@ -354,7 +376,7 @@ impl RadauFlow {
         if lengths != StepSizes::Chosen {
             // a layer has moved out of its small steps; split this step of the mesh into two
             // halves
-            if self.level == LEVELS {
+            if self.level == self.settings.levels {
                 return false;
             }
             self.mesh[self.accepted] += 1;
@@ -363,12 +385,12 @@ impl RadauFlow {
         }
         // number of halvings that bring the error below one
         let halvings = if error.is_finite() {
-            ((error / SAFETY).log2() / f64::from(ESTIMATE_ORDER)).ceil().clamp(1.0, 4.0) as usize
+            ((error / self.settings.safety).log2() / f64::from(ESTIMATE_ORDER)).ceil().clamp(1.0, 4.0) as usize
         } else {
             2
         };
         self.level += halvings;
-        self.level <= LEVELS
+        self.level <= self.settings.levels
     }
 }
 
@@ -440,15 +462,15 @@ impl Flow for RadauFlow {
         }
         (self.accepted, self.rejected, self.again) = (0, 0, true);
         self.steps.clear();
-        let tick = duration / (1u64 << LEVELS) as f64;
+        let tick = duration / (1u64 << self.settings.levels) as f64;
         let scale = self.scales(state);
-        let total = 1u64 << LEVELS;
+        let total = 1u64 << self.settings.levels;
         let mut position = 0u64;
-        // a step has 2^(LEVELS - level) ticks; all runs over the same interval start at the
+        // a step has 2^(levels - level) ticks; all runs over the same interval start at the
         // same level, for equal bits
-        self.level = FIRST_LEVEL;
+        self.level = self.settings.first_level;
         let lengths = match self.lengths {
-            StepSizes::Halved if self.mesh.len() > RECHOICE_RATIO * self.chosen => StepSizes::Chosen,
+            StepSizes::Halved if self.mesh.len() > self.settings.rechoice_ratio * self.chosen => StepSizes::Chosen,
             _ if self.mesh.is_empty() => StepSizes::Chosen,
             lengths => lengths,
         };
@@ -477,7 +499,7 @@ impl Flow for RadauFlow {
             let time = position as f64 * tick;
             let h =
                 self.attempt(lengths, tick).ok_or_else(|| self.stalled(state, (time, self.length(tick)), scale.1))?;
-            let ticks = 1u64 << (LEVELS - self.level);
+            let ticks = 1u64 << (self.settings.levels - self.level);
             self.set_loads(time, h);
             self.predict(state, h, last, time);
             let Some(eliminated) = &self.eliminated[self.level] else {
@@ -529,9 +551,9 @@ impl Flow for RadauFlow {
             position += ticks;
             // double the step only if it starts at a multiple of its size and its expected
             // error passes
-            if self.level > MIN_LEVEL
-                && position.is_multiple_of(1u64 << (LEVELS - self.level + 1))
-                && error * 2f64.powi(ESTIMATE_ORDER) < SAFETY
+            if self.level > self.settings.min_level
+                && position.is_multiple_of(1u64 << (self.settings.levels - self.level + 1))
+                && error * 2f64.powi(ESTIMATE_ORDER) < self.settings.safety
             {
                 self.level -= 1;
             }

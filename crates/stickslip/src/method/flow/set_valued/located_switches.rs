@@ -27,25 +27,47 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use stickslip_numerics::radau::{BUTCHER_MATRIX, ESTIMATE_ORDER, NODES, STAGES};
 
-/// The time interval has `2^LEVELS` ticks.
-const LEVELS: usize = 40;
-/// The largest step is the interval divided by `2^COARSEST`, the first one by `2^FIRST_LEVEL`.
-const COARSEST: usize = 3;
-const FIRST_LEVEL: usize = 7;
-/// Largest number of steps of one run, including rejected ones, and of switches. Beyond them,
-/// the run stalls or chatters.
-const STEP_LIMIT: usize = 100_000;
-const SWITCH_LIMIT: usize = 10_000;
-/// Fraction of the tolerance for the error of the next step.
-const SAFETY: f64 = 0.8;
-/// Relative velocities and forces that count as rounding.
-const ROUNDING: f64 = 1e-12;
-/// Fraction of the interval that counts as zero: a switch this close to the end is at the end.
-const END_TOLERANCE: f64 = 16.0 * f64::EPSILON;
-/// Number of instants of a step at which switches are searched, including its end.
-const SEARCH_INSTANTS: usize = 8;
-/// Largest number of Newton iterations for a switch; two are typical.
-const MAX_LOCATION_STEPS: usize = 12;
+/// Settings of the steps and of the search for switches.
+#[derive(Debug, Clone, Copy)]
+struct SetValuedSettings {
+    /// The time interval has `2^levels` ticks.
+    levels: usize,
+    /// The largest step is the interval divided by `2^min_level`.
+    min_level: usize,
+    /// The first step of a run is the interval divided by `2^first_level`.
+    first_level: usize,
+    /// Largest number of steps of one run, including rejected ones. Beyond it, the run stalls.
+    step_limit: usize,
+    /// Largest number of switches of one run. Beyond it, the motion chatters.
+    switch_limit: usize,
+    /// Fraction of the tolerance for the error of the next step.
+    safety: f64,
+    /// Relative velocities and forces that count as rounding.
+    rounding: f64,
+    /// Fraction of the interval that counts as zero: a switch this close to the end is at the end.
+    end_tolerance: f64,
+    /// Number of instants of a step at which switches are searched, including its end.
+    search_instants: usize,
+    /// Largest number of Newton iterations for a switch; two are typical.
+    location_iterations: usize,
+}
+
+impl Default for SetValuedSettings {
+    fn default() -> Self {
+        SetValuedSettings {
+            levels: 40,
+            min_level: 3,
+            first_level: 7,
+            step_limit: 100_000,
+            switch_limit: 10_000,
+            safety: 0.8,
+            rounding: 1e-12,
+            end_tolerance: 16.0 * f64::EPSILON,
+            search_instants: 8,
+            location_iterations: 12,
+        }
+    }
+}
 
 /// A joint with set-valued friction.
 struct FrictionJoint {
@@ -93,6 +115,7 @@ struct Switch {
 
 /// Flow of a structure with set-valued friction and smooth laws.
 pub(crate) struct SetValuedFlow {
+    settings: SetValuedSettings,
     /// The assembly with the laws of the present modes.
     pub assembly: Assembly,
     /// The assembly with the original laws.
@@ -146,7 +169,9 @@ impl SetValuedFlow {
         let frictions = frictions.collect();
         let (states, n, j) = (plain.states(), plain.n, plain.axes.len());
         let nodes = NODES.into_iter().zip(BUTCHER_MATRIX[STAGES - 1]).collect();
+        let settings = SetValuedSettings::default();
         Ok(SetValuedFlow {
+            settings,
             assembly: plain.clone(),
             excitation: HarmonicExcitation::default(),
             tolerance,
@@ -154,10 +179,10 @@ impl SetValuedFlow {
             steps: StepRecord::with_jumps(nodes, &plain),
             frictions,
             stretch: 0.0,
-            eliminated: vec![None; LEVELS + 1],
+            eliminated: vec![None; settings.levels + 1],
             step: RadauStep::new(&plain),
             loads: StageLoads::default(),
-            level: FIRST_LEVEL,
+            level: settings.first_level,
             tried: 0,
             laws: evaluation_points(&plain),
             slope: vec![0.0; states],
@@ -265,7 +290,7 @@ impl SetValuedFlow {
             let friction = &mut self.frictions[k];
             (friction.laws, friction.unit) = (laws, unit);
             friction.mode = FrictionMode::Slip(velocity.signum());
-            if velocity.abs() <= ROUNDING * scale {
+            if velocity.abs() <= self.settings.rounding * scale {
                 resting.push(k);
             }
         }
@@ -424,9 +449,9 @@ impl SetValuedFlow {
             };
             let margin = |s: f64| self.margin(friction, start, s, scale);
             let mut before = 0.0;
-            for look in 1..=SEARCH_INSTANTS {
-                let s = look as f64 / SEARCH_INSTANTS as f64;
-                if margin(s) >= -ROUNDING {
+            for look in 1..=self.settings.search_instants {
+                let s = look as f64 / self.settings.search_instants as f64;
+                if margin(s) >= -self.settings.rounding {
                     before = s;
                     continue;
                 }
@@ -485,7 +510,7 @@ impl SetValuedFlow {
         (scale, derivatives): (f64, bool),
     ) -> Option<RadauElimination> {
         let mut h = switch.at * longest;
-        for _ in 0..MAX_LOCATION_STEPS {
+        for _ in 0..self.settings.location_iterations {
             let eliminated = RadauElimination::new(&self.assembly, h);
             // the initial guess needs the time derivative at the start of the step
             if !self.set_slope(state, begin.time)
@@ -496,7 +521,7 @@ impl SetValuedFlow {
             let (margin, rate) = self.at_end(switch, begin.time + h, (h, scale))?;
             let change = -margin / rate;
             // rounding of the time, and of the zero
-            if margin.abs() <= ROUNDING || change.abs() <= f64::EPSILON * self.stretch {
+            if margin.abs() <= self.settings.rounding || change.abs() <= f64::EPSILON * self.stretch {
                 return Some(eliminated);
             }
             if !change.is_finite() {
@@ -540,7 +565,7 @@ impl SetValuedFlow {
             next = (0..self.frictions.len()).filter(|i| !stopped.contains(i)).find(|&i| {
                 let own = &self.frictions[i];
                 let FrictionMode::Slip(sign) = own.mode else { return false };
-                let stops = sign * self.velocity(own.axis, state, time) <= ROUNDING * scale;
+                let stops = sign * self.velocity(own.axis, state, time) <= self.settings.rounding * scale;
                 stops && sign * self.acceleration(own.axis, time) < 0.0
             });
         }
@@ -582,13 +607,14 @@ impl SetValuedFlow {
 
     /// Returns the size of the next step, and the tick at its end.
     fn length(&self, begin: StepBegin) -> (f64, u64) {
-        let (tick, ticks) = (self.stretch / (1u64 << LEVELS) as f64, 1u64 << (LEVELS - self.level));
+        let (tick, ticks) =
+            (self.stretch / (1u64 << self.settings.levels) as f64, 1u64 << (self.settings.levels - self.level));
         if let Some(at) = begin.tick {
             return (ticks as f64 * tick, at + ticks);
         }
         // to the next tick of the level, but not by a tiny step
         let end = ((begin.time / tick / ticks as f64 + 0.1).floor() as u64 + 1) * ticks;
-        let end = end.min(1 << LEVELS);
+        let end = end.min(1 << self.settings.levels);
         (end as f64 * tick - begin.time, end)
     }
 
@@ -625,14 +651,14 @@ impl SetValuedFlow {
     ) -> Result<(StepBegin, Option<f64>, bool), IntegrationError> {
         loop {
             let (h, end) = self.length(begin);
-            if self.tried >= STEP_LIMIT || self.level > LEVELS {
+            if self.tried >= self.settings.step_limit || self.level > self.settings.levels {
                 return Err(self.stalled((begin.time, h)));
             }
             let (eliminated, level) = (self.elimination(begin, h), self.level);
             let solved = self.attempt(&eliminated, state, (begin, last), (scale.1, columns > 0));
             let error = if solved { self.error(&eliminated, state, scale) } else { f64::INFINITY };
             if error.is_nan() || error > 1.0 {
-                let halvings = (error / SAFETY).log2() / f64::from(ESTIMATE_ORDER);
+                let halvings = (error / self.settings.safety).log2() / f64::from(ESTIMATE_ORDER);
                 self.level += if error.is_finite() { halvings.ceil().clamp(1.0, 4.0) as usize } else { 2 };
                 self.store_elimination(begin, eliminated, level);
                 continue;
@@ -641,12 +667,20 @@ impl SetValuedFlow {
                 let time = begin.time + h;
                 self.accept(&eliminated, state, (begin.time, time), columns)?;
                 self.store_elimination(begin, eliminated, level);
-                let aligned = end.is_multiple_of(1 << (LEVELS - self.level + 1).min(LEVELS));
-                if self.level > COARSEST && aligned && error * 2f64.powi(ESTIMATE_ORDER) < SAFETY {
+                let aligned =
+                    end.is_multiple_of(1 << (self.settings.levels - self.level + 1).min(self.settings.levels));
+                if self.level > self.settings.min_level
+                    && aligned
+                    && error * 2f64.powi(ESTIMATE_ORDER) < self.settings.safety
+                {
                     self.level -= 1;
                 }
-                let tick = self.stretch / (1u64 << LEVELS) as f64;
-                return Ok((StepBegin { time: end as f64 * tick, tick: Some(end) }, Some(h), end == 1 << LEVELS));
+                let tick = self.stretch / (1u64 << self.settings.levels) as f64;
+                return Ok((
+                    StepBegin { time: end as f64 * tick, tick: Some(end) },
+                    Some(h),
+                    end == 1 << self.settings.levels,
+                ));
             };
             self.store_elimination(begin, eliminated, level);
             let located = self.locate(switch, state, (begin, h), (scale.1, columns > 0));
@@ -661,7 +695,7 @@ impl SetValuedFlow {
             let time = begin.time + eliminated.length;
             self.accept(&eliminated, state, (begin.time, time), columns)?;
             self.switched(switch, state, (time, scale.1), columns)?;
-            let ends = time >= self.stretch * (1.0 - END_TOLERANCE);
+            let ends = time >= self.stretch * (1.0 - self.settings.end_tolerance);
             return Ok((StepBegin { time, tick: None }, None, ends));
         }
     }
@@ -731,7 +765,7 @@ impl Flow for SetValuedFlow {
             self.eliminated.fill(None);
         }
         self.steps.clear();
-        (self.level, self.tried) = (FIRST_LEVEL, 0);
+        (self.level, self.tried) = (self.settings.first_level, 0);
         let scale = self.assembly.scales(state, &self.excitation);
         let columns = sensitivity.as_deref().map_or(0, |matrix| matrix.ncols());
         if let Some(sensitivity) = sensitivity.as_deref() {
@@ -749,7 +783,7 @@ impl Flow for SetValuedFlow {
                 break;
             }
             switches += usize::from(length.is_none());
-            if switches > SWITCH_LIMIT {
+            if switches > self.settings.switch_limit {
                 let joint = self.frictions.first().map_or(0, |friction| friction.joint);
                 let joint = self.assembly.joints[joint].joint.clone();
                 return Err(IntegrationError::Chatter { time: next.time, switches, joint });

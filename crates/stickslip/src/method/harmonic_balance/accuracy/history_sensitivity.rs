@@ -10,11 +10,6 @@ use crate::orbit::Orbit;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
-/// Factors on the friction forces of static equilibrium.
-const HISTORIES: [f64; 2] = [0.0, -1.0];
-/// Newton iterations from the orbit.
-const ITERATIONS: usize = 20;
-
 impl HarmonicBalanceSolver {
     /// Returns the largest change of a place's vibration under another history, relative to the
     /// largest vibration.
@@ -31,7 +26,8 @@ impl HarmonicBalanceSolver {
         let own = self.places(top, omega, &motion).ok()?;
         let states = self.ports.static_states();
         let mut spread: Option<f64> = None;
-        for factor in HISTORIES {
+        // Factors on the friction forces of static equilibrium.
+        for factor in [0.0, -1.0] {
             self.ports.scale_static_states(&states, factor);
             let other = self.solve_with_history(top, omega, &motion);
             self.ports.scale_static_states(&states, 1.0);
@@ -53,7 +49,8 @@ impl HarmonicBalanceSolver {
     ) -> Option<Vec<DVector<Complex64>>> {
         let mut other = HarmonicSolution { iterations: 0, ..motion.clone() };
         let discretization = self.discretizations.get_mut(&top)?;
-        discretization.newton_from(&self.ports, omega, &mut other, ITERATIONS).ok()?;
+        // Newton iterations from the orbit.
+        discretization.newton_from(&self.ports, omega, &mut other, 20).ok()?;
         self.places(top, omega, &other).ok()
     }
 

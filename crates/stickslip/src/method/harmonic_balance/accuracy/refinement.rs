@@ -16,21 +16,31 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use std::iter::successors;
 
-/// Highest harmonic that the method chooses. The error estimate takes twice as many.
-const MOST_HARMONICS: usize = 511;
-/// Highest order at which the truncation error of rigid friction decays with the number of
-/// harmonics. Orders of 1 to 3/2 are usual, see [`truncation_error`]. The larger value avoids
-/// that a sufficient series is refused: 80 masses had an error of 3.0e-3 with 31 harmonics and
-/// less than 1e-3 with 63.
-const ORDER: f64 = 2.0;
-/// Least share of the previous error estimate that remains after a doubling with rigid or steep
-/// friction. A smaller distance is not believed, because two solutions may be close by chance: a
-/// distance of 1.3e-3 was seen with an error of 1e-2.
-const LEAST_ERROR_RATIO: f64 = 0.1;
-/// Reduction of the residual to which the finer solution of an error estimate is solved. The
-/// relative error of the estimate is about as large. With elastic friction one Newton step
-/// reaches it.
-const ESTIMATE_REDUCTION: f64 = 1e-3;
+/// Settings of the choice of the number of harmonics.
+#[derive(Debug, Clone, Copy)]
+struct RefinementSettings {
+    /// Highest harmonic that the method chooses. The error estimate takes twice as many.
+    most_harmonics: usize,
+    /// Highest order at which the truncation error of rigid friction decays with the number of
+    /// harmonics. Orders of 1 to 3/2 are usual, see [`truncation_error`]. The larger value avoids
+    /// that a sufficient series is refused: 80 masses had an error of 3.0e-3 with 31 harmonics and
+    /// less than 1e-3 with 63.
+    order: f64,
+    /// Least share of the previous error estimate that remains after a doubling with rigid or
+    /// steep friction. A smaller distance is not believed, because two solutions may be close by
+    /// chance: a distance of 1.3e-3 was seen with an error of 1e-2.
+    least_error_ratio: f64,
+    /// Reduction of the residual to which the finer solution of an error estimate is solved. The
+    /// relative error of the estimate is about as large. With elastic friction one Newton step
+    /// reaches it.
+    estimate_reduction: f64,
+}
+
+impl Default for RefinementSettings {
+    fn default() -> Self {
+        RefinementSettings { most_harmonics: 511, order: 2.0, least_error_ratio: 0.1, estimate_reduction: 1e-3 }
+    }
+}
 
 impl HarmonicBalanceSolver {
     /// Finds the orbit with the user's number of harmonics and estimates its error.
@@ -64,6 +74,7 @@ impl HarmonicBalanceSolver {
         motion: &HarmonicSolution,
         x: &[DVector<Complex64>],
     ) -> Result<(f64, HarmonicSolution), SolveError> {
+        let settings = RefinementSettings::default();
         let double = self.harmonic_set.doubled(top);
         let start = self.refined_guess(top, motion);
         let (few, many) = (self.harmonic_set.up_to(top), self.harmonic_set.up_to(double));
@@ -75,7 +86,7 @@ impl HarmonicBalanceSolver {
         let goal = if self.ports.iter().any(Port::has_memory_steps) {
             StopCriterion::Solved
         } else {
-            StopCriterion::Share(ESTIMATE_REDUCTION)
+            StopCriterion::Share(settings.estimate_reduction)
         };
         let better = match finer.solve_twice_the_samples(&self.ports, omega, &start, &coarse, states.as_deref()) {
             Some(better) => better,
@@ -127,18 +138,20 @@ impl HarmonicBalanceSolver {
     /// Returns the first doubled number of harmonics that may meet the tolerance with rigid
     /// friction. `times` is the ratio of the error at `top` to the tolerance.
     pub(crate) fn needed_harmonics(&self, top: usize, times: f64) -> usize {
-        let least = top as f64 * times.powf(1.0 / ORDER);
+        let settings = RefinementSettings::default();
+        let least = top as f64 * times.powf(1.0 / settings.order);
         let doubled = successors(Some(top), |top| Some(self.harmonic_set.doubled(*top)));
         doubled
             .skip(1)
-            .find(|top| *top as f64 >= least || *top > MOST_HARMONICS * self.harmonic_set.count_factor)
+            .find(|top| *top as f64 >= least || *top > settings.most_harmonics * self.harmonic_set.count_factor)
             .expect("they grow")
     }
 
     /// Returns true if a series with twice the harmonics can be solved and compared.
     fn can_double(&self, top: usize) -> bool {
+        let settings = RefinementSettings::default();
         let double = self.harmonic_set.doubled(top);
-        double <= MOST_HARMONICS * self.harmonic_set.count_factor
+        double <= settings.most_harmonics * self.harmonic_set.count_factor
             && self.can_estimate_error(double, self.work_used(None))
     }
 
@@ -166,6 +179,7 @@ impl HarmonicBalanceSolver {
         warm: Option<(usize, HarmonicSolution)>,
         returned: &mut Option<Orbit>,
     ) -> Result<Orbit, OrbitError> {
+        let settings = RefinementSettings::default();
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
         let first = top;
         let mut motion =
@@ -174,7 +188,7 @@ impl HarmonicBalanceSolver {
         // the error is unknown until two solutions can be compared
         let (mut checked, mut estimate) = (top, 1.0);
         let mut needed = None;
-        while top <= MOST_HARMONICS * self.harmonic_set.count_factor
+        while top <= settings.most_harmonics * self.harmonic_set.count_factor
             && self.can_estimate_error(top, self.work_used(None))
         {
             let (mut error, finer) = match self.estimate_error(top, omega, &motion, &x) {
@@ -188,7 +202,7 @@ impl HarmonicBalanceSolver {
                 Err(error) => return Err(self.solve_error(error)),
             };
             if (self.ports.has_forces() || self.steep) && top > first {
-                error = error.max(LEAST_ERROR_RATIO * estimate);
+                error = error.max(settings.least_error_ratio * estimate);
             }
             // friction that falls with velocity makes chance agreement frequent, so one
             // comparison is not enough

@@ -8,17 +8,27 @@ use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization
 use crate::method::harmonic_balance::globalization::homotopy::{GIVEN_EQUATIONS, RESIDUAL_TOLERANCE, SearchContext};
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 
-/// Ratio of the last step to the distance from the coarse solution at which the distance counts
-/// as known. A step leaves an error of a few hundredths of its length.
-const STEP_RATIO: f64 = 0.1;
-/// The ratio for systems with many contacts, in which a second step costs as much as the first.
-/// One step is enough. Measured with 16 and 100 nodes: the distance is then known to 3 % at
-/// nearly all points of a curve, and to 10 % at every point.
-const STEP_RATIO_MANY_CONTACTS: f64 = 3.0;
-/// Largest number of steps.
-const MOST_STEPS: usize = 8;
-/// Largest ratio of a step to the previous one.
-const LARGEST_CONTRACTION: f64 = 0.3;
+/// Settings of the Newton steps on finer samples.
+#[derive(Debug, Clone, Copy)]
+struct SamplingErrorSettings {
+    /// Ratio of the last step to the distance from the coarse solution at which the distance
+    /// counts as known. A step leaves an error of a few hundredths of its length.
+    step_ratio: f64,
+    /// `step_ratio` for systems with many contacts, in which a second step costs as much as the
+    /// first. One step is enough. Measured with 16 and 100 nodes: the distance is then known to
+    /// 3 % at nearly all points of a curve, and to 10 % at every point.
+    step_ratio_many_contacts: f64,
+    /// Largest number of steps.
+    steps: usize,
+    /// Largest ratio of a step to the previous one.
+    contraction: f64,
+}
+
+impl Default for SamplingErrorSettings {
+    fn default() -> Self {
+        SamplingErrorSettings { step_ratio: 0.1, step_ratio_many_contacts: 3.0, steps: 8, contraction: 0.3 }
+    }
+}
 
 impl Discretization {
     /// Returns the solution near `start` with twice the samples, accurate enough for its
@@ -71,6 +81,7 @@ impl Discretization {
         near: &HarmonicSolution,
         coarse: &HarmonicSolution,
     ) -> Option<(HarmonicSolution, bool)> {
+        let settings = SamplingErrorSettings::default();
         if !ports.iter().any(Port::has_memory_steps) {
             return None;
         }
@@ -80,8 +91,8 @@ impl Discretization {
             self.compute_jacobians(ports, omega, &mut motion, length);
         }
         let near = |residual, kept| StepStart { length, residual, coarse: true, same_derivatives: kept };
-        let (mut last, mut found, mut left) = (f64::INFINITY, false, MOST_STEPS);
-        let share = if self.uses_krylov() { STEP_RATIO_MANY_CONTACTS } else { STEP_RATIO };
+        let (mut last, mut found, mut left) = (f64::INFINITY, false, settings.steps);
+        let share = if self.uses_krylov() { settings.step_ratio_many_contacts } else { settings.step_ratio };
         loop {
             self.swap_double_samples();
             self.search.reuses_states = true;
@@ -100,7 +111,7 @@ impl Discretization {
             let step = self.distance(ports, &motion, &self.workspace.previous, length);
             found |= step <= share * self.distance(ports, &motion, coarse, length);
             left -= 1;
-            if found || left == 0 || step > LARGEST_CONTRACTION * last {
+            if found || left == 0 || step > settings.contraction * last {
                 self.step_forces(ports, &mut motion, length);
                 self.structure_motion(&mut motion, GIVEN_EQUATIONS);
                 return Some((motion, found));

@@ -9,18 +9,6 @@ use crate::model::Axis;
 use nalgebra::DVector;
 use num_complex::Complex64;
 
-/// Ratio of the error to the distance between the two solutions for rigid friction. Friction
-/// makes accelerations jump, and a doubling leaves four tenths of the error. This lies between
-/// the observed orders 1 (one half) and 3/2 (one third).
-const RIGID_FACTOR: f64 = 1.7;
-/// The ratio for steep laws. Until the series resolves their transition layer, a doubling
-/// leaves half of the error, as order 1 does. Friction that falls with velocity leaves no less.
-/// With all other laws a doubling leaves almost nothing.
-const STEEP_FACTOR: f64 = 2.0;
-/// Smallest size of a motion, relative to the motion without joints. Equations are solved to a
-/// tenth of it.
-const NO_MOTION: f64 = 10.0 * RESIDUAL_TOLERANCE;
-
 /// A solution for the comparison: its harmonics, and per harmonic the motions of the places and
 /// along the axes of the ports.
 pub(crate) struct ComparedSolution<'a> {
@@ -32,8 +20,8 @@ pub(crate) struct ComparedSolution<'a> {
 /// Returns the truncation error of `coarse`, relative to the largest motion.
 ///
 /// The error is the largest distance between both solutions, over the places and the sliders
-/// behind springs. It is divided by the largest of these motions, at least [`NO_MOTION`], without
-/// means. The factor accounts for the error of the finer solution. Resonances above the
+/// behind springs. It is divided by the largest of these motions without means. The factor accounts
+/// for the error of the finer solution. Resonances above the
 /// harmonics of the finer solution count too. The finer solution consists of its equations, its
 /// harmonics and, per harmonic, the motions of the places.
 pub(crate) fn truncation_error(
@@ -51,7 +39,10 @@ pub(crate) fn truncation_error(
         moving.map(|(_, free)| length(place, free).norm_sqr()).sum::<f64>()
     };
     let largest = seen.iter().map(unhindered).fold(0.0, f64::max);
-    let (mut distance, mut size) = (0.0f64, NO_MOTION * NO_MOTION * largest);
+    // Smallest size of a motion, relative to the motion without joints. Equations are solved to a
+    // tenth of it.
+    let no_motion = 10.0 * RESIDUAL_TOLERANCE;
+    let (mut distance, mut size) = (0.0f64, no_motion * no_motion * largest);
     let mut compare = |coarse_at: &dyn Fn(usize) -> Complex64, fine_at: &dyn Fn(usize) -> Complex64, missing: f64| {
         let (mut d, mut s) = (missing, missing);
         for (k, h) in fine.harmonics.iter().enumerate().filter(|(_, h)| **h > 0) {
@@ -71,9 +62,15 @@ pub(crate) fn truncation_error(
         compare(&|k| coarse.along[q * few + k], &|k| fine.along[q * many + k], 0.0);
     }
     let share = if steep {
-        STEEP_FACTOR
+        // The ratio for steep laws. Until the series resolves their transition layer, a doubling
+        // leaves half of the error, as order 1 does. Friction that falls with velocity leaves no
+        // less. With all other laws a doubling leaves almost nothing.
+        2.0
     } else if ports.has_forces() {
-        RIGID_FACTOR
+        // Ratio of the error to the distance between the two solutions for rigid friction.
+        // Friction makes accelerations jump, and a doubling leaves four tenths of the error. This
+        // lies between the observed orders 1 (one half) and 3/2 (one third).
+        1.7
     } else {
         1.0
     };

@@ -42,14 +42,12 @@ pub(in super::super) struct BracketingGrid {
     pub(super) slope: Vec<f64>,
 }
 
-/// Least number of grid points per harmonic. Between two of them the motion is
-/// a cubic up to a thousandth of the highest harmonic.
-const POINTS: usize = 8;
-
 impl BracketingGrid {
     /// Creates a grid for harmonics up to `top`.
     pub fn new(top: usize) -> Self {
-        let points = (POINTS * (top + 1)).next_power_of_two();
+        // Least number of grid points per harmonic. Between two of them the motion is a cubic up
+        // to a thousandth of the highest harmonic.
+        let points = (8 * (top + 1)).next_power_of_two();
         BracketingGrid {
             fourier: FourierPlan::new(points),
             pairs: Vec::new(),

@@ -10,11 +10,6 @@
 use super::FrequencyTime;
 use num_complex::Complex64;
 
-/// Approximate initial force, relative to the limit, where `y` is largest.
-const INITIAL_FORCE_SHARE: f64 = 0.5;
-/// Longest step, as a share of the distance to the nearest bound.
-const STEP_TO_BOUNDARY: f64 = 0.99;
-
 /// The samples of one port.
 #[derive(Debug, Clone)]
 pub(in super::super) struct InteriorPort {
@@ -61,7 +56,9 @@ impl InteriorPort {
         aft.synthesise(y, |_| Complex64::new(1.0, 0.0));
         let largest = aft.signal.iter().fold(limit, |most, y| most.max(y.abs()));
         let begin = |y: &f64| {
-            let force = INITIAL_FORCE_SHARE * limit * (y / (INITIAL_FORCE_SHARE * largest)).tanh();
+            // Approximate initial force, relative to the limit, where `y` is largest.
+            let share = 0.5;
+            let force = share * limit * (y / (share * largest)).tanh();
             let held = y - force;
             // ξ - η = y - f, ξ η = largest²
             let more = 0.5 * (held.abs() + held.hypot(2.0 * largest));
@@ -124,7 +121,9 @@ impl InteriorPort {
     /// share of it, at most 1, that stays inside all bounds.
     pub fn step(&mut self, aft: &mut FrequencyTime, y: &[Complex64]) -> f64 {
         aft.synthesise(y, |_| Complex64::new(1.0, 0.0));
-        let mut most = 1.0 / STEP_TO_BOUNDARY;
+        // Longest step, as a share of the distance to the nearest bound.
+        let longest: f64 = 0.99;
+        let mut most = 1.0 / longest;
         for (s, y) in self.samples.iter_mut().zip(&aft.signal) {
             let [above, below] = s.distances_to_limits(self.limit);
             let force = s.slope * (y - s.argument + s.reduced_residual(self.limit));
@@ -139,7 +138,7 @@ impl InteriorPort {
                 }
             }
         }
-        STEP_TO_BOUNDARY * most
+        longest * most
     }
 
     /// Takes a share of the step.

@@ -262,7 +262,9 @@ impl FrequencyTime {
         let HarmonicSeries { harmonics, .. } = series;
         let (nh, top) = (harmonics.len(), harmonics.last().copied().unwrap_or(0));
         let share = |h: usize| if h == 0 { 1.0 / TAU } else { 1.0 / PI };
-        let panel = TAU / (2 * top + PANELS) as f64;
+        // Panels of a period for a motion without harmonics. Each harmonic adds two, so that
+        // products of two harmonics are integrated.
+        let panel = TAU / (2 * top + 8) as f64;
         let (mut slopes, mut own) = (Vec::new(), std::mem::take(&mut self.column));
         let [stiffness, integrals, of_branch] = &mut self.spectra;
         stiffness.fill(ZERO);
@@ -332,10 +334,6 @@ impl FrequencyTime {
         }
     }
 }
-
-/// Panels of a period for a motion without harmonics. Each harmonic adds two,
-/// so that products of two harmonics are integrated.
-const PANELS: usize = 8;
 
 /// Computes the row of points and their factors: `Σ factor δu* = Re(row δU)`.
 fn row<'a>(row: &mut [Complex64], harmonics: &[usize], points: impl IntoIterator<Item = (&'a ReturnPoint, f64)>) {

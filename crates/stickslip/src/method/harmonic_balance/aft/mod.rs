@@ -418,10 +418,6 @@ impl Ports {
     }
 }
 
-/// Velocity range over which rigid friction changes its sign, relative to the speed. It applies
-/// where the motion along a contact is imposed, so that the structure cannot move.
-const IMPOSED: f64 = 1e-9;
-
 impl FrequencyTime {
     /// Computes the harmonics of the force of a motion port that moves with the harmonics `c`,
     /// [axis][harmonic], into `force`. Writes the derivative by (Re, Im) of the harmonics into
@@ -495,7 +491,10 @@ impl FrequencyTime {
         signal.clear();
         if penalty.is_infinite() {
             let speed: f64 = c.iter().enumerate().map(|(i, c)| (c * turn(i, &self.harmonics)).norm()).sum();
-            let width = (IMPOSED * speed).max(f64::MIN_POSITIVE);
+            // Velocity range over which rigid friction changes its sign, relative to the speed. It
+            // applies where the motion along a contact is imposed, so that the structure cannot
+            // move.
+            let width = (1e-9 * speed).max(f64::MIN_POSITIVE);
             signal.extend(c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) / share));
             self.velocity(prox, port, width / share, &mut signal, image);
         } else {

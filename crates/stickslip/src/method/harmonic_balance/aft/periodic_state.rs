@@ -21,21 +21,40 @@ use std::ops::Range;
 use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::interrupt;
 
-/// Replaces [`PERIODICITY_TOLERANCE`] if the change over a period no longer decreases.
-const ROUNDED: f64 = 1e-9;
-/// Maximum number of periods with derivatives; hysteresis that slips forgets in a few.
-const PERIODS: usize = 60;
-/// Maximum number of initial periods without derivatives, and the ratio of successive changes
-/// above which they end. A period with derivatives costs as much as three without.
-const PLAIN_PERIODS: usize = 6;
-const SLOW_RATIO: f64 = 0.03;
-/// Ratio to the least change so far that a step of Broyden's method must reach.
-/// Two misses in a row end the iteration.
-const BROYDEN_REDUCTION: f64 = 0.3;
-/// Singular values of `1 - Π` below this belong to states that are never forgotten.
-const NEUTRAL_SINGULAR_VALUE: f64 = 1e-9;
-/// Number of harmonics up to which a matrix product transforms derivatives, instead of FFTs.
-const MATRIX_HARMONICS: usize = 16;
+/// Settings of the search for periodic states.
+#[derive(Debug, Clone, Copy)]
+struct PeriodicStateSettings {
+    /// Replaces [`PERIODICITY_TOLERANCE`] if the change over a period no longer decreases.
+    rounded: f64,
+    /// Maximum number of periods with derivatives; hysteresis that slips forgets in a few.
+    periods: usize,
+    /// Maximum number of initial periods without derivatives. A period with derivatives costs as
+    /// much as three without.
+    plain_periods: usize,
+    /// Ratio of successive changes above which the periods without derivatives end.
+    slow_ratio: f64,
+    /// Ratio to the least change so far that a step of Broyden's method must reach. Two misses in
+    /// a row end the iteration.
+    broyden_reduction: f64,
+    /// Singular values of `1 - Π` below this belong to states that are never forgotten.
+    neutral_singular_value: f64,
+    /// Number of harmonics up to which a matrix product transforms derivatives, instead of FFTs.
+    matrix_harmonics: usize,
+}
+
+impl Default for PeriodicStateSettings {
+    fn default() -> Self {
+        PeriodicStateSettings {
+            rounded: 1e-9,
+            periods: 60,
+            plain_periods: 6,
+            slow_ratio: 0.03,
+            broyden_reduction: 0.3,
+            neutral_singular_value: 1e-9,
+            matrix_harmonics: 16,
+        }
+    }
+}
 
 /// A law with memory as a sequence of steps.
 pub(super) trait StepSequence {
@@ -105,6 +124,7 @@ impl FrequencyTime {
         memory: &mut StepWorkspace,
         linear: bool,
     ) -> Option<DMatrix<f64>> {
+        let settings = PeriodicStateSettings::default();
         let m = sequence.states();
         let scale = sequence.state_scale();
         let known = std::mem::take(&mut self.known_state);
@@ -135,7 +155,7 @@ impl FrequencyTime {
         } else if !begun {
             // a law that slips forgets its initial states in a few periods without derivatives
             let mut last = f64::INFINITY;
-            for _ in 0..PLAIN_PERIODS {
+            for _ in 0..settings.plain_periods {
                 let after = self.period(sequence, &z, None)?;
                 let gap = (&after - &z).amax() / scale;
                 z = after;
@@ -144,17 +164,17 @@ impl FrequencyTime {
                     self.state.extend(z.iter());
                     return Some(DMatrix::zeros(m, m));
                 }
-                if gap <= PERIODICITY_TOLERANCE || gap > SLOW_RATIO * last {
+                if gap <= PERIODICITY_TOLERANCE || gap > settings.slow_ratio * last {
                     break;
                 }
                 last = gap;
             }
         }
         let mut last = f64::INFINITY;
-        for _ in 0..PERIODS {
+        for _ in 0..settings.periods {
             let (after, product) = self.linear_period(sequence, &z, memory)?;
             let gap = (&after - &z).amax() / scale;
-            if m == 0 || gap <= self.periodicity_tolerance || (gap <= ROUNDED && gap >= 0.5 * last) {
+            if m == 0 || gap <= self.periodicity_tolerance || (gap <= settings.rounded && gap >= 0.5 * last) {
                 self.state.clear();
                 self.state.extend(z.iter());
                 return Some(product);
@@ -183,6 +203,7 @@ impl FrequencyTime {
         z: &mut DVector<f64>,
         mut inverse: DMatrix<f64>,
     ) -> Option<bool> {
+        let settings = PeriodicStateSettings::default();
         let scale = sequence.state_scale();
         let mut change = self.period(sequence, z, None)? - &*z;
         let mut best = change.amax() / scale;
@@ -192,7 +213,8 @@ impl FrequencyTime {
             *z += &step;
             let after = self.period(sequence, z, None)? - &*z;
             let gap = after.amax() / scale;
-            (best, waited) = if gap < BROYDEN_REDUCTION * best { (gap, 0) } else { (best.min(gap), waited + 1) };
+            (best, waited) =
+                if gap < settings.broyden_reduction * best { (gap, 0) } else { (best.min(gap), waited + 1) };
             if waited > 1 || !gap.is_finite() {
                 return Some(false);
             }
@@ -250,11 +272,12 @@ impl FrequencyTime {
         product: &DMatrix<f64>,
         tangent: &mut [f64],
     ) -> bool {
+        let settings = PeriodicStateSettings::default();
         let (n, nh) = (self.samples(), self.harmonics.len());
         let (m, d) = (sequence.states(), sequence.axes());
         let size = 2 * nh * d;
         let open = DMatrix::identity(m, m) - product;
-        let neutral = m > 0 && open.clone().singular_values().min() <= NEUTRAL_SINGULAR_VALUE;
+        let neutral = m > 0 && open.clone().singular_values().min() <= settings.neutral_singular_value;
         let inverse = pseudo_inverse(open);
         self.forgetting_inverse.clear();
         if !neutral {
@@ -273,7 +296,7 @@ impl FrequencyTime {
             None
         };
         let wide = 2 * nh;
-        let few = nh <= MATRIX_HARMONICS;
+        let few = nh <= settings.matrix_harmonics;
         if few {
             self.fill_projection(&mut memory.projection);
             memory.of_states.resize(wide * d * m, 0.0);
@@ -676,13 +699,14 @@ fn add(to: &mut [f64], weight: f64, values: &[f64]) {
     }
 }
 
-/// Returns the pseudo-inverse, with singular values below [`NEUTRAL_SINGULAR_VALUE`] taken as
-/// zero.
+/// Returns the pseudo-inverse, with singular values below
+/// [`PeriodicStateSettings::neutral_singular_value`] taken as zero.
 fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let settings = PeriodicStateSettings::default();
     let m = matrix.nrows();
     if m == 0 {
         return matrix;
     }
     let svd = matrix.svd(true, true);
-    svd.pseudo_inverse(NEUTRAL_SINGULAR_VALUE).unwrap_or_else(|_| DMatrix::zeros(m, m))
+    svd.pseudo_inverse(settings.neutral_singular_value).unwrap_or_else(|_| DMatrix::zeros(m, m))
 }

@@ -19,11 +19,6 @@ use crate::law::{MAX_DIRECTIONS, ProxView, SampleMeans, SharedLaw};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Change of the argument over a sample, relative to the law's scale, below
-/// which a resolvent counts as smooth. The point value is then exact to
-/// spectral accuracy, and more accurate than the mean.
-const SMOOTH: f64 = 0.1;
-
 /// Rigid friction along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RigidFriction {
@@ -152,11 +147,14 @@ impl FrequencyTime {
         self.apply_in_plane(prox, port.axes, penalty, v, image, None);
     }
 
-    /// Tells whether a signal times `scale` may change over a sample by [`SMOOTH`] or more.
+    /// Returns true if a signal times `scale` may change over a sample by a tenth or more.
     fn changes_by(&self, y: &[Complex64], scale: f64) -> bool {
         let highest = self.harmonics.last().map_or(1.0, |&h| h as f64);
         let largest: f64 = y.iter().map(|y| y.norm()).sum();
-        scale * largest * TAU * highest / self.samples() as f64 >= SMOOTH
+        // Below this change of the argument over a sample, relative to the law's scale, a
+        // resolvent counts as smooth. The point value is then exact to spectral accuracy, and more
+        // accurate than the mean.
+        scale * largest * TAU * highest / self.samples() as f64 >= 0.1
     }
 
     /// Applies a map along one axis. `mean`: the mean over each sample is taken. `undo`: the

@@ -17,21 +17,32 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Maximum number of Newton iterations of one step; three are usual.
-const ITERATIONS: usize = 60;
-/// Longest change in an iteration, relative to the size of states. Some states
-/// are logarithms of the physical quantity.
-const LARGEST_CHANGE: f64 = 2.0;
-/// Change of the stages, relative to the size of states, at which a step is solved. Newton's
-/// method squares the error, so that the next change is rounding.
-const SOLVED: f64 = 1e-9;
+/// Settings of the integration of a law with a rate.
+#[derive(Debug, Clone, Copy)]
+struct RateSettings {
+    /// Maximum number of Newton iterations of one step; three are usual.
+    iterations: usize,
+    /// Longest change in an iteration, relative to the size of states. Some states are logarithms
+    /// of the physical quantity.
+    largest_change: f64,
+    /// Change of the stages, relative to the size of states, at which a step is solved. Newton's
+    /// method squares the error, so that the next change is rounding.
+    tolerance: f64,
+    /// Duration of the initial step from static equilibrium to the beginning of the period, as a
+    /// share of the period.
+    initial_step_share: f64,
+}
+
+impl Default for RateSettings {
+    fn default() -> Self {
+        RateSettings { iterations: 60, largest_change: 2.0, tolerance: 1e-9, initial_step_share: 0.25 }
+    }
+}
+
 /// Coefficients of Radau IIA of order 3. Its stages lie at a third of the step and at its end.
 const RADAU: [[f64; 2]; 2] = [[5.0 / 12.0, -1.0 / 12.0], [0.75, 0.25]];
 /// Share of the step after the first stage.
 const FIRST_STAGE_REMAINDER: f64 = 2.0 / 3.0;
-/// Duration of the initial step from static equilibrium to the beginning of the
-/// period, as a share of the period.
-const INITIAL_STEP_SHARE: f64 = 0.25;
 
 impl FrequencyTime {
     /// Adds the harmonics of the force in the motion `c`, [axis][harmonic], to
@@ -200,13 +211,14 @@ impl RateStepper<'_> {
         force: &mut [f64; MAX_DIRECTIONS],
         rows: Option<&mut [f64]>,
     ) -> bool {
+        let settings = RateSettings::default();
         let (m, d) = (before.len(), self.axes);
         let scale = self.rate.state_scale();
         for s in 0..m {
             (self.stage[s], self.stage[m + s]) = (before[s], before[s]);
         }
         let mut factor = None;
-        for _ in 0..ITERATIONS {
+        for _ in 0..settings.iterations {
             for (stage, motion) in motions.iter().enumerate() {
                 let z = &self.stage.as_slice()[stage * m..(stage + 1) * m];
                 self.rate.evaluate_with_derivatives(d, motion, z, &mut self.points[stage]);
@@ -217,7 +229,7 @@ impl RateStepper<'_> {
             };
             self.stage += &change;
             factor = Some(lu);
-            if size <= SOLVED * scale {
+            if size <= settings.tolerance * scale {
                 break;
             }
         }
@@ -242,6 +254,7 @@ impl RateStepper<'_> {
         force: &mut [Vec<f64>; MAX_DIRECTIONS],
         mut rows: Option<&mut [f64]>,
     ) -> bool {
+        let settings = RateSettings::default();
         let (n, m, d) = (motions.len() / 2, z.len(), self.axes);
         let size = (m + d) * (4 * d + m + usize::from(self.frequency));
         let scale = self.rate.state_scale();
@@ -249,7 +262,7 @@ impl RateStepper<'_> {
         if self.whole.len() != 2 * n * m {
             self.whole = z.iter().copied().cycle().take(2 * n * m).collect();
         }
-        for _ in 0..ITERATIONS {
+        for _ in 0..settings.iterations {
             self.rate.evaluate_many_with_derivatives(d, motions, &self.whole, &mut points);
             let mut factors = Vec::with_capacity(n);
             let mut before = z.to_vec();
@@ -266,7 +279,7 @@ impl RateStepper<'_> {
                 before.copy_from_slice(&stage[m..]);
                 factors.push((change, lu));
             }
-            if largest > SOLVED * scale {
+            if largest > settings.tolerance * scale {
                 continue;
             }
             for (step, (change, lu)) in factors.iter().enumerate() {
@@ -350,6 +363,7 @@ fn newton_step(
     stage: &[f64],
     scale: f64,
 ) -> Option<(DVector<f64>, f64, StageFactor)> {
+    let settings = RateSettings::default();
     let m = before.len();
     let matrix = DMatrix::from_fn(2 * m, 2 * m, |row, column| {
         let (i, s, k, t) = (row / m, row % m, column / m, column % m);
@@ -367,8 +381,8 @@ fn newton_step(
     if !size.is_finite() {
         return None;
     }
-    if size > LARGEST_CHANGE * scale {
-        change *= LARGEST_CHANGE * scale / size;
+    if size > settings.largest_change * scale {
+        change *= settings.largest_change * scale / size;
     }
     Some((change, size, lu))
 }
@@ -395,7 +409,8 @@ impl StepSequence for RateStepper<'_> {
         [stage, stage * turn, at, at * turn]
     }
     fn initial_input_factors(&self, _h: usize) -> [Complex64; 4] {
-        let rate = self.omega / (TAU * INITIAL_STEP_SHARE);
+        let settings = RateSettings::default();
+        let rate = self.omega / (TAU * settings.initial_step_share);
         [1.0 - FIRST_STAGE_REMAINDER, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
     }
     fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
@@ -426,7 +441,8 @@ impl StepSequence for RateStepper<'_> {
         true
     }
     fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
-        let duration = TAU * INITIAL_STEP_SHARE / self.omega;
+        let settings = RateSettings::default();
+        let duration = TAU * settings.initial_step_share / self.omega;
         let to: [f64; MAX_DIRECTIONS] =
             std::array::from_fn(|a| if a < self.axes { self.samples[0][a][0] } else { 0.0 });
         let velocity = std::array::from_fn(|a| (to[a] - self.rest[a]) / duration);

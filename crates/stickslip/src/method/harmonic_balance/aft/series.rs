@@ -6,12 +6,6 @@ use super::frequency_time::FrequencyTime;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Maximum number of Newton iterations for an event; three are usual. A step
-/// out of the bracket is replaced by bisection.
-const ITERATIONS: usize = 60;
-/// Maximum number of Newton iterations from a grid point to a turning point; three are usual.
-const REFINED: usize = 8;
-
 /// A Fourier series with equally spaced harmonics.
 #[derive(Clone, Copy)]
 pub(super) struct HarmonicSeries<'a> {
@@ -46,7 +40,9 @@ impl HarmonicSeries<'_> {
         f: impl Fn(&Self, f64) -> (f64, f64),
     ) -> f64 {
         let mut at = start.clamp(low, high);
-        for _ in 0..ITERATIONS {
+        // Maximum number of Newton iterations for an event; three are usual. A step out of the
+        // bracket is replaced by bisection.
+        for _ in 0..60 {
             let (value, slope) = f(self, at);
             if value * sign > 0.0 {
                 high = at
@@ -70,7 +66,9 @@ impl HarmonicSeries<'_> {
     /// iteration moves more than `reach`.
     fn turning(&self, mut theta: f64, reach: f64) -> Option<f64> {
         let (mut best, mut moved) = (0.0, 0.0f64);
-        for _ in 0..REFINED {
+        // Maximum number of Newton iterations from a grid point to a turning point; three are
+        // usual.
+        for _ in 0..8 {
             let (value, slope, bend) = self.at(theta);
             let step = slope / bend;
             moved += step.abs();

@@ -6,16 +6,14 @@ use num_complex::Complex64;
 /// count as periodic: the rounding of a thousand steps.
 pub(in super::super) const PERIODICITY_TOLERANCE: f64 = 1e-12;
 
-/// Memory for derivatives by the harmonics of a motion, bytes. Those of a long
-/// series are computed in groups of harmonics.
-const DERIVATIVE_BYTES: f64 = 2.5e8;
-
 /// Returns the number of harmonics by which the forces at all samples are
 /// differentiated at once, and the memory for that, bytes.
 pub(in super::super) fn derivative_batch(axes: usize, samples: usize, harmonics: usize) -> (usize, f64) {
     // forces at all samples by both parts of one harmonic
     let each = 8.0 * 2.0 * (axes * axes) as f64 * samples as f64;
-    let count = harmonics.min((DERIVATIVE_BYTES / each) as usize).max(1);
+    // Memory for derivatives by the harmonics of a motion, bytes. Those of a long series are
+    // computed in groups of harmonics.
+    let count = harmonics.min((2.5e8 / each) as usize).max(1);
     (count, each * count as f64)
 }
 

@@ -14,8 +14,6 @@ use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
 
-/// Number of degrees of freedom from which the banded form is considered.
-const BANDED_DOFS: usize = 16;
 /// Number of degrees of freedom from which a search begins without friction. Describing
 /// functions would solve the whole structure with dense matrices.
 pub(crate) const DESCRIBING_DOFS: usize = 40;
@@ -60,7 +58,8 @@ impl BandedForm {
     /// faster: they are few, or they couple many places.
     pub fn new(system: &System, ports: &Ports, harmonics: &[usize]) -> Option<Self> {
         let n = system.dofs();
-        if n < BANDED_DOFS || ports.wave().is_some() || ports.iter().any(|port| port.series_compliance > 0.0) {
+        // Number of degrees of freedom from which the banded form is considered.
+        if n < 16 || ports.wave().is_some() || ports.iter().any(|port| port.series_compliance > 0.0) {
             return None;
         }
         if system.structure().damped_modes().is_some() {

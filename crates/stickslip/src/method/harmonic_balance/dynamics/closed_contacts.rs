@@ -22,14 +22,6 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_blocked};
 
-/// Receptance of the structure, relative to the compliance of a closed contact, up to which the
-/// structure is well supported. Two digits are lost at this value.
-const WELL_SUPPORTED: f64 = 1e2;
-/// Ratio of the receptances at the frequency and at twice the frequency above which
-/// [`REGULARIZING_FREQUENCY`] alone supports a direction. Its springs are four times as stiff at
-/// twice the frequency.
-const UNSUPPORTED_RATIO: f64 = 2.0;
-
 /// Returns the stiffness of closed contacts along the axes, N/m.
 pub(crate) fn closed_stiffness(ports: &Ports) -> Vec<f64> {
     let all = ports.iter().flat_map(|port| (0..port.axes).map(|axis| port.closed_stiffness(axis)));
@@ -50,12 +42,18 @@ pub(crate) fn need_contact_support(
         return false;
     }
     let Ok(once) = own(omega) else { return false };
-    if springs.iter().zip(&once).all(|(k, own)| k * own <= WELL_SUPPORTED) {
+    // Receptance of the structure, relative to the compliance of a closed contact, up to which the
+    // structure is well supported. Two digits are lost at this value.
+    let well_supported = 1e2;
+    if springs.iter().zip(&once).all(|(k, own)| k * own <= well_supported) {
         return false;
     }
     let Ok(stiffer) = own(2.0 * omega) else { return false };
-    let free = once.iter().zip(&stiffer).map(|(once, stiffer)| *once > UNSUPPORTED_RATIO * stiffer);
-    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > WELL_SUPPORTED)
+    // Ratio of the receptances at the frequency and at twice the frequency above which the
+    // regularizing frequency alone supports a direction. Its springs are four times as stiff at
+    // twice the frequency.
+    let free = once.iter().zip(&stiffer).map(|(once, stiffer)| *once > 2.0 * stiffer);
+    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > well_supported)
 }
 
 /// Structure in uncoupled modes, which the closed contacts couple.

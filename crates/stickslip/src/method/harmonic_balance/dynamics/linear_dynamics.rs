@@ -29,22 +29,44 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// Number of axes up to which a complex matrix fits in the cache of the processor, 260 kB.
 pub(crate) const CACHED: usize = 128;
-/// Share of the largest static receptance below which springs hold a direction. The largest is
-/// that of a soft spring, if one holds a direction alone.
-const HELD_RECEPTANCE: f64 = 1e-5;
+/// Limits of the linear dynamics.
+#[derive(Debug, Clone, Copy)]
+struct LinearDynamicsSettings {
+    /// Share of the largest static receptance below which springs hold a direction. The largest is
+    /// that of a soft spring, if one holds a direction alone.
+    held_receptance: f64,
+    /// Number of degrees of freedom beyond which modes of full matrices are not computed: at 200
+    /// they take a second, with the third power.
+    modal_dofs: usize,
+    /// Number of axes from which receptances of a structure in modes are not formed: products with
+    /// either take equally long.
+    modal_axes: usize,
+    /// Number of right sides that a factor solves at once.
+    right_sides: usize,
+    /// Harmonics above this are ignored.
+    highest_harmonic: f64,
+    /// Memory limit of kept factors, bytes. Measured: 1.7 GB for each harmonic of a block of
+    /// 60,000 degrees of freedom, 11.5 GB in all with five harmonics and an estimate of their
+    /// error. A discarded factor is computed again when needed.
+    factor_bytes: usize,
+    /// Memory limit of kept motions under unit forces, bytes. Measured: 54 MB for each harmonic of
+    /// a blade of 69,930 rows with 16 contacts of three directions, whose factors take 1.3 GB.
+    response_bytes: usize,
+}
 
-/// Number of degrees of freedom beyond which modes of full matrices are not computed: at 200
-/// they take a second, with the third power.
-const MODAL_DOFS: usize = 200;
-
-/// Number of axes from which receptances of a structure in modes are not
-/// formed: products with either take equally long.
-const MODAL_AXES: usize = 150;
-/// Number of right sides that a factor solves at once.
-const AT_ONCE: usize = 64;
-
-/// Harmonics above this are ignored.
-const HIGHEST: f64 = 1e6;
+impl Default for LinearDynamicsSettings {
+    fn default() -> Self {
+        LinearDynamicsSettings {
+            held_receptance: 1e-5,
+            modal_dofs: 200,
+            modal_axes: 150,
+            right_sides: 64,
+            highest_harmonic: 1e6,
+            factor_bytes: 2_000_000_000,
+            response_bytes: 1_000_000_000,
+        }
+    }
+}
 
 /// Receptance of the structure without its joints.
 #[derive(Debug, Clone)]
@@ -74,15 +96,6 @@ pub(crate) struct LinearDynamics {
     /// The structure with these springs, if they alone hold some motion of it.
     closed: OnceCell<Option<ClosedContacts>>,
 }
-
-/// Memory limit of kept factors, bytes. Measured: 1.7 GB for each harmonic of a block of 60,000
-/// degrees of freedom, 11.5 GB in all with five harmonics and an estimate of their error. A
-/// discarded factor is computed again when needed.
-const FACTOR_BYTES: usize = 2_000_000_000;
-
-/// Memory limit of kept motions under unit forces, bytes. Measured: 54 MB for each harmonic of
-/// a blade of 69,930 rows with 16 contacts of three directions, whose factors take 1.3 GB.
-const RESPONSE_BYTES: usize = 1_000_000_000;
 
 /// Motions of all places at a rate (1/s) and an excitation frequency (rad/s): n
 /// × q, one column for a unit force along each axis.
@@ -249,7 +262,8 @@ impl LinearDynamics {
     /// Returns the modes that replace receptances, if these would be large
     /// matrices and all ports need only their products.
     pub fn modes_for(&self, ports: &Ports) -> Option<&Arc<UncoupledDynamics>> {
-        self.uncoupled.as_ref().filter(|_| ports.count() >= MODAL_AXES && !ports.has_forces())
+        let settings = LinearDynamicsSettings::default();
+        self.uncoupled.as_ref().filter(|_| ports.count() >= settings.modal_axes && !ports.has_forces())
     }
 
     /// Returns the structure with closed contacts if the harmonic is the mean,
@@ -438,6 +452,7 @@ impl LinearDynamics {
         omega: f64,
         mut take: impl FnMut(usize, &[Complex64]),
     ) -> Result<(), UndampedResonance> {
+        let settings = LinearDynamicsSettings::default();
         let mut hand = |from: usize, columns: &DMatrix<Complex64>| {
             (0..columns.ncols()).for_each(|b| take(from + b, &columns.as_slice()[b * self.n..(b + 1) * self.n]));
         };
@@ -454,14 +469,14 @@ impl LinearDynamics {
         let mut kept = self.unit_responses.borrow_mut();
         kept.retain(|kept| kept.omega == omega);
         let bytes = size_of::<Complex64>() * self.n * self.directions.len();
-        if (kept.len() + 1) * bytes <= RESPONSE_BYTES {
+        if (kept.len() + 1) * bytes <= settings.response_bytes {
             let columns = Arc::new(solved(&self.directions));
             hand(0, &columns);
             kept.push(UnitResponses { rate: s, omega, columns });
         } else {
             // in groups: all at once would fill the memory
-            let some = self.directions.chunks(AT_ONCE).enumerate();
-            some.for_each(|(number, some)| hand(number * AT_ONCE, &solved(some)));
+            let some = self.directions.chunks(settings.right_sides).enumerate();
+            some.for_each(|(number, some)| hand(number * settings.right_sides, &solved(some)));
         }
         Ok(())
     }
@@ -478,12 +493,13 @@ impl LinearDynamics {
         x: &mut DVector<Complex64>,
         along: impl Fn(usize) -> f64,
     ) -> Result<(), UndampedResonance> {
+        let settings = LinearDynamicsSettings::default();
         let q = self.directions.len();
         let unheld = rigid_body_fraction(ZERO, omega).re / self.structure.largest()[0];
         if let Some(uncoupled) = &self.uncoupled {
             // at rest no place moves more than the place under the force
             let own = uncoupled.diagonal_receptance(&uncoupled.modal_receptances(ZERO, omega)?);
-            if own.iter().all(|r| r.norm() < HELD_RECEPTANCE * unheld) {
+            if own.iter().all(|r| r.norm() < settings.held_receptance * unheld) {
                 return Ok(());
             }
         }
@@ -491,11 +507,11 @@ impl LinearDynamics {
             DVector::from_fn(q, |a, _| along(a) - self.directions[a].iter().map(|&(i, w)| w * x[i].re).sum::<f64>());
         let receptance = self.receptance(0, omega)?.map(|r| r.re);
         let largest = receptance.amax();
-        if largest == 0.0 || largest < HELD_RECEPTANCE * unheld {
+        if largest == 0.0 || largest < settings.held_receptance * unheld {
             return Ok(()); // springs hold all that moves, or nothing moves
         }
         // only along directions that nothing else holds
-        let Ok(inverse) = receptance.pseudo_inverse(HELD_RECEPTANCE * largest) else { return Ok(()) };
+        let Ok(inverse) = receptance.pseudo_inverse(settings.held_receptance * largest) else { return Ok(()) };
         let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
         *x += self.respond_along(0, omega, |a| force[a])?;
         Ok(())
@@ -503,10 +519,11 @@ impl LinearDynamics {
 
     /// Returns the harmonics next to the resonances above harmonic `top`.
     pub fn resonances_above(&self, top: usize, omega: f64) -> Vec<usize> {
+        let settings = LinearDynamicsSettings::default();
         let lambda = self.modal.iter().flat_map(|modal| &modal.lambda);
         let mut found: Vec<usize> = lambda
             .map(|lambda| (lambda.im.abs() / omega).floor())
-            .filter(|h| *h < HIGHEST)
+            .filter(|h| *h < settings.highest_harmonic)
             .flat_map(|h| [h as usize, h as usize + 1])
             .filter(|h| *h > top)
             .collect();
@@ -538,6 +555,7 @@ impl LinearDynamics {
     /// Factors the dynamic stiffness of a large structure. Factors of one
     /// excitation frequency are kept, up to the memory limit.
     fn factor(&self, s: Complex64, omega: f64) -> Result<Arc<DynamicStiffness>, UndampedResonance> {
+        let settings = LinearDynamicsSettings::default();
         let mut factors = self.factors.borrow_mut();
         factors.retain(|kept| kept.omega == omega);
         if let Some(kept) = factors.iter().find(|kept| kept.rate == s) {
@@ -551,7 +569,7 @@ impl LinearDynamics {
         let bytes =
             |factor: &Result<Arc<DynamicStiffness>, UndampedResonance>| factor.as_ref().map_or(0, |f| f.bytes());
         while !factors.is_empty()
-            && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > FACTOR_BYTES
+            && factors.iter().map(|kept| bytes(&kept.factor)).sum::<usize>() + bytes(&factor) > settings.factor_bytes
         {
             factors.remove(0);
         }
@@ -562,7 +580,8 @@ impl LinearDynamics {
 
 /// Tells whether the dynamic stiffness is factored at every frequency.
 fn is_factored(structure: &Structure) -> bool {
-    structure.is_sparse() || structure.dofs() > MODAL_DOFS
+    let settings = LinearDynamicsSettings::default();
+    structure.is_sparse() || structure.dofs() > settings.modal_dofs
 }
 
 /// Tells whether the coordinates are real modes, as in a reduced model.

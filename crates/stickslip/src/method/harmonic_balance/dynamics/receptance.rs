@@ -11,9 +11,6 @@ use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_block
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Number of axes from which products in blocks are faster.
-const BLOCKED: usize = 12;
-
 /// Receptances at the harmonics of a discretization, m/N.
 #[derive(Debug, Clone)]
 pub(crate) enum Receptance {
@@ -35,7 +32,7 @@ pub(crate) struct ReceptanceMatrices {
 
 impl ReceptanceMatrices {
     pub fn new(matrices: Vec<DMatrix<Complex64>>) -> Self {
-        let few = |matrix: &&DMatrix<Complex64>| (BLOCKED..=CACHED).contains(&matrix.nrows());
+        let few = |matrix: &&DMatrix<Complex64>| multiplies_in_blocks(matrix.nrows()) && matrix.nrows() <= CACHED;
         let pairs =
             matrices.iter().filter(few).map(|matrix| ComplexGemv::new(matrix.as_slice(), matrix.nrows())).collect();
         ReceptanceMatrices { matrices, gemv_copies: pairs, ..ReceptanceMatrices::default() }
@@ -58,7 +55,7 @@ impl ReceptanceMatrices {
             let own = if let Some(pairs) = self.gemv_copies.get(k) {
                 pairs.apply(forces, &mut self.memory);
                 &*forces
-            } else if axes >= BLOCKED {
+            } else if multiplies_in_blocks(axes) {
                 multiply_blocked(
                     matrix.as_slice(),
                     forces,
@@ -189,4 +186,8 @@ impl Receptance {
             Receptance::Modal(modal) => modal.mean[q],
         }
     }
+}
+/// Returns true if products in blocks are faster for this number of axes.
+fn multiplies_in_blocks(axes: usize) -> bool {
+    axes >= 12
 }

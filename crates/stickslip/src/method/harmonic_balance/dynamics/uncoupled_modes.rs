@@ -14,10 +14,6 @@ use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Ratio of a modal dynamic stiffness to its terms below which it is rounding: a resonance
-/// without damping.
-const RESONANT: f64 = 1e-14;
-
 /// Singular dynamic stiffness: a resonance without damping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct UndampedResonance;
@@ -68,7 +64,9 @@ impl UncoupledDynamics {
         let of_mass = (s * s + hold) * mass;
         let sum = of_mass + s * damping + stiffness;
         let size = of_mass.norm() + (s * damping).norm() + stiffness.abs();
-        if sum.norm() > RESONANT * size { Ok(sum) } else { Err(UndampedResonance) }
+        // Ratio of a modal dynamic stiffness to its terms below which it is rounding: a resonance
+        // without damping.
+        if sum.norm() > 1e-14 * size { Ok(sum) } else { Err(UndampedResonance) }
     }
 
     /// Returns the inverse modal dynamic stiffness of all modes.

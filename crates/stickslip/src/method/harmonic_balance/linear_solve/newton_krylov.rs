@@ -31,52 +31,89 @@ use stickslip_numerics::gmres::{Gmres, GmresLimits};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Number of unknowns from which GMRES is faster than elimination, with derivatives by all
-/// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
-/// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0. The second limit applies with
-/// rigid friction, whose lowest harmonics are eliminated in any case.
-const KRYLOV_UNKNOWNS: usize = 200;
-const MANY_OF_FORCES: usize = 400;
+/// Settings of Newton's method with GMRES.
+#[derive(Debug, Clone, Copy)]
+struct KrylovSettings {
+    /// Number of unknowns from which GMRES is faster than elimination, with derivatives by all
+    /// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
+    /// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0.
+    unknowns: usize,
+    /// The same number with rigid friction, whose lowest harmonics are eliminated in any case.
+    unknowns_with_forces: usize,
+    /// Number of unknowns from which GMRES is used for few directions with rigid friction, whose
+    /// series are long. Measured: a step of 10 joints with 128 harmonics, 2560 unknowns, takes 80
+    /// products, an eighth of its elimination.
+    long_series_unknowns: usize,
+    /// Number of unknowns of the lowest harmonics that are factored together to precondition a
+    /// step with long series. Measured: with a quarter of the harmonics a step takes 80 products,
+    /// with an eighth 150. With none, each harmonic by its mean, it does not converge in hundreds.
+    lowest_unknowns: usize,
+    /// Relative tolerance of GMRES, as a share of Newton's residual.
+    forcing_term: f64,
+    /// Upper bound of this tolerance. Derivatives of laws cost as much as tens of products, so
+    /// that fewer Newton steps count more.
+    coarsest: f64,
+    /// Upper bound with modes, whose products cost more than derivatives do: for 1000 nodes one
+    /// product takes 50 ms, all derivatives 0.3 s.
+    coarsest_with_modes: f64,
+    /// Lower bound with coarse derivatives, which have an error of this size. Measured: with a
+    /// tenth of it, a point of 16 nodes takes 2 % longer.
+    finest_with_coarse_derivatives: f64,
+    /// Maximum number of Krylov vectors.
+    vectors: usize,
+    /// Maximum number of products.
+    products: usize,
+    /// Relative residual of the linear equations up to which a step is used.
+    useful: f64,
+    /// Number of products beyond which a kept preconditioner is replaced.
+    kept_products: usize,
+    /// Number of products that later steps may take in total in excess of the step for which a
+    /// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
+    excess_products: usize,
+    /// Modes with frequencies above this multiple of the highest harmonic respond almost
+    /// statically.
+    above: f64,
+    /// Number of harmonics above which derivatives of laws do not fit in the cache.
+    cached_harmonics: usize,
+    /// Cost factor of products with the derivatives of unknown forces, whose series are long:
+    /// every product reads them from memory. Measured: 21 ms a product of 11 joints with 512
+    /// harmonics.
+    uncached_cost: f64,
+}
+
+impl Default for KrylovSettings {
+    fn default() -> Self {
+        KrylovSettings {
+            unknowns: 200,
+            unknowns_with_forces: 400,
+            long_series_unknowns: 2048,
+            lowest_unknowns: 1000,
+            forcing_term: 0.1,
+            coarsest: 1e-6,
+            coarsest_with_modes: 1e-2,
+            finest_with_coarse_derivatives: 1e-2,
+            vectors: 80,
+            products: 320,
+            useful: 0.1,
+            kept_products: 25,
+            excess_products: 10,
+            above: 3.0,
+            cached_harmonics: 64,
+            uncached_cost: 8.0,
+        }
+    }
+}
+
 /// Number of unknowns up to which the Jacobian is formed if GMRES does not
 /// converge: 130 MB, seconds.
 pub(crate) const FORMED_UNKNOWNS: usize = 4096;
-/// Number of unknowns from which GMRES is used for few directions with rigid
-/// friction, whose series are long. Measured: a step of 10 joints with 128
-/// harmonics, 2560 unknowns, takes 80 products, an eighth of its elimination.
-const KRYLOV_LONG_SERIES: usize = 2048;
-/// Number of unknowns of the lowest harmonics that are factored together to precondition such a
-/// step. Measured: with a quarter of the harmonics a step takes 80 products, with an eighth
-/// 150. With none, each harmonic by its mean, it does not converge in hundreds.
-const LOWEST_UNKNOWNS: usize = 1000;
 /// Tells whether a discretization with `size` unknowns uses GMRES.
 pub(crate) fn uses_krylov(size: usize, ports: &Ports) -> bool {
-    let many = if ports.has_forces() { MANY_OF_FORCES } else { KRYLOV_UNKNOWNS };
+    let settings = KrylovSettings::default();
+    let many = if ports.has_forces() { settings.unknowns_with_forces } else { settings.unknowns };
     let many = size >= many && ports.count() >= KRYLOV_AXES;
-    size > FORMED_UNKNOWNS || many || (size > KRYLOV_LONG_SERIES && ports.has_forces())
+    size > FORMED_UNKNOWNS || many || (size > settings.long_series_unknowns && ports.has_forces())
 }
-
-/// Relative tolerance of GMRES, as a share of Newton's residual, and its upper bound.
-/// Derivatives of laws cost as much as tens of products, so that fewer Newton steps count more.
-const FORCING_TERM: f64 = 0.1;
-const COARSEST: f64 = 1e-6;
-/// Upper bound with modes, whose products cost more than derivatives do: for 1000 nodes one
-/// product takes 50 ms, all derivatives 0.3 s.
-const COARSEST_OF_MODES: f64 = 1e-2;
-/// Lower bound with coarse derivatives, which have an error of this size. Measured: with a
-/// tenth of it, a point of 16 nodes takes 2 % longer.
-const FINEST_OF_SKETCHES: f64 = 1e-2;
-/// Maximum number of Krylov vectors, and of products.
-const VECTORS: usize = 80;
-const PRODUCTS: usize = 320;
-/// Relative residual of the linear equations up to which a step is used.
-const USEFUL: f64 = 0.1;
-/// Number of products beyond which a kept preconditioner is replaced.
-const KEPT_PRODUCTS: usize = 25;
-/// Number of products that later steps may take in total in excess of the step for which a
-/// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
-const EXCESS_PRODUCTS: usize = 10;
-/// Modes with frequencies above this multiple of the highest harmonic respond almost statically.
-const ABOVE: f64 = 3.0;
 
 /// Residual flexibility of the modes above a bound, from a discarded split.
 type KeptResidualFlexibility = (f64, Arc<Vec<f64>>);
@@ -133,13 +170,16 @@ impl NewtonKrylov {
         step: &mut [f64],
         near: StepStart,
     ) -> (bool, usize) {
-        let coarsest = if matches!(receptance, Receptance::Modal(_)) { COARSEST_OF_MODES } else { COARSEST };
-        let (residual, finest) = (near.residual, if near.coarse { FINEST_OF_SKETCHES } else { 0.0 });
-        let wanted = (FORCING_TERM * residual)
+        let settings = KrylovSettings::default();
+        let coarsest =
+            if matches!(receptance, Receptance::Modal(_)) { settings.coarsest_with_modes } else { settings.coarsest };
+        let (residual, finest) =
+            (near.residual, if near.coarse { settings.finest_with_coarse_derivatives } else { 0.0 });
+        let wanted = (settings.forcing_term * residual)
             .min(coarsest)
-            .max(FORCING_TERM * RESIDUAL_TOLERANCE / residual.max(RESIDUAL_TOLERANCE))
+            .max(settings.forcing_term * RESIDUAL_TOLERANCE / residual.max(RESIDUAL_TOLERANCE))
             .max(finest);
-        let limits = GmresLimits { tolerance: wanted, restart: VECTORS, products: PRODUCTS };
+        let limits = GmresLimits { tolerance: wanted, restart: settings.vectors, products: settings.products };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
         let NewtonKrylov { gmres, harmonics, split, above, force, moved, parts } = self;
@@ -151,8 +191,11 @@ impl NewtonKrylov {
             else {
                 break false;
             };
-            let most =
-                if fresh { limits } else { GmresLimits { products: KEPT_PRODUCTS, restart: KEPT_PRODUCTS, ..limits } };
+            let most = if fresh {
+                limits
+            } else {
+                GmresLimits { products: settings.kept_products, restart: settings.kept_products, ..limits }
+            };
             let outcome = gmres.solve(
                 step,
                 most,
@@ -165,10 +208,10 @@ impl NewtonKrylov {
             }
             harmonics.take_if(|known| {
                 known.excess += outcome.products.saturating_sub(known.products);
-                known.excess > EXCESS_PRODUCTS
+                known.excess > settings.excess_products
             });
             if fresh || outcome.solved {
-                break outcome.solved || outcome.residual <= USEFUL;
+                break outcome.solved || outcome.residual <= settings.useful;
             }
             // the stiffness of another motion
             *harmonics = None;
@@ -189,7 +232,8 @@ pub(crate) fn lowest_factor_entries(ports: &Ports, harmonics: usize) -> usize {
 
 /// Returns the number of lowest harmonics that are factored together; zero if it would be one.
 fn lowest_count(ports: &Ports, harmonics: usize) -> usize {
-    let count = if ports.has_forces() { LOWEST_UNKNOWNS / (2 * ports.count()) } else { 0 };
+    let settings = KrylovSettings::default();
+    let count = if ports.has_forces() { settings.lowest_unknowns / (2 * ports.count()) } else { 0 };
     if count < 2 { 0 } else { count.min(harmonics) }
 }
 
@@ -475,18 +519,13 @@ impl Preconditioner<'_> {
     }
 }
 
-/// Number of harmonics above which derivatives of laws do not fit in the cache.
-const CACHED_HARMONICS: usize = 64;
-/// Cost factor of products with the derivatives of unknown forces, whose series are long: every
-/// product reads them from memory. Measured: 21 ms a product of 11 joints with 512 harmonics.
-const UNCACHED_COST: f64 = 8.0;
-
 /// Returns the multiplications in a product with the Jacobian: of the structure
 /// over the axes, and of the laws over the harmonics.
 pub(crate) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
+    let settings = KrylovSettings::default();
     let of_law = |port: &Port| {
         (2 * harmonics * port.axes).pow(2) as f64
-            * if port.is_force() && harmonics > CACHED_HARMONICS { UNCACHED_COST } else { 1.0 }
+            * if port.is_force() && harmonics > settings.cached_harmonics { settings.uncached_cost } else { 1.0 }
     };
     4.0 * harmonics as f64 * (ports.count() as f64).powi(2) + ports.iter().map(of_law).sum::<f64>()
 }
@@ -494,8 +533,9 @@ pub(crate) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
 /// Returns the multiplications in a step by GMRES, with the lowest harmonics of
 /// unknown forces factored together.
 pub(crate) fn krylov_step_work(ports: &Ports, harmonics: usize) -> f64 {
-    let together = if ports.has_forces() { LOWEST_UNKNOWNS.min(2 * harmonics * ports.count()) } else { 0 };
-    VECTORS as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
+    let settings = KrylovSettings::default();
+    let together = if ports.has_forces() { settings.lowest_unknowns.min(2 * harmonics * ports.count()) } else { 0 };
+    settings.vectors as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
 }
 
 /// The preconditioner `(1 + R K)⁻¹` with one real K for all harmonics, for a structure in modes.
@@ -526,8 +566,9 @@ struct ModalPreconditioner {
 impl ModalPreconditioner {
     /// Returns the bound, rounded up so that nearby frequencies share it.
     fn bound(modal: &ModalReceptance) -> f64 {
+        let settings = KrylovSettings::default();
         let top = modal.rates.iter().map(|s| s.im).fold(modal.omega, f64::max);
-        ABOVE * top.log2().ceil().exp2()
+        settings.above * top.log2().ceil().exp2()
     }
 
     /// Creates the split from `stiffness(p, port, a, b)` of the joints. `above`
@@ -843,10 +884,11 @@ mod tests {
     /// the lowest harmonics factored together.
     #[test]
     fn factored_lowest_harmonics_precondition_long_series() {
+        let settings = KrylovSettings::default();
         let laws: [SharedLaw; 2] = [Arc::new(Coulomb { limit: 0.3 }), Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 })];
         let joints: Vec<_> = (0..12).map(|i| (laws[usize::from(i % 3 == 2)].clone(), 1)).collect();
         let harmonics: Vec<usize> = (1..128).step_by(2).collect();
-        assert!(LOWEST_UNKNOWNS < 24 * harmonics.len(), "some are left to their means");
+        assert!(settings.lowest_unknowns < 24 * harmonics.len(), "some are left to their means");
         agree(&system(&joints), &harmonics, &[SolverForm::Formed]);
     }
 

@@ -19,17 +19,26 @@ use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::continuation::ParametricEquations;
 
-/// Default number of harmonics, in units of the excitation's greatest common divisor.
-const HARMONICS: usize = 15;
-/// Step of the central difference with respect to the parameter, relative to the larger of the
-/// parameter and its range. It is near the cube root of rounding.
-const DIFFERENCE: f64 = 1e-6;
+/// Settings of the equations of a branch.
+#[derive(Debug, Clone, Copy)]
+struct BranchSettings {
+    /// Default number of harmonics, in units of the excitation's greatest common divisor.
+    harmonics: usize,
+    /// Step of the central difference with respect to the parameter, relative to the larger of the
+    /// parameter and its range. It is near the cube root of rounding.
+    difference: f64,
+    /// Newton iterations of the solution for the error estimate.
+    estimate_iterations: usize,
+    /// Unit of the unknowns relative to the first motion. Motions grow towards a resonance, and
+    /// the unknowns then stay of order one.
+    unit_of_motion: f64,
+}
 
-/// Newton iterations of the solution for the error estimate.
-const ESTIMATE_ITERATIONS: usize = 30;
-/// Unit of the unknowns relative to the first motion. Motions grow towards a resonance, and the
-/// unknowns then stay of order one.
-const UNIT_OF_MOTION: f64 = 30.0;
+impl Default for BranchSettings {
+    fn default() -> Self {
+        BranchSettings { harmonics: 15, difference: 1e-6, estimate_iterations: 30, unit_of_motion: 30.0 }
+    }
+}
 
 /// Equations whose unknowns are the harmonics along the joints, relative to the size of the
 /// first orbit.
@@ -63,12 +72,13 @@ impl<'a> BranchEquations<'a> {
         method: HarmonicBalance,
         range: (f64, f64),
     ) -> Result<Self, MethodError> {
+        let settings = BranchSettings::default();
         let (system, omega) = at(range.0);
         let system = Arc::new(system);
         // a force that is zero at the first value may be nonzero later
         let harmonic_set = HarmonicSet::new(&system, |_| true);
         method.check(harmonic_set.highest)?;
-        let top = method.harmonics.unwrap_or((HARMONICS * harmonic_set.unit).max(harmonic_set.highest));
+        let top = method.harmonics.unwrap_or((settings.harmonics * harmonic_set.unit).max(harmonic_set.highest));
         let (ports, around) =
             Ports::for_sector(&system).map_err(|error| error.with_alternatives(alternatives(&system)))?;
         let dynamics = LinearDynamics::new(&system, &ports);
@@ -151,6 +161,7 @@ impl<'a> BranchEquations<'a> {
 
     /// Finds the first point from the describing functions.
     pub fn start(&mut self, value: f64) -> Result<Vec<f64>, OrbitError> {
+        let settings = BranchSettings::default();
         if !self.set_parameter(value) {
             return Err(OrbitError::Frequency { omega: self.omega });
         }
@@ -163,12 +174,13 @@ impl<'a> BranchEquations<'a> {
         self.motion = solved.map_err(|error| self.not_converged(error.iterations, error.residual))?;
         let norm = |c: &[Complex64]| c.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let size = norm(&self.motion.c).max(1e-3 * norm(&self.discretization.linear.motion));
-        self.length = (UNIT_OF_MOTION * size).max(f64::MIN_POSITIVE);
+        self.length = (settings.unit_of_motion * size).max(f64::MIN_POSITIVE);
         Ok(self.discretization.pack(&self.ports, &self.motion, self.length))
     }
 
     /// Returns the orbit of a point of the branch.
     pub fn orbit(&mut self, x: &[f64], value: f64) -> Option<Orbit> {
+        let settings = BranchSettings::default();
         if !self.set_parameter(value) {
             return None;
         }
@@ -181,7 +193,7 @@ impl<'a> BranchEquations<'a> {
             let mut motion = with_harmonics(&self.motion, self.discretization.harmonics(), finer.harmonics());
             // Newton's method alone: a search would find another branch near a turning point
             finer.begin_point();
-            finer.newton_from(&self.ports, self.omega, &mut motion, ESTIMATE_ITERATIONS).ok()?;
+            finer.newton_from(&self.ports, self.omega, &mut motion, settings.estimate_iterations).ok()?;
             let better = postprocess::places(finer, &self.dynamics, self.omega, &motion).ok()?;
             let coarse =
                 ComparedSolution { harmonics: self.discretization.harmonics(), places: &places, along: &self.motion.c };
@@ -225,14 +237,16 @@ impl ParametricEquations for BranchEquations<'_> {
     }
 
     fn tolerance(&self) -> f64 {
-        crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE / UNIT_OF_MOTION
+        let settings = BranchSettings::default();
+        crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE / settings.unit_of_motion
     }
 
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {
+        let settings = BranchSettings::default();
         if !p.is_finite() || x.iter().any(|x| !x.is_finite()) {
             return false;
         }
-        let step = DIFFERENCE * p.abs().max(self.range_length);
+        let step = settings.difference * p.abs().max(self.range_length);
         for (sign, at) in [(1.0, p + step), (-1.0, p - step)] {
             if !self.set_parameter(at) {
                 return false;

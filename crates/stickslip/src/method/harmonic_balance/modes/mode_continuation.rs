@@ -7,20 +7,12 @@
 //! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
 //! (2003), Ch. 6.
 
-use super::nonlinear_mode::{ITERATIONS, ModeEquations, ModeState, ROUNDED, SOLVED};
+use super::nonlinear_mode::{ModeEquations, ModeSettings, ModeState};
 use crate::method::harmonic_balance::line_search::LineSearch;
 use crate::method::harmonic_balance::settings::NewtonSettings;
 use num_complex::Complex64;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::{dense, interrupt};
-
-/// Weight of `ln a` in the arc length. A tenth of the shape counts as much as a fifth of the
-/// amplitude.
-const AMPLITUDE: f64 = 0.5;
-
-/// Relative motion below which its changes do not count, relative to the modal amplitude
-/// (1/√kg). It is above rounding.
-const SMALL: f64 = 1e-6;
 
 /// Point of the curve: modal amplitude, m √kg, and motion.
 #[derive(Debug, Clone)]
@@ -176,7 +168,9 @@ impl ModeEquations<'_> {
                 .map(|k| along(k, &|i| at.state.x[i].re).powi(2) + along(k, &|i| at.state.x[i].im).powi(2))
                 .sum();
             let reach = placed.port.slip_displacement();
-            let size = square + reach * reach + (SMALL * at.amplitude).powi(2);
+            // Relative motion below which its changes do not count, relative to the modal
+            // amplitude (1/√kg). It is above rounding.
+            let size = square + reach * reach + (1e-6 * at.amplitude).powi(2);
             let weight = at.amplitude * at.amplitude / size;
             for k in 0..nh {
                 for part in 0..2 {
@@ -196,7 +190,10 @@ impl ModeEquations<'_> {
         let (omega, zeta) = (at.state.omega, 1.0 + at.state.damping.abs());
         out[last - 2] = direction[last - 2] / (omega * omega);
         out[last - 1] = direction[last - 1] / (zeta * zeta);
-        out[last] = direction[last] * AMPLITUDE * AMPLITUDE;
+        // Weight of `ln a` in the arc length. A tenth of the shape counts as much as a fifth of
+        // the amplitude.
+        let weight = 0.5;
+        out[last] = direction[last] * weight * weight;
         out
     }
 
@@ -205,6 +202,7 @@ impl ModeEquations<'_> {
     /// The line search halves steps as in [`ModeEquations::solve`]. Returns the solution with
     /// its unit tangent, on the side of `row`, and the iterations.
     fn corrector(&mut self, mut point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
+        let settings = ModeSettings::default();
         let size = self.size();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
         let (mut bordered, mut right) = (vec![0.0; (size + 1) * (size + 1)], vec![0.0; size + 1]);
@@ -216,9 +214,9 @@ impl ModeEquations<'_> {
             norm(residual)
         };
         let mut now = evaluate(self, &point, &mut residual, &mut jacobian);
-        let mut enough = SOLVED;
+        let mut enough = settings.tolerance;
         let mut iteration = 0;
-        while iteration <= ITERATIONS {
+        while iteration <= settings.iterations {
             interrupt::check();
             let solved = now <= enough;
             self.border((&point, &scale), &jacobian, row, &mut bordered);
@@ -257,9 +255,9 @@ impl ModeEquations<'_> {
             };
             match LineSearch::default().run(now, |fraction| step(self, fraction)) {
                 Some(after) => (point, now) = (trial, after),
-                None if now <= ROUNDED => {
+                None if now <= settings.rounded => {
                     // rounding prevents a smaller residual
-                    enough = ROUNDED;
+                    enough = settings.rounded;
                     now = evaluate(self, &point, &mut residual, &mut jacobian);
                 }
                 None => {

@@ -5,18 +5,34 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::eigen;
 
-/// Share of the joints' stiffness that separates equal modes of a structure without joints.
-const JOINT_SHARE: f64 = 1e-9;
-/// Relative distance of two squared frequencies up to which modes count as equal. It is well
-/// above [`JOINT_SHARE`].
-const EQUAL_FREQUENCIES: f64 = 1e-7;
-/// Rounding error of squared frequencies relative to the largest, per degree of freedom.
-const SQUARE: f64 = 64.0 * f64::EPSILON;
-/// Share of the size of a mode below which an entry is ignored.
-const NEGLIGIBLE_ENTRY: f64 = 1e-6;
-/// Iterations between the frequency and the stiffness of joints at small amplitude, which may
-/// depend on the frequency.
-const ITERATIONS: usize = 5;
+/// Settings of the modes at small amplitude.
+#[derive(Debug, Clone, Copy)]
+struct LinearModeSettings {
+    /// Share of the joints' stiffness that separates equal modes of a structure without joints.
+    joint_share: f64,
+    /// Relative distance of two squared frequencies up to which modes count as equal. It is well
+    /// above `joint_share`.
+    equal_frequencies: f64,
+    /// Rounding error of squared frequencies relative to the largest, per degree of freedom.
+    rounding: f64,
+    /// Share of the size of a mode below which an entry is ignored.
+    negligible_entry: f64,
+    /// Iterations between the frequency and the stiffness of joints at small amplitude, which may
+    /// depend on the frequency.
+    iterations: usize,
+}
+
+impl Default for LinearModeSettings {
+    fn default() -> Self {
+        LinearModeSettings {
+            joint_share: 1e-9,
+            equal_frequencies: 1e-7,
+            rounding: 64.0 * f64::EPSILON,
+            negligible_entry: 1e-6,
+            iterations: 5,
+        }
+    }
+}
 
 /// Linear mode of the structure without its joints.
 #[derive(Debug, Clone)]
@@ -50,12 +66,15 @@ fn real(shape: &DVector<f64>) -> DVector<Complex64> {
 /// In the first wave a place leads the previous ones, as under a positive engine order with
 /// places numbered sector by sector. The first place with a significant phase decides.
 fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
+    let settings = LinearModeSettings::default();
     let size = one.amax().max(other.amax());
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let wave = one.zip_map(other, |re, im| Complex64::new(half * re, half * im));
-    let from = wave.iter().find(|x| x.norm() > NEGLIGIBLE_ENTRY * size).copied().unwrap_or(ZERO);
-    let leads =
-        wave.iter().map(|x| (from.conj() * x).im).find(|leads| leads.abs() > NEGLIGIBLE_ENTRY * size * from.norm());
+    let from = wave.iter().find(|x| x.norm() > settings.negligible_entry * size).copied().unwrap_or(ZERO);
+    let leads = wave
+        .iter()
+        .map(|x| (from.conj() * x).im)
+        .find(|leads| leads.abs() > settings.negligible_entry * size * from.norm());
     let back = wave.map(|x| x.conj());
     if leads.is_some_and(|leads| leads < 0.0) { [back, wave] } else { [wave, back] }
 }
@@ -63,6 +82,7 @@ fn waves(one: &DVector<f64>, other: &DVector<f64>) -> [DVector<Complex64>; 2] {
 impl ModeEquations<'_> {
     /// Returns the linear modes of the structure without its joints, by rising frequency.
     pub fn linear_modes(&self) -> Vec<LinearMode> {
+        let settings = LinearModeSettings::default();
         let n = self.system.dofs();
         if n == 0 {
             return Vec::new(); // the motion of every place is given
@@ -74,7 +94,7 @@ impl ModeEquations<'_> {
             let kt = port.stiffness();
             let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
             for w in w {
-                stiffness += w * w.transpose() * (JOINT_SHARE * kt);
+                stiffness += w * w.transpose() * (settings.joint_share * kt);
             }
         }
         let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
@@ -85,7 +105,7 @@ impl ModeEquations<'_> {
         let mut modes: Vec<(f64, DVector<f64>)> =
             (0..n).map(|k| (eigen.eigenvalues[k].max(0.0), shapes.column(k).into_owned())).collect();
         modes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let rounding = SQUARE * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
+        let rounding = settings.rounding * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
         let equal = |a: &(f64, DVector<f64>), b: &(f64, DVector<f64>)| b.0 - a.0 <= rounding;
         let mut found = Vec::with_capacity(n);
         for group in modes.chunk_by(equal) {
@@ -129,13 +149,14 @@ impl ModeEquations<'_> {
     /// A mode that begins at its small end starts there. Returns `None` with rigid friction,
     /// which has no stiffness.
     pub fn small_amplitude_mode(&self, index: usize, a: f64) -> Option<ModeState> {
+        let settings = LinearModeSettings::default();
         if !self.force_ports.is_empty() {
             return None;
         }
         let (n, structure) = (self.system.dofs(), self.system.structure());
         let mut square = structure.stiffness().amax() / structure.mass().amax();
         let mut found = None;
-        for _ in 0..ITERATIONS {
+        for _ in 0..settings.iterations {
             let omega = square.sqrt();
             let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
             stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
@@ -173,6 +194,7 @@ impl ModeEquations<'_> {
     /// There the first harmonic of friction is at most `share` of the inertia forces. It is also
     /// at most `apart` times the difference of squared frequencies to every other mode.
     pub fn weak_friction_amplitude(&self, modes: &[LinearMode], index: usize, share: f64, apart: f64) -> f64 {
+        let settings = LinearModeSettings::default();
         let Some(mode) = modes.get(index) else { return 0.0 };
         // the force of an unbounded law is weak at small amplitudes, if at all
         let bounded = self.motion_ports.iter().chain(&self.force_ports).filter(|placed| placed.port.scale.is_finite());
@@ -187,7 +209,11 @@ impl ModeEquations<'_> {
         let own = onto(&mode.shape) / (share * mode.squared_frequency);
         let others = modes.iter().enumerate().filter(|(k, _)| *k != index).map(|(_, other)| {
             let gap = (other.squared_frequency - mode.squared_frequency).abs();
-            if gap <= EQUAL_FREQUENCIES * mode.squared_frequency { 0.0 } else { onto(&other.shape) / (apart * gap) }
+            if gap <= settings.equal_frequencies * mode.squared_frequency {
+                0.0
+            } else {
+                onto(&other.shape) / (apart * gap)
+            }
         });
         4.0 / std::f64::consts::PI * others.fold(own, f64::max)
     }

@@ -34,17 +34,24 @@ use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::{dense, interrupt};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
-/// Newton iterations at one amplitude; 2 to 10 are usual.
-pub(crate) const ITERATIONS: usize = 60;
-/// Residual, relative to the elastic forces and to the slip limits, at which a motion counts as
-/// periodic.
-pub(crate) const SOLVED: f64 = 1e-11;
-/// The residual at which a stagnating iteration counts as converged. A stiff joint between soft
-/// springs loses three digits to rounding.
-pub(crate) const ROUNDED: f64 = 1e-8;
-/// Factors of smaller motions that test proportionality. If these motions solve the equations,
-/// all smaller ones do.
-const PROPORTIONALITY_FACTORS: [f64; 3] = [0.7, 0.5, 0.01];
+/// Settings of Newton's method for a nonlinear mode.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ModeSettings {
+    /// Newton iterations at one amplitude; 2 to 10 are usual.
+    pub iterations: usize,
+    /// Residual, relative to the elastic forces and to the slip limits, at which a motion counts
+    /// as periodic.
+    pub tolerance: f64,
+    /// The residual at which a stagnating iteration counts as converged. A stiff joint between
+    /// soft springs loses three digits to rounding.
+    pub rounded: f64,
+}
+
+impl Default for ModeSettings {
+    fn default() -> Self {
+        ModeSettings { iterations: 60, tolerance: 1e-11, rounded: 1e-8 }
+    }
+}
 
 /// Point of a nonlinear mode.
 #[derive(Debug, Clone)]
@@ -399,12 +406,15 @@ impl<'a> ModeEquations<'a> {
     /// Returns true if every smaller motion is a multiple of this one about the same mean. Then
     /// no contact slips, opens or closes in it.
     pub fn is_proportional(&mut self, state: &ModeState, a: f64) -> bool {
+        let settings = ModeSettings::default();
         let mut residual = vec![0.0; self.size()];
-        PROPORTIONALITY_FACTORS.iter().all(|factor| {
+        // Factors of smaller motions that test proportionality. If these motions solve the
+        // equations, all smaller ones do.
+        [0.7, 0.5, 0.01].iter().all(|factor| {
             let (smaller, a) = (self.scaled(state, *factor), a * factor);
             let units = self.units(&smaller, a);
             self.evaluate(&smaller, (&smaller, a), &mut residual, None);
-            scaled_norm(&units, &residual) <= SOLVED
+            scaled_norm(&units, &residual) <= settings.tolerance
         })
     }
 
@@ -426,6 +436,7 @@ impl<'a> ModeEquations<'a> {
     /// the residual, the full step is taken. It may break a cycle of slipping samples, or pass
     /// the amplitude at which two modes coalesce.
     pub fn solve(&mut self, start: &ModeState, before: f64, a: f64) -> Option<ModeState> {
+        let settings = ModeSettings::default();
         let size = self.size();
         let mut start = start.clone();
         start.x.iter_mut().for_each(|x| *x *= a / before);
@@ -435,9 +446,9 @@ impl<'a> ModeEquations<'a> {
         let norm = |residual: &[f64]| scaled_norm(&scale, residual);
         self.evaluate(&state, (&start, a), &mut residual, Some(&mut jacobian));
         let mut now = norm(&residual);
-        for _ in 0..ITERATIONS {
+        for _ in 0..settings.iterations {
             interrupt::check();
-            if now <= SOLVED {
+            if now <= settings.tolerance {
                 return Some(state);
             }
             for (row, scale) in scale.iter().enumerate() {
@@ -471,12 +482,12 @@ impl<'a> ModeEquations<'a> {
             };
             now = match LineSearch::default().run(now, &mut evaluate) {
                 Some(after) => after,
-                None if now <= ROUNDED => return Some(state),
+                None if now <= settings.rounded => return Some(state),
                 None => Some(evaluate(1.0)).filter(|after| after.is_finite())?,
             };
             state = trial;
         }
-        (now <= ROUNDED).then_some(state)
+        (now <= settings.rounded).then_some(state)
     }
 }
 

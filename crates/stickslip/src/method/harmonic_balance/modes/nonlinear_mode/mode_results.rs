@@ -7,22 +7,19 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip_numerics::golden_section::golden_section;
 
-/// Samples per wave of the highest harmonic in which the extremes of a motion are bracketed.
-const SAMPLES: f64 = 16.0;
-/// Accuracy of the extremes, relative to the sample spacing.
-const CLOSE: f64 = 1e-6;
-
 /// Returns half the range of a sum of harmonics, each with its number.
 fn half_range(terms: &[(f64, Complex64)]) -> f64 {
     let value = |t: f64| terms.iter().map(|(h, x)| (x * Complex64::from_polar(1.0, h * t)).re).sum::<f64>();
     let highest = terms.iter().map(|(h, _)| *h).fold(1.0, f64::max);
-    let count = (SAMPLES * highest) as usize;
+    // Samples per wave of the highest harmonic in which the extremes of a motion are bracketed.
+    let count = (16.0 * highest) as usize;
     let step = TAU / count as f64;
     let end = |sign: f64| {
         let sampled = (0..count).map(|i| (i, sign * value(i as f64 * step)));
         let (top, best) = sampled.fold((0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
         let bracket = ((top as f64 - 1.0) * step, (top as f64 + 1.0) * step);
-        let found = golden_section(bracket, |a, b| b - a <= CLOSE * step, |t| Ok::<f64, ()>(sign * value(t)));
+        // Accuracy of the extremes, relative to the sample spacing.
+        let found = golden_section(bracket, |a, b| b - a <= 1e-6 * step, |t| Ok::<f64, ()>(sign * value(t)));
         found.map_or(best, |found| found.1.max(best))
     };
     0.5 * (end(1.0) + end(-1.0))
