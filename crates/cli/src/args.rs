@@ -130,10 +130,11 @@ pub enum Command {
         #[arg(long)]
         open: bool,
     },
-    /// Describe matrix files: size, entries, symmetry, definiteness, row names; for stiffness
-    /// and mass also the lowest frequencies
+    /// Describe matrix files (size, entries, symmetry, definiteness, row names; for stiffness
+    /// and mass also the lowest frequencies) and files of measured data (columns, units,
+    /// sampling, ranges, a plot)
     Inspect {
-        /// Files with matrices or with the names of their rows
+        /// Files with matrices, with the names of their rows, or with measured data
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Format of the files, if their content does not show it

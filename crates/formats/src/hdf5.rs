@@ -23,7 +23,7 @@ pub(crate) const FORMAT: Format = Format {
     summary: "MATLAB (.mat) of version 7.3, `save -v7.3`, and datasets of h5py (.h5)",
     // The superblock is at the beginning or, after a user block such as
     // MATLAB's, at 512, 1024 or 2048.
-    sniff: |bytes| [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC))),
+    sniff: is_hdf5,
     open,
 };
 
@@ -45,6 +45,11 @@ const MEMBERS: usize = 10_000;
 /// Maximum number of groups visited, because links may form cycles.
 const GROUPS: usize = 1000;
 
+/// Returns whether the content is HDF5.
+pub(crate) fn is_hdf5(bytes: &[u8]) -> bool {
+    [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC)))
+}
+
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let file = catching_panics(Location::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
@@ -56,7 +61,10 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
 
 /// Calls the crate `hdf5-pure`, and converts its errors and panics. For damaged files it adds
 /// numbers without a check (0.47, positions of chunks) and may panic.
-fn catching_panics<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
+pub(crate) fn catching_panics<T>(
+    location: Location,
+    ask: impl FnOnce() -> Result<T, hdf5_pure::Error>,
+) -> Result<T, Error> {
     // The data it was working on is dropped with the error, so no inconsistent
     // state remains visible.
     let answer = catch_unwind(AssertUnwindSafe(ask));
@@ -169,7 +177,7 @@ fn dense_item(dataset: Dataset, name: String, limit: DecompressionLimit) -> Resu
 }
 
 /// Returns MATLAB's description of a dataset that is not a matrix.
-fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
+pub(crate) fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
     if attributes.contains_key("MATLAB_empty") {
         return Some("empty");
     }
@@ -180,7 +188,7 @@ fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> 
     }
 }
 
-fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
+pub(crate) fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
     let shape = catching_panics(location.clone(), || dataset.shape())?;
     shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(location.clone()))
 }
@@ -196,7 +204,7 @@ fn too_large(location: Location) -> Error {
 }
 
 /// Reads all numbers of a dataset.
-fn numbers<T>(
+pub(crate) fn numbers<T>(
     dataset: &Dataset,
     limit: DecompressionLimit,
     name: &str,
