@@ -8,8 +8,11 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/measured")
 }
 
-/// Returns the blocks of `expected.txt`: a file, and its columns with their values.
-fn expected() -> Vec<(String, Vec<(String, Vec<f64>)>)> {
+/// A column by its name, with its values.
+type ExpectedColumn = (String, Vec<f64>);
+
+/// Returns the blocks of `expected.txt`: a file, and its columns.
+fn expected() -> Vec<(String, Vec<ExpectedColumn>)> {
     let text = std::fs::read_to_string(folder().join("expected.txt")).expect("the expected values");
     let column = |line: &str| {
         let mut words = line.split(' ');
@@ -28,7 +31,7 @@ fn files_of_other_programs_are_read_to_the_last_bit() {
     let mut formats = Vec::new();
     for (name, columns) in expected() {
         let file = read(folder().join(&name)).unwrap_or_else(|error| panic!("{error}"));
-        let found: Vec<(String, Vec<f64>)> =
+        let found: Vec<ExpectedColumn> =
             file.columns.iter().map(|column| (column.name.clone(), column.values.clone())).collect();
         for (column, values) in &columns {
             let found = found.iter().find(|(name, _)| name == column).unwrap_or_else(|| panic!("{name}: no {column}"));

@@ -46,10 +46,21 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
     let dialect = dialect(&lines);
     let mut rows: Vec<Row<'_>> =
         lines.iter().map(|line| Row { line: *line, fields: fields(line.text, dialect) }).collect();
+    drop_end_separators(&mut rows);
     drop_short_end(&mut rows, dialect, &mut notes);
     let Some(last) = rows.last() else { return Err(no_numbers()) };
     let width = last.fields.len();
-    let numeric: Vec<bool> = last.fields.iter().map(|field| number(field, dialect).is_some()).collect();
+    // a value may be missing in the last rows
+    let end = &rows[rows.len().saturating_sub(SAMPLE)..];
+    let filled = |at: usize| {
+        end.iter()
+            .rev()
+            .filter(|row| row.fields.len() == width)
+            .map(move |row| &row.fields[at])
+            .find(|field| !field.is_empty())
+    };
+    let numeric: Vec<bool> =
+        (0..width).map(|at| filled(at).is_some_and(|field| number(field, dialect).is_some())).collect();
     if !numeric.contains(&true) {
         return Err(no_numbers());
     }
@@ -116,6 +127,21 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
 fn no_numbers() -> Error {
     let remedy = "export a table with at least one column of numbers";
     Error::new(ErrorKind::Format, Location::File, "the text has no number in its last line".into(), remedy)
+}
+
+/// Number of lines at the end of a file that show its dialect and its numeric columns.
+const SAMPLE: usize = 20;
+
+/// Removes the empty last fields of a file whose lines end with a separator.
+fn drop_end_separators(rows: &mut [Row<'_>]) {
+    // the last line may be short
+    let end = &rows[rows.len().saturating_sub(SAMPLE + 1)..rows.len().saturating_sub(1)];
+    let is_empty = |row: &Row<'_>| row.fields.len() > 1 && row.fields.last().is_some_and(|field| field.is_empty());
+    if !end.is_empty() && end.iter().all(is_empty) {
+        rows.iter_mut().filter(|row| is_empty(row)).for_each(|row| {
+            row.fields.pop();
+        });
+    }
 }
 
 /// Removes the last line if it has fewer fields than the line before it: the file was truncated.
@@ -192,7 +218,7 @@ fn numbered_words(words: impl Iterator<Item = String>) -> (Vec<f64>, Vec<String>
 
 /// Returns the dialect of the last lines. Titles and preambles say nothing about it.
 fn dialect(lines: &[Line<'_>]) -> Dialect {
-    let sample = &lines[lines.len().saturating_sub(20)..];
+    let sample = &lines[lines.len().saturating_sub(SAMPLE)..];
     let has = |byte: u8| {
         let with = sample.iter().filter(|line| line.text.contains(&byte)).count();
         // the last line may be short
@@ -243,10 +269,6 @@ fn fields(text: &[u8], dialect: Dialect) -> Vec<Cow<'_, [u8]>> {
         }
     }
     out.push(unquoted(&text[start..]));
-    // some programs end every line with a separator
-    if out.len() > 1 && out.last().is_some_and(|field| field.is_empty()) {
-        out.pop();
-    }
     out
 }
 
@@ -322,6 +344,8 @@ mod tests {
 
     #[test]
     fn missing_values_texts_and_a_short_end() {
+        let file = table("a,b\n1,2\n3,\n4,5\n6,\n");
+        assert!(file.columns[1].values[1].is_nan() && file.columns[1].values[3].is_nan());
         let file = table("a,b,c\n1,,x\n2,3,y\n4,5,x\n6,7");
         assert!(file.columns[1].values[0].is_nan());
         assert_eq!(file.columns[2].values, [1.0, 2.0, 1.0]);
