@@ -105,7 +105,7 @@ fn plot(values: &[f64]) -> Vec<String> {
         if let Some(before) = before {
             (least, most) = (least.min(before), most.max(before));
         }
-        before = own.last();
+        before = own.clone().next_back();
         dots[row(most)..=row(least)].iter_mut().for_each(|line| line[column] = true);
     }
     // Unicode block "Braille Patterns": bits of the eight dots, column by column

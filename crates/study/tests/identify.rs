@@ -152,22 +152,6 @@ fn undetermined_parameters_are_named() {
     assert!(notes.contains("`mu` raised by 1.00 % with `N0` lowered by 1.00 %"), "{notes}");
 }
 
-/// The residuals do not depend on the limit of a joint that never slips.
-#[test]
-fn parameters_without_influence_are_named() {
-    let rows = loops(0.0, 1e4, 1e9, 1e-4).into_iter().map(|(u, f)| vec![u, f]);
-    // the search begins where the joint sticks
-    let study = loop_study("").replace("k = \"1e2 N/m\"", "k = \"0 N/m\"").replace("Ft = \"0.2 N\"", "Ft = \"50 N\"");
-    let study = study.replace("kind = \"identify\"", "kind = \"identify\"\nstarts = 0");
-    let study: String =
-        study.lines().filter(|line| !line.starts_with("fit.k =")).map(|line| format!("{line}\n")).collect();
-    let dataset = identify(&csv("displacement_m,force_N", rows), &study);
-    assert!((estimate(&dataset, "kt").value / 1e4 - 1.0).abs() < 1e-6, "{}", estimate(&dataset, "kt").value);
-    assert_ne!(estimate(&dataset, "Ft").status, "determined");
-    let notes = dataset.notes.join("\n");
-    assert!(notes.contains("do not determine `Ft`"), "{notes}");
-}
-
 /// The 95 % intervals contain the true value in 95 % of the cases.
 #[test]
 fn intervals_contain_the_truth() {

@@ -545,7 +545,7 @@ mod tests {
                 displacement: vec![0.0],
                 velocity: vec![0.0],
                 states: vec![],
-                excitation: Excitation::RunUp { from, to, duration },
+                excitation: Excitation::RunUp { from, to, duration, scale: SweepScale::Linear },
                 duration,
                 step,
                 width: None,

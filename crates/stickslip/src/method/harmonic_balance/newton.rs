@@ -405,7 +405,7 @@ impl Discretization {
     pub(super) fn newton_step(&mut self, ports: &Ports, omega: f64, homotopy: Homotopy, near: StepStart) -> bool {
         self.eliminations += 1;
         if let Some(banded) = &mut self.banded {
-            let along = StepParameters { penalty: &self.penalty, homotopy: homotopy };
+            let along = StepParameters { penalty: &self.penalty, homotopy };
             if !banded.linearise(ports, &along, &self.tangents) {
                 return false;
             }

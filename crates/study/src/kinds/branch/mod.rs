@@ -94,7 +94,7 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let values = &inputs.case.values;
     let branches = if along_parameter(inputs.study) { inputs.curves() } else { inputs.cases };
     let steps = branches * values.count("steps").unwrap_or(100) as f64;
-    let length = values.count("harmonics").unwrap_or(HARMONICS as u64) as f64;
+    let length = values.count("harmonics").unwrap_or(HARMONICS) as f64;
     let samples = values.count("samples").unwrap_or(SERIES_SAMPLES) as f64;
     let rows = steps * POINTS;
     PlannedSize {

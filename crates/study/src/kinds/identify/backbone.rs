@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_parabola_is_interpolated_exactly_between_inner_points() {
-        let curve: Vec<[f64; 3]> = (0..6).map(|i| f64::from(i)).map(|x| [x, x * x, 1.0 - x]).collect();
+        let curve: Vec<[f64; 3]> = (0..6).map(f64::from).map(|x| [x, x * x, 1.0 - x]).collect();
         assert!((hermite(&curve, 2.3, 1) - 2.3 * 2.3).abs() < 1e-12);
         assert!((hermite(&curve, 2.3, 2) + 1.3).abs() < 1e-12);
     }

@@ -104,10 +104,10 @@ impl<'a> Problem<'a> {
         let named: Vec<(&str, f64)> = self.ranges.iter().map(|range| range.name.as_str()).zip(values).collect();
         let computed = self.study.case_with_parameters(self.case.index, &named).map_err(|error| error.to_string());
         let computed = computed.and_then(|case| {
-            let one = |(target, states): (&Box<dyn Target>, &RowStates)| {
-                if of(&**target) { target.fitted(&case, states) } else { Ok(Fitted::default()) }
+            let one = |(target, states): (&dyn Target, &RowStates)| {
+                if of(target) { target.fitted(&case, states) } else { Ok(Fitted::default()) }
             };
-            self.targets.iter().zip(states).map(one).collect::<Result<Vec<_>, String>>()
+            self.targets.iter().map(|target| &**target).zip(states).map(one).collect::<Result<Vec<_>, String>>()
         });
         if let (Err(reason), Ok(mut failure)) = (&computed, self.failure.lock()) {
             *failure = Some(reason.clone());

@@ -168,7 +168,7 @@ impl Target for ResponseTarget {
                 let place = orbit.place(&self.place).ok_or_else(|| format!("there is no place `{}`", self.place))?;
                 let mut value = place.first_harmonic
                     * Complex64::from_polar(1.0, -phase)
-                    * self.quantity.from_displacement(row.omega);
+                    * self.quantity.displacement_factor(row.omega);
                 if self.per_force {
                     value /= amplitude;
                 }

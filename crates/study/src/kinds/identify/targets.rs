@@ -114,7 +114,7 @@ impl Quantity {
     }
 
     /// Returns the factor `(jω)^n` from the displacement.
-    pub fn from_displacement(self, omega: f64) -> Complex64 {
+    pub fn displacement_factor(self, omega: f64) -> Complex64 {
         Complex64::new(0.0, omega).powi(self.derivatives)
     }
 }
