@@ -43,7 +43,7 @@ pub enum Command {
         /// 2GB, or the free memory if that is less]
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
-        /// Write only these outputs: csv, parquet, json, svg, png, html (comma-separated)
+        /// Write only these outputs: csv, parquet, json, fitted, svg, png, html (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
         /// Also write these outputs: parquet
@@ -81,7 +81,7 @@ pub enum Command {
         /// Folder of the results; the study gets a subfolder with its name
         #[arg(long, default_value = "stickslip-out")]
         out: PathBuf,
-        /// Write only these outputs: csv, parquet, json, svg, png, html (comma-separated)
+        /// Write only these outputs: csv, parquet, json, fitted, svg, png, html (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
         /// Also write these outputs: parquet
@@ -130,10 +130,11 @@ pub enum Command {
         #[arg(long)]
         open: bool,
     },
-    /// Describe matrix files: size, entries, symmetry, definiteness, row names; for stiffness
-    /// and mass also the lowest frequencies
+    /// Describe matrix files (size, entries, symmetry, definiteness, row names; for stiffness
+    /// and mass also the lowest frequencies) and files of measured data (columns, units,
+    /// sampling, ranges, a plot)
     Inspect {
-        /// Files with matrices or with the names of their rows
+        /// Files with matrices, with the names of their rows, or with measured data
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Format of the files, if their content does not show it

@@ -2,6 +2,7 @@
 //! structure.
 
 use crate::exit_status::{Exit, print};
+use crate::inspect_data::inspect_data;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write};
@@ -75,9 +76,12 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
             }
             // Row names are in separate files.
             Err(error) if error.kind == ErrorKind::Format && format.is_none() => rows.push((file, error)),
+            // Files of data are no matrices, but a damaged file of matrices is not data either.
             Err(error) => {
-                complain!("error: {error}");
-                wrong = true;
+                if format.is_some() || inspect_data(file, &mut text).is_err() {
+                    complain!("error: {error}");
+                    wrong = true;
+                }
             }
         }
     }
@@ -100,6 +104,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                         file.display()
                     ),
                     (ErrorKind::Names, Some(_)) => complain!("error: {other}"),
+                    _ if inspect_data(file, &mut text).is_ok() => continue,
                     _ => complain!("error: {error}"),
                 }
                 wrong = true;
@@ -132,6 +137,11 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
 /// Returns the square matrices, and `true` if no matrix is damaged.
 fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<(Vec<NamedMatrix>, bool), Error> {
     let variables = formats::list(file, format)?;
+    // arrays of a file of MATLAB, NumPy or HDF5 without any matrix of a structure are data
+    let square = |variable: &formats::Variable| variable.rows == variable.columns && variable.rows > 1;
+    if format.is_none() && !variables.iter().any(square) && inspect_data(file, text).is_ok() {
+        return Ok((Vec::new(), true));
+    }
     let several = variables.len() > 1;
     if variables.is_empty() {
         formats::read(file, format, None)?;

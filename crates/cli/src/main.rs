@@ -11,6 +11,7 @@ mod args;
 mod browser;
 mod exit_status;
 mod inspect;
+mod inspect_data;
 mod list;
 mod merge;
 mod messages;

@@ -23,25 +23,48 @@ pub(crate) const FORMAT: Format = Format {
     summary: "MATLAB (.mat) of version 7.3, `save -v7.3`, and datasets of h5py (.h5)",
     // The superblock is at the beginning or, after a user block such as
     // MATLAB's, at 512, 1024 or 2048.
-    sniff: |bytes| [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC))),
+    sniff: is_hdf5,
     open,
 };
 
 const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// Maximum depth of nested groups.
+const DEPTH: usize = 8;
+
+/// Count of numbers that any dataset may have, stored or not, and any chunk.
+/// Chunks of h5py are not larger.
+const MIN_NUMBER_LIMIT: u64 = 1 << 17;
+
+/// Maximum number of bytes that deflate packs into one.
+const DEFLATE: u64 = 1032;
+
+/// Maximum number of listed members of a file.
+const MEMBERS: usize = 10_000;
+
+/// Maximum number of groups visited, because links may form cycles.
+const GROUPS: usize = 1000;
+
+/// Returns whether the content is HDF5.
+pub(crate) fn is_hdf5(bytes: &[u8]) -> bool {
+    [0, 512, 1024, 2048].iter().any(|&at| bytes.get(at..).is_some_and(|rest| rest.starts_with(MAGIC)))
+}
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let file = catching_panics(Location::File, || File::from_bytes(bytes.to_vec()))?;
     let mut items = Vec::new();
     let root = Rc::new(file.root());
     Traversal { limit: DecompressionLimit::for_file(bytes.len()), groups: 0, items: &mut items }
-        // Maximum depth of nested groups.
-        .visit_group(&root, "", 8)?;
+        .visit_group(&root, "", DEPTH)?;
     Ok(items)
 }
 
 /// Calls the crate `hdf5-pure`, and converts its errors and panics. For damaged files it adds
 /// numbers without a check (0.47, positions of chunks) and may panic.
-fn catching_panics<T>(location: Location, ask: impl FnOnce() -> Result<T, hdf5_pure::Error>) -> Result<T, Error> {
+pub(crate) fn catching_panics<T>(
+    location: Location,
+    ask: impl FnOnce() -> Result<T, hdf5_pure::Error>,
+) -> Result<T, Error> {
     // The data it was working on is dropped with the error, so no inconsistent
     // state remains visible.
     let answer = catch_unwind(AssertUnwindSafe(ask));
@@ -66,24 +89,20 @@ struct Traversal<'w, 'a> {
 impl Traversal<'_, '_> {
     /// Adds the contents of a group and of its subgroups.
     fn visit_group(&mut self, group: &Rc<Group>, path: &str, depth: usize) -> Result<(), Error> {
-        // Maximum number of listed members of a file.
-        let members = 10_000;
-        // Maximum number of groups visited, because links may form cycles.
-        let groups = 1000;
         self.groups += 1;
         let here = || Location::Variable(path.to_string());
         // MATLAB stores the parts of cells and objects in the groups `#refs#` and `#subsystem#`.
         let own = |name: &String| !name.starts_with('#');
         let full = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };
         for name in catching_panics(here(), || group.datasets())?.into_iter().filter(own) {
-            if self.items.len() >= members || self.groups >= groups {
+            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
                 return Ok(());
             }
             let dataset = catching_panics(Location::Variable(full(&name)), || group.dataset(&name))?;
             self.items.push(dense_item(dataset, full(&name), self.limit)?);
         }
         for name in catching_panics(here(), || group.groups())?.into_iter().filter(own) {
-            if self.items.len() >= members || self.groups >= groups {
+            if self.items.len() >= MEMBERS || self.groups >= GROUPS {
                 return Ok(());
             }
             let location = || Location::Variable(full(&name));
@@ -158,7 +177,7 @@ fn dense_item(dataset: Dataset, name: String, limit: DecompressionLimit) -> Resu
 }
 
 /// Returns MATLAB's description of a dataset that is not a matrix.
-fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
+pub(crate) fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> {
     if attributes.contains_key("MATLAB_empty") {
         return Some("empty");
     }
@@ -169,7 +188,7 @@ fn matlab_note(attributes: &HashMap<String, AttrValue>) -> Option<&'static str> 
     }
 }
 
-fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
+pub(crate) fn sizes(dataset: &Dataset, location: &Location) -> Result<Vec<usize>, Error> {
     let shape = catching_panics(location.clone(), || dataset.shape())?;
     shape.into_iter().map(usize::try_from).collect::<Result<_, _>>().map_err(|_| too_large(location.clone()))
 }
@@ -185,15 +204,12 @@ fn too_large(location: Location) -> Error {
 }
 
 /// Reads all numbers of a dataset.
-fn numbers<T>(
+pub(crate) fn numbers<T>(
     dataset: &Dataset,
     limit: DecompressionLimit,
     name: &str,
     read: impl Fn(&Dataset) -> Result<Vec<T>, hdf5_pure::Error>,
 ) -> Result<Vec<T>, Error> {
-    // Count of numbers that any dataset may have, stored or not, and any chunk. Chunks of h5py
-    // are not larger.
-    let min_number_limit = 1 << 17;
     let location = Location::Variable(name.to_string());
     // A chunk is decompressed as a whole, even if the dataset ends within it.
     let chunk = catching_panics(location.clone(), || dataset.chunk_shape())?.unwrap_or_default();
@@ -206,11 +222,12 @@ fn numbers<T>(
             .ok()
             .map(|chunks| chunks.iter().map(|one| one.storage_size).sum()),
     };
-    // Maximum number of bytes that deflate packs into one.
-    let room =
-        stored.map_or(u64::MAX, |stored: u64| stored.saturating_mul(1032)).max(min_number_limit).min(limit.numbers());
+    let room = stored
+        .map_or(u64::MAX, |stored: u64| stored.saturating_mul(DEFLATE))
+        .max(MIN_NUMBER_LIMIT)
+        .min(limit.numbers());
     let count = product(&shape).filter(|&count| count <= room);
-    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(min_number_limit))) {
+    if count.is_none_or(|count| product(&chunk).is_none_or(|chunk| chunk > count.max(MIN_NUMBER_LIMIT))) {
         return Err(too_large(location));
     }
     catching_panics(location, || read(dataset))

@@ -1,5 +1,5 @@
 //! Reads and writes matrices: files of finite-element programs, MATLAB and
-//! Python become one [`Matrix`] type.
+//! Python become one [`Matrix`] type. The module [`data`] reads measured tables.
 //!
 //! ```
 //! use stickslip_formats::{Matrix, Symmetry, list, read, write};
@@ -28,6 +28,7 @@ mod ansys_full;
 mod bytes;
 mod constrained;
 mod coordinate;
+pub mod data;
 mod dense;
 mod error;
 mod file;

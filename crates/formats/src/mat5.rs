@@ -22,18 +22,24 @@ pub(crate) const FORMAT: Format = Format {
 };
 
 /// Size of the file header in bytes: a text, an offset, a version and the byte order.
-const HEADER: usize = 128;
+pub(crate) const HEADER: usize = 128;
+
+/// Number of bytes of a compressed variable that certainly contain its class, size and name.
+const BEGINNING: usize = 4096;
+
+/// Maximum depth of nested structures.
+pub(crate) const DEPTH: usize = 8;
 
 /// Types of elements.
-const MATRIX: u32 = 14;
-const COMPRESSED: u32 = 15;
+pub(crate) const MATRIX: u32 = 14;
+pub(crate) const COMPRESSED: u32 = 15;
 
 /// Classes of variables.
-const STRUCTURE: u8 = 2;
-const SPARSE: u8 = 5;
+pub(crate) const STRUCTURE: u8 = 2;
+pub(crate) const SPARSE: u8 = 5;
 
 /// Returns the byte order, if the file has a header of version 5.
-fn order(bytes: &[u8]) -> Option<ByteOrder> {
+pub(crate) fn order(bytes: &[u8]) -> Option<ByteOrder> {
     let [major_or_minor @ .., a, b] = bytes.get(HEADER - 4..HEADER)? else { return None };
     match (major_or_minor, [*a, *b]) {
         ([_, 1], [b'I', b'M']) => Some(ByteOrder::Little),
@@ -60,14 +66,14 @@ pub(crate) fn is_version_4(bytes: &[u8]) -> bool {
 }
 
 /// An element: its type and its bytes.
-struct MatElement<'a> {
-    kind: u32,
-    data: &'a [u8],
-    location: Location,
+pub(crate) struct MatElement<'a> {
+    pub kind: u32,
+    pub data: &'a [u8],
+    pub location: Location,
 }
 
 /// Reads the next element and moves the cursor after it.
-fn element<'a>(bytes: &mut ByteCursor<'a>) -> Result<MatElement<'a>, Error> {
+pub(crate) fn element<'a>(bytes: &mut ByteCursor<'a>) -> Result<MatElement<'a>, Error> {
     let location = bytes.location();
     let kind = bytes.u32()?;
     // A small element stores its length in the upper half of its type, and its
@@ -98,9 +104,7 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
         let found = match kind {
             MATRIX => variable(VariableBytes { data: Cow::Borrowed(data), packed: None, order, location }),
             COMPRESSED => {
-                // Number of bytes of a compressed variable that certainly contain its class,
-                // size and name.
-                let start = beginning(data, Container::Zlib, 4096);
+                let start = beginning(data, Container::Zlib, BEGINNING);
                 variable(VariableBytes { data: start.into(), packed: Some((data, limit)), order, location })
             }
             _ => continue,
@@ -132,16 +136,16 @@ impl<'a> VariableBytes<'a> {
 }
 
 /// The header of a variable.
-struct VariableHeader {
-    class: u8,
-    complex: bool,
-    rows: usize,
-    columns: usize,
+pub(crate) struct VariableHeader {
+    pub class: u8,
+    pub complex: bool,
+    pub rows: usize,
+    pub columns: usize,
     dimensions: usize,
-    name: String,
+    pub name: String,
 }
 
-fn head(parts: &mut ByteCursor) -> Result<VariableHeader, Error> {
+pub(crate) fn head(parts: &mut ByteCursor) -> Result<VariableHeader, Error> {
     let flags = element(parts)?;
     let [class, bits] = match (parts.order, flags.data) {
         (ByteOrder::Little, [class, bits, ..]) => [*class, *bits],
@@ -160,7 +164,7 @@ fn head(parts: &mut ByteCursor) -> Result<VariableHeader, Error> {
 }
 
 /// Returns the description of a class that is not a matrix.
-fn class_name(class: u8) -> Option<&'static str> {
+pub(crate) fn class_name(class: u8) -> Option<&'static str> {
     match class {
         SPARSE..=15 => None,
         1 => Some("a cell array"),
@@ -185,8 +189,7 @@ fn variable(mut source: VariableBytes) -> Result<Vec<Item>, Error> {
     }
     let head = head(&mut ByteCursor::new(&source.data, source.order)).map_err(|error| error_in(error, &source))?;
     if head.class == STRUCTURE {
-        // Maximum depth of nested structures.
-        return structure(&source, &head.name, 8);
+        return structure(&source, &head.name, DEPTH);
     }
     Ok(vec![item(source, head)])
 }
@@ -270,7 +273,7 @@ fn structure<'a>(source: &VariableBytes<'a>, name: &str, depth: usize) -> Result
 }
 
 /// Returns the number type of an element.
-fn number(kind: u32) -> Option<NumberType> {
+pub(crate) fn number(kind: u32) -> Option<NumberType> {
     Some(match kind {
         1 => NumberType::I8,
         2 => NumberType::U8,

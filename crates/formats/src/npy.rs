@@ -24,7 +24,8 @@ pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum ElementType {
     Number(NumberType),
-    Complex,
+    /// Complex, with the type of its parts if it is supported.
+    Complex(Option<NumberType>),
     /// Text of the given number of bytes.
     Text(usize),
     /// Any other type, by NumPy's name.
@@ -37,6 +38,12 @@ pub(crate) struct NpyArray<'a> {
     pub shape: Vec<usize>,
     fortran: bool,
     data: ByteCursor<'a>,
+}
+
+/// Real and imaginary parts of an array, by columns; no imaginary parts if the array is real.
+pub(crate) struct ComplexParts {
+    pub real: Vec<f64>,
+    pub imaginary: Vec<f64>,
 }
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
@@ -84,7 +91,7 @@ impl<'a> NpyArray<'a> {
     pub fn size(&self) -> Result<(usize, usize), String> {
         match &self.element {
             ElementType::Number(_) => {}
-            ElementType::Complex => return Err(COMPLEX.into()),
+            ElementType::Complex(_) => return Err(COMPLEX.into()),
             ElementType::Text(_) => return Err("text".into()),
             ElementType::Other(name) => return Err(format!("an array of type {name}")),
         }
@@ -106,6 +113,33 @@ impl<'a> NpyArray<'a> {
         };
         let count = self.count(number)?;
         (0..count).map(|_| read(number, &mut self.data)).collect()
+    }
+
+    /// Reads real and imaginary parts, by columns; the imaginary part of real numbers is empty.
+    /// Returns `None` for an array of another type.
+    pub fn columns(mut self) -> Result<Option<ComplexParts>, Error> {
+        let (number, parts) = match self.element {
+            ElementType::Number(number) => (number, 1),
+            ElementType::Complex(Some(number)) => (number, 2),
+            _ => return Ok(None),
+        };
+        let rows = self.shape.first().copied().unwrap_or(1);
+        let across = self.shape.get(1).copied().unwrap_or(1);
+        let stated = rows.checked_mul(across).and_then(|count| count.checked_mul(parts));
+        if stated.is_none_or(|stated| stated > self.data.remaining() / number.size()) {
+            // the error with the numbers in it
+            self.shape.push(parts);
+            self.count(number)?;
+        }
+        let mut planes = vec![vec![0.0; rows * across]; parts];
+        for at in 0..rows * across {
+            let place = if self.fortran { at } else { at % across * rows + at / across };
+            for plane in &mut planes {
+                plane[place] = number.real(&mut self.data)?;
+            }
+        }
+        let imaginary = if parts == 2 { planes.pop() } else { None };
+        Ok(Some(ComplexParts { real: planes.pop().unwrap_or_default(), imaginary: imaginary.unwrap_or_default() }))
     }
 
     /// Returns the bytes of an array of one text.
@@ -133,7 +167,11 @@ impl<'a> NpyArray<'a> {
 
     pub fn matrix(self) -> Result<Matrix, Error> {
         let size = self.size().map_err(|note| {
-            let kind = if self.element == ElementType::Complex { ErrorKind::Complex } else { ErrorKind::Unsupported };
+            let kind = if matches!(self.element, ElementType::Complex(_)) {
+                ErrorKind::Complex
+            } else {
+                ErrorKind::Unsupported
+            };
             let remedy = "save a real array of two dimensions";
             Error::new(kind, Location::File, format!("this is not a real matrix: {note}"), remedy)
         });
@@ -181,7 +219,9 @@ fn element_of(descr: &str) -> (ElementType, ByteOrder) {
         "u8" => ElementType::Number(NumberType::U64),
         "f4" => ElementType::Number(NumberType::F32),
         "f8" => ElementType::Number(NumberType::F64),
-        "c8" | "c16" | "c32" => ElementType::Complex,
+        "c8" => ElementType::Complex(Some(NumberType::F32)),
+        "c16" => ElementType::Complex(Some(NumberType::F64)),
+        "c32" => ElementType::Complex(None),
         text => match (text.strip_prefix('S'), text.strip_prefix('U')) {
             (Some(length), _) if length.parse::<usize>().is_ok() => ElementType::Text(length.parse().unwrap_or(0)),
             // Four bytes per character.

@@ -17,12 +17,29 @@ use crate::text::quoted;
 pub(crate) const FORMAT: Format = Format {
     name: "npz",
     summary: "NumPy and SciPy (.npz): `numpy.savez`, `scipy.sparse.save_npz` (csc, csr, coo)",
-    sniff: |bytes| bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06"),
+    sniff: is_zip,
     open,
 };
 
 /// The supported layouts of SciPy.
 const LAYOUTS: &str = "csc, csr or coo";
+
+/// Returns whether the content is a zip.
+pub(crate) fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
+}
+
+/// A member by its name, without the extension `.npy`, and its bytes.
+pub(crate) struct MemberContents<'a> {
+    pub name: String,
+    pub bytes: Result<Cow<'a, [u8]>, Error>,
+}
+
+/// Returns the contents of the members.
+pub(crate) fn contents(bytes: &[u8]) -> Result<impl Iterator<Item = MemberContents<'_>>, Error> {
+    let members = members(bytes)?.into_iter();
+    Ok(members.map(|member| MemberContents { name: member.name.clone(), bytes: member.contents() }))
+}
 
 fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let members = members(bytes)?;
@@ -77,7 +94,7 @@ fn read_sparse(members: &[Member], rows: usize, columns: usize) -> Result<Matrix
     let layout: Vec<u8> = array(&layout)?.text()?.iter().copied().filter(|&byte| byte != 0).collect();
     let data = part("data")?;
     let values = array(&data)?;
-    if values.element == npy::ElementType::Complex {
+    if matches!(values.element, npy::ElementType::Complex(_)) {
         let location = Location::Variable("data".into());
         return Err(Error::new(
             ErrorKind::Complex,

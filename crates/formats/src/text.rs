@@ -40,6 +40,11 @@ impl<'a> Lines<'a> {
         self.rest.len()
     }
 
+    /// Skips bytes after the last line read, such as binary data.
+    pub fn skip_bytes(&mut self, count: usize) {
+        self.rest = &self.rest[count.min(self.rest.len())..];
+    }
+
     /// Returns the location of the last line read.
     pub fn location(&self) -> Location {
         Location::Line(self.number)

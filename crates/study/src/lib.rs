@@ -8,6 +8,7 @@
 //! - `syntax`: text, keys, units and expressions;
 //! - `compile`: from the text to compiled statements;
 //! - `case`: the cases of a study, each with its model and values;
+//! - `data`: tables of measured numbers;
 //! - `check`: checks and sizes before a run;
 //! - [`kinds`]: the study kinds;
 //! - [`run`](mod@run): computes the units of a study;
@@ -16,6 +17,7 @@
 mod case;
 mod check;
 mod compile;
+mod data;
 pub mod kinds;
 pub mod results;
 pub mod run;

@@ -2,10 +2,12 @@
 //!
 //! - `command_line`: exit status, files, messages and bits of the results;
 //! - `golden`: texts as users read them;
+//! - `inspect_data`: measured data;
 //! - `plot`: figures from stored results, and comparisons of runs;
 //! - `stream`: runs that are killed, sharded, or lose their disk.
 
 mod command_line;
 mod golden;
+mod inspect_data;
 mod plot;
 mod stream;

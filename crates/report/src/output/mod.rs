@@ -2,9 +2,10 @@
 //!
 //! - `result_file`: a file of results, an output, and the errors of writing.
 //! - `folder`: replaces the results of a run completely or not at all.
-//! - `csv`, `parquet`, `json`: one output each; figures are in `figure`.
+//! - `csv`, `parquet`, `json`, `fitted`: one output each; figures are in `figure`.
 
 pub mod csv;
+pub mod fitted;
 pub mod folder;
 pub mod json;
 pub mod parquet;
@@ -20,6 +21,7 @@ pub static TABLE: &[Output] = &[
     csv::OUTPUT,
     parquet::OUTPUT,
     json::OUTPUT,
+    fitted::OUTPUT,
     crate::figure::svg::OUTPUT,
     crate::figure::png::OUTPUT,
     crate::figure::html::OUTPUT,

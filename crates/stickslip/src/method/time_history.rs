@@ -15,6 +15,11 @@ use std::sync::Arc;
 
 const NAME: &str = "transient";
 
+/// Relative error per step for smooth laws.
+const TOLERANCE: f64 = 1e-9;
+/// Samples per interval of a free decay.
+const SAMPLES_PER_INTERVAL: usize = 64;
+
 /// The excitation of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Excitation {
@@ -22,7 +27,7 @@ pub enum Excitation {
     Free,
     /// A constant excitation frequency, rad/s.
     Steady(f64),
-    /// A frequency that changes linearly from `from` to `to` (rad/s) within `duration` (s).
+    /// A frequency that changes from `from` to `to` (rad/s) within `duration` (s).
     RunUp {
         /// First frequency, rad/s.
         from: f64,
@@ -30,7 +35,32 @@ pub enum Excitation {
         to: f64,
         /// Duration of the change, s.
         duration: f64,
+        /// How the frequency changes.
+        scale: SweepScale,
     },
+}
+
+/// Change of the frequency of a run-up over time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SweepScale {
+    /// Equal differences in equal times.
+    Linear,
+    /// Equal ratios in equal times: `f = f₀ (f₁/f₀)^(t/T)`.
+    Logarithmic,
+}
+
+/// The excitation of one interval of a motion: that of a system at one frequency, from phase zero
+/// at the beginning of the interval.
+#[derive(Debug, Clone)]
+pub struct DrivenInterval {
+    /// The system with its excitation. All intervals have the same structure, joints and laws.
+    pub system: Arc<System>,
+    /// Excitation frequency, rad/s; at zero, only the constant forces act.
+    pub omega: f64,
+    /// Frequency that samples report, rad/s.
+    pub reported: f64,
+    /// Length, s.
+    pub length: f64,
 }
 
 /// A motion to compute.
@@ -73,6 +103,11 @@ pub enum TimeHistoryError {
 fn good(last: Option<f64>) -> String {
     last.map_or("no sample is valid".to_owned(), |last| format!("the samples up to t = {last:.6e} s are valid"))
 }
+
+/// Most attempts to recompute an interval in which the motion broke down. Each attempt ends
+/// where the last one broke down, or at half of its length if the cause names no time. This is
+/// enough to find one of [`SAMPLES_PER_INTERVAL`] samples.
+const RECOMPUTE_ATTEMPTS: usize = 6;
 
 /// The motion in an interval that starts at `begin` (s).
 struct TimeInterval {
@@ -150,7 +185,29 @@ impl TimeHistory {
         visitor: &mut dyn FnMut(TimeSample<'_>) -> bool,
     ) -> Result<(), TimeHistoryError> {
         let shared = Arc::new(system.clone());
-        let mut flow = TimeHistory::flow(system, self.width)?;
+        let mut next = |begin: f64| {
+            let omega = self.frequency(begin);
+            let length = if omega > 0.0 { TAU / omega } else { SAMPLES_PER_INTERVAL as f64 * self.step };
+            // shorten a cycle that outlasts the motion
+            let length = if length > self.duration { self.duration + self.step } else { length };
+            DrivenInterval { system: shared.clone(), omega, reported: omega, length }
+        };
+        self.visit_intervals(&mut next, visitor)
+    }
+
+    /// Computes the motion under an excitation that is given interval by interval. `excitation`
+    /// receives the time at which an interval begins, s, from zero on. The field `excitation` of
+    /// the motion has no effect.
+    ///
+    /// # Errors
+    /// Same as [`TimeHistory::run`].
+    pub fn visit_intervals(
+        &self,
+        excitation: &mut dyn FnMut(f64) -> DrivenInterval,
+        visitor: &mut dyn FnMut(TimeSample<'_>) -> bool,
+    ) -> Result<(), TimeHistoryError> {
+        let mut interval = excitation(0.0);
+        let mut flow = TimeHistory::flow(&interval.system, self.width)?;
         flow.set_recording(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         if state.len() + self.states.len() == flow.states() {
@@ -162,12 +219,11 @@ impl TimeHistory {
         let mut before: Option<TimeInterval> = None;
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
-            let omega = self.frequency(begin);
-            // A free decay has 64 samples per interval.
-            let length = if omega > 0.0 { TAU / omega } else { 64.0 * self.step };
-            // shorten a cycle that outlasts the motion
-            let length = if length > self.duration { self.duration + self.step } else { length };
-            flow.set_excitation(system, omega);
+            if begin > 0.0 {
+                interval = excitation(begin);
+            }
+            let length = interval.length;
+            flow.set_excitation(&interval.system, interval.omega);
             let start = state.clone();
             let followed = flow.run_accurately(&mut state, length);
             let end = begin + length;
@@ -175,12 +231,11 @@ impl TimeHistory {
             let whole = inside.last();
             let stretch = match &followed {
                 Ok(()) => {
-                    let path = flow.path(&shared, Symmetry::FullPeriod, length);
+                    let path = flow.path(&interval.system, Symmetry::FullPeriod, length);
                     Some(TimeInterval { begin, length, last: whole, path })
                 }
-                Err(cause) => {
-                    whole.and_then(|last| self.recompute_before_breakdown(&shared, &start, (begin, next, last), cause))
-                }
+                Err(cause) => whole
+                    .and_then(|last| self.recompute_before_breakdown(&interval, &start, (begin, next, last), cause)),
             };
             if let Some(stretch) = stretch {
                 while stretch.last.is_some_and(|last| next <= last) {
@@ -189,7 +244,12 @@ impl TimeHistory {
                         Some(before) if time < stretch.begin => before.at(time),
                         _ => stretch.at(time),
                     };
-                    if !visitor(TimeSample { time, omega, state: &stretch.at(time), between: &since }) {
+                    if !visitor(TimeSample {
+                        time,
+                        omega: interval.reported,
+                        state: &stretch.at(time),
+                        between: &since,
+                    }) {
                         return Ok(());
                     }
                     next += 1;
@@ -211,28 +271,25 @@ impl TimeHistory {
     /// `last`. Returns `None` if it has no motion or no sample before the breakdown.
     fn recompute_before_breakdown(
         &self,
-        system: &Arc<System>,
+        interval: &DrivenInterval,
         start: &[f64],
         (begin, first, mut last): (f64, usize, usize),
         cause: &IntegrationError,
     ) -> Option<TimeInterval> {
         let since = |sample: usize| sample as f64 * self.step - begin;
         let mut cause = cause.clone();
-        // Most attempts to recompute an interval in which the motion broke down. Each attempt ends
-        // where the last one broke down, or at half of its length if the cause names no time. This
-        // is enough to find one of the 64 samples of an interval.
-        for _ in 0..6 {
+        for _ in 0..RECOMPUTE_ATTEMPTS {
             let reached = cause.time().unwrap_or(0.5 * since(last + 1));
             last = (first..=last).take_while(|sample| since(*sample) < reached).last()?;
             // a sample at the very start needs a short motion behind it
             let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
             // a new flow, without memory of the failed attempt
-            let mut flow = TimeHistory::flow(system, self.width).ok()?;
+            let mut flow = TimeHistory::flow(&interval.system, self.width).ok()?;
             flow.set_recording(true);
-            flow.set_excitation(system, self.frequency(begin));
+            flow.set_excitation(&interval.system, interval.omega);
             match flow.run_accurately(&mut start.to_vec(), length) {
                 Ok(()) => {
-                    let path = flow.path(system, Symmetry::FullPeriod, length);
+                    let path = flow.path(&interval.system, Symmetry::FullPeriod, length);
                     return Some(TimeInterval { begin, length, last: Some(last), path });
                 }
                 Err(again) => cause = again,
@@ -251,8 +308,7 @@ impl TimeHistory {
     }
 
     fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        // Relative error per step for smooth laws.
-        integrator_choice::integrator(system, width, 1e-9, NAME)
+        integrator_choice::integrator(system, width, TOLERANCE, NAME)
             .map_err(|error| error.with_alternatives(alternatives(system)))
     }
 
@@ -264,7 +320,22 @@ impl TimeHistory {
         match self.excitation {
             Excitation::Free => 0.0,
             Excitation::Steady(omega) => omega,
-            Excitation::RunUp { from, to, duration } => {
+            Excitation::RunUp { from, to, duration, scale: SweepScale::Logarithmic } => {
+                let (rate, left) = ((to / from).ln() / duration, duration - time);
+                if left <= 0.0 {
+                    return to;
+                }
+                let begin = from * (rate * time).exp();
+                // `ω (e^{rτ} - 1)/r = 2π`; a falling frequency may never complete the cycle
+                let growth = TAU * rate / begin;
+                let whole = if growth > -1.0 { growth.ln_1p() / rate } else { f64::INFINITY };
+                if whole <= left {
+                    return TAU / whole;
+                }
+                let turned = begin * (rate * left).exp_m1() / rate;
+                TAU / (left + (TAU - turned) / to)
+            }
+            Excitation::RunUp { from, to, duration, scale: SweepScale::Linear } => {
                 let (rate, left) = ((to - from) / duration, duration - time);
                 if left <= 0.0 {
                     return to;
@@ -287,6 +358,34 @@ impl TimeHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The cycles of a run-up end where the phase `2π f₀ T/ln r (r^(t/T) - 1)` is a multiple of
+    /// 2π.
+    #[test]
+    fn cycles_of_a_logarithmic_run_up_keep_its_phase() {
+        for (from, to) in [(10.0, 80.0), (80.0, 10.0)] {
+            let duration = 20.0;
+            let excitation = Excitation::RunUp { from, to, duration, scale: SweepScale::Logarithmic };
+            let motion = TimeHistory {
+                displacement: vec![],
+                velocity: vec![],
+                states: vec![],
+                excitation,
+                duration,
+                step: 1.0,
+                width: None,
+            };
+            let (mut time, mut cycles) = (0.0, 0.0);
+            let rate = (to / from).ln() / duration;
+            while time < 0.9 * duration {
+                time += TAU / motion.frequency(time);
+                cycles += 1.0;
+                let phase = from * (rate * time).exp_m1() / rate;
+                assert!((phase / TAU - cycles).abs() < 1e-9, "{phase} {cycles}");
+            }
+            assert_eq!(motion.frequency(duration), to);
+        }
+    }
     use crate::law::{Coulomb, Cubic, FrictionContact, SharedLaw};
     use crate::model::{Axis, Force, GROUND, Joint, Mass, Model, Spring};
     use crate::structure::Structure;
@@ -446,7 +545,7 @@ mod tests {
                 displacement: vec![0.0],
                 velocity: vec![0.0],
                 states: vec![],
-                excitation: Excitation::RunUp { from, to, duration },
+                excitation: Excitation::RunUp { from, to, duration, scale: SweepScale::Linear },
                 duration,
                 step,
                 width: None,

@@ -28,7 +28,8 @@ pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};
 pub use survey::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, Survey, UnloadedContacts, WaveModes};
 pub use system::{
-    Axis, CyclicSymmetry, ExcitationHarmonic, MovedPlace, System, SystemBuilder, SystemError, SystemJoint,
+    Axis, CyclicSymmetry, ExcitationHarmonic, ExcitationSum, MovedPlace, System, SystemBuilder, SystemError,
+    SystemJoint,
 };
 
 use crate::law::SharedLaw;

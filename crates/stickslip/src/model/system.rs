@@ -275,6 +275,15 @@ impl ExcitationHarmonic {
     }
 }
 
+/// A harmonic of an excitation as a sum of harmonics of another one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExcitationSum {
+    /// Harmonic number of the sum.
+    pub harmonic: u32,
+    /// Harmonics of the other excitation with their factors.
+    pub of: Vec<(u32, Complex64)>,
+}
+
 /// A place with imposed motion, with the data for the force that moves it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovedPlace {
@@ -509,6 +518,50 @@ impl System {
         let axes = system.joints.iter_mut().flat_map(|joint| &mut joint.axes);
         axes.flat_map(|axis| &mut axis.imposed).for_each(|(h, _)| *h *= periods);
         system.moved.iter_mut().flat_map(|place| &mut place.motion).for_each(|(h, _)| *h *= periods);
+        system
+    }
+
+    /// Returns the same system under other sums of its harmonics: for every harmonic of the new
+    /// excitation the factors of harmonics of this one.
+    ///
+    /// # Example
+    /// The excitation of the first harmonic becomes a constant force of half its amplitude.
+    /// ```
+    /// use num_complex::Complex64;
+    /// use stickslip::model::ExcitationSum;
+    /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
+    /// let half = ExcitationSum { harmonic: 0, of: vec![(1, Complex64::new(0.5, 0.0))] };
+    /// let constant = system.with_excitation_sums(&[half]);
+    /// let force = |system: &stickslip::model::System| system.excitation(1.0)[0].1[0];
+    /// assert_eq!(force(&constant), 0.5 * force(&system));
+    /// ```
+    #[must_use]
+    pub fn with_excitation_sums(&self, sums: &[ExcitationSum]) -> System {
+        let combine = |harmonics: &[(u32, Complex64)]| -> Vec<(u32, Complex64)> {
+            let value = |old: u32| harmonics.iter().find(|(h, _)| *h == old).map_or(ZERO, |(_, amplitude)| *amplitude);
+            let sum = |sum: &ExcitationSum| sum.of.iter().map(|(old, factor)| factor * value(*old)).sum::<Complex64>();
+            sums.iter().map(|one| (one.harmonic, sum(one))).filter(|(_, amplitude)| *amplitude != ZERO).collect()
+        };
+        let n = self.dofs();
+        let load = |sum: &ExcitationSum| {
+            let mut new = ExcitationHarmonic::zero(sum.harmonic, n);
+            for (old, factor) in &sum.of {
+                for load in self.loads.iter().filter(|load| load.harmonic == *old) {
+                    new.force += &load.force * *factor;
+                    new.by_velocity += &load.by_velocity * *factor;
+                    new.by_acceleration += &load.by_acceleration * *factor;
+                }
+            }
+            new
+        };
+        let mut system = System { cyclic: None, ..self.clone() };
+        system.loads = sums.iter().map(load).collect();
+        system.loads.sort_by_key(|load| load.harmonic);
+        let axes = system.joints.iter_mut().flat_map(|joint| &mut joint.axes);
+        axes.chain(&mut system.place_axes).for_each(|axis| axis.imposed = combine(&axis.imposed));
+        for place in &mut system.moved {
+            (place.motion, place.force) = (combine(&place.motion), combine(&place.force));
+        }
         system
     }
 

@@ -132,12 +132,25 @@ pub(crate) fn build_model(
         let values = resolve(Element::Force(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         forces.push(sector_distribution(table, &values, &mut wrong));
+        // a record replaces the amplitude when the motion is computed
+        if table.entry("data").is_some() {
+            model.forces.push(Force { on: text(&values, "on"), amplitude: 0.0, phase: 0.0, harmonic: 0 });
+            continue;
+        }
         model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     for (i, table) in lists.motion.iter().enumerate() {
         let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
+        let from_record = table.entry("data").is_some();
+        if from_record && text(&values, "on") == GROUND {
+            continue;
+        }
         motions.push(sector_distribution(table, &values, &mut wrong));
+        if from_record {
+            model.motions.push(Motion { on: text(&values, "on"), amplitude: 0.0, phase: 0.0, harmonic: 0 });
+            continue;
+        }
         model.motions.push(Motion { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     problems.append(&mut wrong);

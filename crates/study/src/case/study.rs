@@ -14,6 +14,7 @@ use crate::compile::compiled::{
 };
 use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
+use crate::data::DataTable;
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::expression::{ExpressionValue, quantity_text};
@@ -48,6 +49,8 @@ pub struct Study {
     pub(crate) study: CompiledTable,
     pub(crate) method: CompiledTable,
     pub(crate) figure: CompiledTable,
+    /// The tables of `[[data]]`.
+    pub(crate) data: Arc<Vec<DataTable>>,
     /// Memory limit of a run, bytes, if the user set one.
     pub(crate) memory: Option<u64>,
 }
@@ -203,6 +206,8 @@ pub struct Case {
     pub frequencies: Option<Frequencies>,
     /// The method.
     pub method: MethodChoice,
+    /// Number of forces and motions that take their values from records.
+    pub records: usize,
 }
 
 impl Case {
@@ -364,7 +369,7 @@ impl Study {
     /// [`StudyError`] if there is no such case. The cases of a study that was read have been
     /// checked.
     pub fn case(&self, index: usize) -> Result<Case, StudyError> {
-        self.build_case(index, None)
+        self.build_case(index, &[])
     }
 
     /// Returns case `index` with the parameter `name` at another value (SI), for searches
@@ -373,16 +378,26 @@ impl Study {
     /// # Errors
     /// [`StudyError`]: there is no such case or parameter, or the model cannot have this value.
     pub fn case_with_parameter(&self, index: usize, name: &str, si: f64) -> Result<Case, StudyError> {
-        match self.names.iter().position(|n| n == name) {
-            Some(parameter) => self.build_case(index, Some((parameter, si))),
-            None => {
-                let message = format!("there is no parameter `{}`", excerpt(name));
-                Err(StudyError::file(&self.sources[0].name, message, None))
-            }
-        }
+        self.case_with_parameters(index, &[(name, si)])
     }
 
-    fn build_case(&self, index: usize, fixed: Option<(usize, f64)>) -> Result<Case, StudyError> {
+    /// Returns case `index` with several parameters at other values (SI).
+    ///
+    /// # Errors
+    /// [`StudyError`]: there is no such case or parameter, or the model cannot have these values.
+    pub fn case_with_parameters(&self, index: usize, values: &[(&str, f64)]) -> Result<Case, StudyError> {
+        let mut fixed = Vec::with_capacity(values.len());
+        for (name, si) in values {
+            let Some(parameter) = self.names.iter().position(|n| n == name) else {
+                let message = format!("there is no parameter `{}`", excerpt(name));
+                return Err(StudyError::file(&self.sources[0].name, message, None));
+            };
+            fixed.push((parameter, *si));
+        }
+        self.build_case(index, &fixed)
+    }
+
+    fn build_case(&self, index: usize, fixed: &[(usize, f64)]) -> Result<Case, StudyError> {
         if index >= self.cases() {
             let message = format!("there is no case {index}; the study has {} cases", self.cases());
             return Err(StudyError::file(&self.sources[0].name, message, None));
@@ -533,6 +548,8 @@ impl Study {
             "number_of_cases": self.cases(),
             "seed": self.seed(),
             "matrices": self.matrices_checksum(),
+            "data": self.data.iter().map(|data| json!({ "name": data.name, "file": data.file, "crc": data.checksum() }))
+                .collect::<Vec<_>>(),
             "units": self.written_units(),
             "cases": cases,
         })
@@ -575,7 +592,7 @@ impl Study {
     fn resolve_with_case_name(
         &self,
         index: usize,
-        look: CheckScope,
+        look: CheckScope<'_>,
         problems: &mut Vec<Problem>,
     ) -> Option<ResolvedCase> {
         let parts = self.resolve(index, look, problems);
@@ -682,13 +699,13 @@ impl Study {
         varied_units.chain(frequency_unit).collect()
     }
 
-    fn resolve(&self, index: usize, look: CheckScope, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
+    fn resolve(&self, index: usize, look: CheckScope<'_>, problems: &mut Vec<Problem>) -> Option<ResolvedCase> {
         let (first_look, fixed) = match look {
-            CheckScope::First => (index == 0, None),
+            CheckScope::First => (index == 0, &[][..]),
             CheckScope::NumbersOnly(fixed) => (false, fixed),
         };
         let choice = self.value_indices(index);
-        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed.as_slice()) {
+        let values = match evaluate(&self.names, &self.parameters, &self.order, &choice, fixed) {
             Ok(values) => values,
             Err(problem) => {
                 let template = self.structure.template.as_ref().map(|template| template.source);
@@ -759,7 +776,8 @@ impl Study {
         let method =
             MethodChoice { name: method.text("kind").unwrap_or("auto").to_owned(), options: options.collect() };
         let frequencies = values.frequencies("frequency").cloned();
-        Case { index, varied, parameters, model, values, frequencies, method }
+        let records = self.structure.lists.records().len();
+        Case { index, varied, parameters, model, values, frequencies, method, records }
     }
 
     fn model_problem(&self, error: &ModelError, model: &Model) -> Problem {
@@ -781,12 +799,12 @@ impl Study {
 
 /// Extent of the check of a case.
 #[derive(Debug, Clone, Copy)]
-enum CheckScope {
+enum CheckScope<'a> {
     /// First check: the first case is assembled and the figure is checked. The other cases
     /// differ only in numbers.
     First,
-    /// Later: only the numbers are checked. A parameter may have another value.
-    NumbersOnly(Option<(usize, f64)>),
+    /// Later: only the numbers are checked. Some parameters may have other values.
+    NumbersOnly(&'a [(usize, f64)]),
 }
 
 struct ResolvedCase {

@@ -229,6 +229,24 @@ pub(crate) enum ResolvedValue {
     Sums(Vec<Vec<(String, f64)>>),
     Law(SharedLaw),
     Table(Values),
+    Tables(Vec<Values>),
+    Texts(BTreeMap<String, String>),
+    Fit(Vec<FitRange>),
+}
+
+/// A fitted parameter with the range of its values, in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitRange {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its dimension, if the file determines it.
+    pub dimension: Option<Dimension>,
+    /// Smallest value.
+    pub from: f64,
+    /// Largest value.
+    pub to: f64,
+    /// True if ratios of the parameter count, not differences.
+    pub is_log: bool,
 }
 
 /// The values of a table by key. An absent key with a default has its default here.
@@ -275,6 +293,12 @@ accessors! {
     law -> &SharedLaw { ResolvedValue::Law(law) => law }
     /// A table inside the table.
     table -> &Values { ResolvedValue::Table(table) => table }
+    /// A list of tables inside the table.
+    tables -> &[Values] { ResolvedValue::Tables(tables) => tables }
+    /// Texts by name.
+    texts -> &BTreeMap<String, String> { ResolvedValue::Texts(texts) => texts }
+    /// Fitted parameters.
+    fit -> &[FitRange] { ResolvedValue::Fit(ranges) => ranges }
 }
 
 impl Values {
@@ -315,6 +339,15 @@ impl ResolvedValue {
             ResolvedValue::Sums(sums) => json!(sums),
             ResolvedValue::Law(law) => json!(law),
             ResolvedValue::Table(table) => table.to_json(),
+            ResolvedValue::Tables(tables) => json!(tables.iter().map(Values::to_json).collect::<Vec<_>>()),
+            ResolvedValue::Texts(texts) => json!(texts),
+            ResolvedValue::Fit(ranges) => {
+                let one = |range: &FitRange| {
+                    let end = |si: f64| quantity_json(si, range.dimension);
+                    (range.name.clone(), json!({ "from": end(range.from), "to": end(range.to), "log": range.is_log }))
+                };
+                Json::Object(ranges.iter().map(one).collect())
+            }
         }
     }
 }

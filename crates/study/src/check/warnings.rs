@@ -37,7 +37,7 @@ enum InitialStates {
 }
 
 fn no_excitation(cases: &[SurveyedCase], initial_states: InitialStates) -> Option<String> {
-    if cases.iter().any(|one| !one.survey.harmonics().is_empty()) {
+    if cases.iter().any(|one| !one.survey.harmonics().is_empty() || one.case.records > 0) {
         return None;
     }
     let starts = |values: &Values| {

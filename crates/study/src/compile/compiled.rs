@@ -1,7 +1,7 @@
 //! Compiled statements of a study file: expressions are parsed and locations are known, but
 //! nothing is evaluated.
 
-use crate::case::values::{Frequencies, ResolvedValue, Values};
+use crate::case::values::{FitRange, Frequencies, ResolvedValue, Values};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::{Expression, ExpressionValue, dimension_text, quantity_text};
 use crate::syntax::key::Bounds;
@@ -61,6 +61,44 @@ pub(crate) enum CompiledValue {
     Sums(Vec<Weights>),
     Law(&'static LawInfo, CompiledTable),
     Table(CompiledTable),
+    Tables(Vec<CompiledTable>),
+    Fit(Vec<CompiledFitRange>),
+}
+
+/// The range of a fitted parameter.
+#[derive(Debug, Clone)]
+pub(crate) struct CompiledFitRange {
+    pub name: String,
+    pub location: Location,
+    pub from: CompiledQuantity,
+    pub to: CompiledQuantity,
+    pub is_log: bool,
+}
+
+impl CompiledFitRange {
+    fn resolve(&self, environment: &Environment<'_>) -> Result<FitRange, Problem> {
+        let index = environment.names.iter().position(|name| *name == self.name);
+        let dimension = index.and_then(|index| environment.values[index].dimension);
+        let end = |quantity: &CompiledQuantity| {
+            let value = quantity.parameter_value(&self.name, dimension, environment)?;
+            if value.si.is_finite() {
+                Ok(value.si)
+            } else {
+                Err(quantity.problem(&self.name, "this is not a finite number"))
+            }
+        };
+        let (from, to) = (end(&self.from)?, end(&self.to)?);
+        if from >= to {
+            let message = format!("must be more than `from`, found {}", quantity_text(to, dimension));
+            return Err(self.to.problem("to", message));
+        }
+        if self.is_log && from <= 0.0 {
+            let message =
+                format!("must be more than zero on a logarithmic scale, found {}", quantity_text(from, dimension));
+            return Err(self.from.problem("from", message));
+        }
+        Ok(FitRange { name: self.name.clone(), dimension, from, to, is_log: self.is_log })
+    }
 }
 
 impl CompiledTable {
@@ -102,6 +140,11 @@ impl CompiledTable {
                     list.iter().for_each(|(_, _, q)| each(entry.key, q, Some(*dimension)));
                 }
                 CompiledValue::Law(_, table) | CompiledValue::Table(table) => table.each_quantity(each),
+                CompiledValue::Tables(tables) => tables.iter().for_each(|table| table.each_quantity(each)),
+                CompiledValue::Fit(ranges) => ranges.iter().for_each(|range| {
+                    each(entry.key, &range.from, None);
+                    each(entry.key, &range.to, None);
+                }),
             }
         }
     }
@@ -118,6 +161,7 @@ impl CompiledTable {
             CompiledValue::Sums(sums) => {
                 sums.iter().flatten().find(|(n, _, _)| n == name).map(|(_, location, _)| location)
             }
+            CompiledValue::Fit(ranges) => ranges.iter().find(|range| range.name == name).map(|range| &range.location),
             _ => None,
         });
         inside.unwrap_or(&entry.location)
@@ -336,6 +380,12 @@ impl CompiledValue {
             }
             CompiledValue::Law(row, table) => ResolvedValue::Law(law(row, table, key, environment, problems)?),
             CompiledValue::Table(table) => ResolvedValue::Table(table.values(environment, problems)),
+            CompiledValue::Tables(tables) => {
+                ResolvedValue::Tables(tables.iter().map(|table| table.values(environment, problems)).collect())
+            }
+            CompiledValue::Fit(ranges) => {
+                ResolvedValue::Fit(ranges.iter().map(|range| range.resolve(environment)).collect::<Result<_, _>>()?)
+            }
         })
     }
 }

@@ -131,6 +131,16 @@ impl ModelLists {
         }
     }
 
+    /// Returns the entries of forces and motions that take their values from a record: list and
+    /// number.
+    pub fn records(&self) -> Vec<(&'static str, usize)> {
+        let of = |list: &'static str, tables: &[CompiledTable]| {
+            let has = |(index, table): (usize, &CompiledTable)| table.entry("data").map(|_| (list, index));
+            tables.iter().enumerate().filter_map(has).collect::<Vec<_>>()
+        };
+        [of("force", &self.force), of("motion", &self.motion)].concat()
+    }
+
     /// Returns all lists, in order.
     pub fn all(&self) -> [&Vec<CompiledTable>; 7] {
         [&self.place, &self.mass, &self.body, &self.spring, &self.joint, &self.force, &self.motion]

@@ -12,6 +12,7 @@
 mod branch;
 mod campbell;
 pub mod hysteresis;
+mod identify;
 pub(crate) mod info;
 pub(crate) mod kind;
 mod modes;
@@ -24,6 +25,7 @@ mod transient;
 
 use crate::case::study::Study;
 use crate::run::output_columns;
+use crate::syntax::error::StudyError;
 
 pub use crate::kinds::info::{KeyError, KindInfo};
 pub use crate::kinds::kind::Kind;
@@ -39,11 +41,44 @@ pub const TABLE: &[Kind] = &[
     branch::KIND,
     nodal_diameter::KIND,
     campbell::KIND,
+    identify::KIND,
 ];
 
 /// Returns the kind with this name.
 pub fn find(name: &str) -> Option<&'static Kind> {
     TABLE.iter().find(|kind| kind.info.name == name)
+}
+
+/// Checks what a kind requires of the tables of `[[data]]`.
+pub(crate) fn check_data(study: &Study) -> Result<(), StudyError> {
+    check_records(study)?;
+    if study.kind().name == identify::NAME { identify::check_data(study) } else { Ok(()) }
+}
+
+/// Checks the forces and motions from records.
+fn check_records(study: &Study) -> Result<(), StudyError> {
+    for (list, index) in study.structure.lists.records() {
+        let refuse = |key: &str, message: &str, help: &str| {
+            Err(study.error_at(list, index, key, message, Some(help.to_owned())))
+        };
+        if study.kind().name != "transient" {
+            return refuse("data", "a record needs a study of kind `transient`", "write kind = \"transient\"");
+        }
+        if study.structure.lists.disk.is_some() {
+            return refuse("data", "a record is not possible on a bladed disk", "state the whole model without [disk]");
+        }
+        let values = study.case(0)?.values;
+        if values.frequencies("frequency").is_some() || values.table("run_up").is_some() {
+            let help = "remove `frequency` and `run_up`, and state `duration` and `time_step`";
+            return refuse("data", "a record and an excitation frequency exclude each other", help);
+        }
+    }
+    match transient::record::check(study, &study.case(0)?) {
+        Ok(()) => Ok(()),
+        Err(transient::record::RecordError { list, index, key, error }) => {
+            Err(study.error_at(list, index, key, error.message, Some(error.help)))
+        }
+    }
 }
 
 /// Returns the kind of a study.

@@ -6,6 +6,7 @@
 //! - `table_builder`: builds tables row by row;
 //! - `notes`: notes for the reader;
 //! - `drawing`: tools for kinds to draw figures from finished tables;
+//! - `fitted_study`: the study file with identified values;
 //! - `draw_panels`: panels of many random draws;
 //! - `percentiles`: bands of many curves;
 //! - `histogram`: histograms, and for maxima the fitted distribution;
@@ -19,6 +20,7 @@ pub(crate) mod decay;
 pub mod decimation;
 pub(crate) mod draw_panels;
 pub(crate) mod drawing;
+mod fitted_study;
 pub(crate) mod histogram;
 pub(crate) mod notes;
 pub(crate) mod percentiles;
@@ -26,5 +28,6 @@ pub(crate) mod table_builder;
 mod typed;
 pub(crate) mod weibull;
 
+pub use fitted_study::fitted_study;
 pub(crate) use typed::Results;
 pub use typed::{Evidence, Peak, ResultsError, worst_evidence};

@@ -31,7 +31,7 @@ pub fn markdown() -> String {
     // nested tables follow the table that contains them
     let inner = |book: &mut String, of: &str, keys: &[Key]| {
         for key in keys.iter().filter(|key| key.is_supported()) {
-            if let ValueType::Table(keys) | ValueType::TableOrFalse(keys) = key.takes {
+            if let ValueType::Table(keys) | ValueType::TableOrFalse(keys) | ValueType::Tables(keys) = key.takes {
                 rows(book, &format!("`{}` of {of}", key.name), key.doc, keys);
             }
         }
@@ -39,7 +39,7 @@ pub fn markdown() -> String {
     rows(&mut book, "Top of the file", "", FILE);
     for key in FILE {
         let (heading, keys) = match key.takes {
-            ValueType::List(keys) => (format!("`[[{}]]`", key.name), keys),
+            ValueType::List(keys) | ValueType::Tables(keys) => (format!("`[[{}]]`", key.name), keys),
             ValueType::Table(keys) => (format!("`[{}]`", key.name), keys),
             ValueType::Sample => (format!("`[{}]`", key.name), SAMPLE),
             _ => continue,

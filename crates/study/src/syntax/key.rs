@@ -87,6 +87,12 @@ pub enum ValueType {
     Repeat,
     /// A list of tables with these keys: `[[mass]]`.
     List(&'static [Key]),
+    /// A list of tables with these keys that is read with the tables around it.
+    Tables(&'static [Key]),
+    /// A table from names to texts.
+    Texts,
+    /// `fit`: parameters with the range of their values.
+    Fit,
     /// A file: its path, or `{ file, name, format }`.
     File,
     /// A table with these keys, or `false`.

@@ -73,6 +73,12 @@ pub const FILE: &[Key] = &[
         "[]",
     ),
     optional("motion", ValueType::List(MOTION), "imposed motions of a place; they add up", "[]"),
+    optional(
+        "data",
+        ValueType::Tables(DATA),
+        "tables of measured or given numbers, from files",
+        "[{ name = \"sweep\", file = \"sweep.csv\" }]",
+    ),
     required("study", ValueType::Study, "the results to compute", "{ kind = \"response\", frequency = \"121 Hz\" }"),
     optional(
         "sample",
@@ -122,6 +128,32 @@ fn panel_names() -> Vec<(&'static str, &'static str)> {
 fn scale_names() -> Vec<(&'static str, &'static str)> {
     vec![("linear", "equal differences have equal lengths"), ("log", "equal ratios have equal lengths")]
 }
+
+/// The keys of `[[data]]`.
+pub const DATA: &[Key] = &[
+    required("name", ValueType::Name, "name of the table, for the keys that use it", "\"sweep\""),
+    required(
+        "file",
+        ValueType::Text,
+        "file in the folder of the study file: CSV and other text, Universal File Format, MATLAB, HDF5, NumPy, WAV; \
+         recognized by its content",
+        "\"sweep.csv\"",
+    ),
+    optional(
+        "columns",
+        ValueType::Texts,
+        "the columns of the file by their use, as far as they have other names: `force = \"F\"`; a unit in brackets \
+         counts for a column without one: `force = \"F [kN]\"`",
+        "{ frequency = \"frequency_Hz\", force = \"F [kN]\" }",
+    ),
+];
+
+/// The keys of a fitted parameter.
+pub(crate) const FIT_RANGE: &[Key] = &[
+    required("from", ValueType::Quantity(Dimension::NONE, Bounds::Finite), "smallest value", "\"0.1 N\""),
+    required("to", ValueType::Quantity(Dimension::NONE, Bounds::Finite), "largest value", "\"20 N\""),
+    default("scale", ValueType::Choice(scale_names), "linear", "log for a parameter whose ratios count", "\"log\""),
+];
 
 const MODEL: &[Key] = &[
     required("template", ValueType::Choice(template_names), "name of the template", "\"blade-couple\""),
@@ -554,12 +586,14 @@ const HARMONIC: Key = default(
 
 const FORCE: &[Key] = &[
     required("on", ValueType::Name, "the place on which it acts", "\"blade1\""),
-    required(
+    optional(
         "amplitude",
         ValueType::Quantity(Dimension::FORCE, Bounds::Finite),
-        "amplitude; on a rotation of a body the amplitude of a moment in N m",
+        "amplitude; on a rotation of a body the amplitude of a moment in N m; required without `data`",
         "\"10 N\"",
     ),
+    RECORD,
+    RECORD_COLUMN,
     PHASE,
     HARMONIC,
     ENGINE_ORDER,
@@ -568,13 +602,41 @@ const FORCE: &[Key] = &[
     REPEAT,
 ];
 
+const RECORD: Key = optional(
+    "data",
+    ValueType::Text,
+    "in a transient, instead of `amplitude`: name of a [[data]] with the column `time`; linear between its rows, zero \
+     outside of them",
+    "\"record\"",
+);
+
+const RECORD_COLUMN: Key = optional("column", ValueType::Text, "column of `data`; default: `force`", "\"force_N\"");
+
 const MOTION: &[Key] = &[
-    required("on", ValueType::Name, "the place: a mass, or a place that exists only by this motion", "\"mover\""),
     required(
+        "on",
+        ValueType::Name,
+        "the place: a mass, or a place that exists only by this motion; with `data` also `ground` for its acceleration",
+        "\"mover\"",
+    ),
+    optional(
         "amplitude",
         ValueType::Quantity(Dimension::LENGTH, Bounds::Finite),
-        "amplitude; for a rotation of a body an angle",
+        "amplitude; for a rotation of a body an angle; required without `data`",
         "\"2 mm\"",
+    ),
+    RECORD,
+    optional(
+        "column",
+        ValueType::Text,
+        "column of `data`; default: `displacement`, or `acceleration` for the motion of the ground",
+        "\"displacement_m\"",
+    ),
+    optional(
+        "along",
+        ValueType::Text,
+        "for an acceleration of the ground under masses with directions: the direction",
+        "\"x\"",
     ),
     PHASE,
     HARMONIC,
@@ -584,9 +646,8 @@ const MOTION: &[Key] = &[
     unsupported(
         "velocity",
         "a place with a constant velocity, such as a belt, is not supported: every motion repeats with the excitation",
-        "for a belt of velocity v use kind = \"transient\" and a slow, long motion: with amplitude A, phase = \"-90 \
-         deg\" and an excitation frequency of v/A rad/s, the velocity is v while the duration is short compared with \
-         A/v",
+        "for a belt of velocity v use kind = \"transient\" and data = \"belt\": a [[data]] with two rows of time and \
+         displacement, zero and v times the time",
     ),
     REPEAT,
 ];
@@ -676,6 +737,9 @@ pub fn describe_value(takes: &ValueType) -> String {
             let many = matches!(takes, ValueType::List(_));
             format!("{} with the keys {names}", if many { "a list of tables" } else { "a table" })
         }
+        ValueType::Tables(keys) => describe_value(&ValueType::List(keys)),
+        ValueType::Texts => "a table from names to texts".to_owned(),
+        ValueType::Fit => "a table from parameters to { from, to }, with scale = \"log\" for ratios".to_owned(),
         ValueType::Repeat => {
             "a table with a number of repetitions or [first, last] for each index, and `wrap`".to_owned()
         }
@@ -788,6 +852,11 @@ fn takes_schema(takes: &ValueType) -> Value {
         ValueType::Vector(_) => json!({ "type": "array", "items": quantity(), "minItems": 3, "maxItems": 3 }),
         ValueType::Table(keys) => object(keys),
         ValueType::List(keys) => json!({ "type": "array", "items": object(keys), "maxItems": MAX_ELEMENTS }),
+        ValueType::Tables(keys) => json!({ "type": "array", "items": object(keys), "minItems": 1 }),
+        ValueType::Texts => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
+        ValueType::Fit => json!({
+            "type": "object", "additionalProperties": object(FIT_RANGE), "propertyNames": { "pattern": NAME_PATTERN },
+        }),
         ValueType::Repeat => json!({
             "type": "object",
             "properties": { "wrap": {

@@ -185,14 +185,14 @@ fn frequencies() {
 #[test]
 fn a_constant_velocity_is_refused() {
     let belt = "[[motion]]\non = \"belt\"\namplitude = \"1 m\"\nvelocity = \"50 mm/s\"\n[[force]]";
-    check("[[force]]", belt, (43, 12), "velocity", &["constant velocity, such as a belt", "transient", "v/A"]);
+    check("[[force]]", belt, (43, 12), "velocity", &["constant velocity, such as a belt", "transient", "two rows"]);
     // lists of keys do not contain it
     check(
         "[[force]]",
         &belt.replace("velocity", "speed"),
         (43, 1),
         "speed",
-        &["the keys of motion 1 are `on`, `amplitude`, `phase`, `harmonic`, `engine_order`"],
+        &["the keys of motion 1 are `on`, `amplitude`, `data`, `column`, `along`, `phase`, `harmonic`, `engine_order`"],
     );
 }
 

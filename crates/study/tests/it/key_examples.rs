@@ -21,7 +21,29 @@ spring = [
 motion = [{ on = "mover", amplitude = "1 mm" }]
 joint = [{ name = "shroud", between = ["blade1", "contact"], law = { kind = "coulomb", limit = "Ft" } }]
 force = [{ on = "blade1", amplitude = "10 N" }]
+data = [{ name = "sweep", file = "sweep.csv" }]
 study = { kind = "response", frequency = "121 Hz" }
+"#;
+
+/// A mass under a force and on a place that follow records.
+const RECORDS: &str = r#"
+schema = 1
+data = [{ name = "record", file = "record.csv" }]
+mass = [{ name = "blade1", mass = "180 g" }]
+spring = [{ between = ["blade1", "ground"], stiffness = "1e5 N/m" }, { between = ["blade1", "mover"], stiffness = "1e3 N/m" }]
+force = [{ on = "blade1", data = "record" }]
+motion = [{ on = "mover", data = "record" }]
+study = { kind = "transient", duration = "1 s", time_step = "0.1 s" }
+"#;
+
+/// A mass with directions on a ground that moves.
+const QUAKE: &str = r#"
+schema = 1
+data = [{ name = "record", file = "record.csv" }]
+mass = [{ name = "deck", mass = "1 kg", directions = ["x", "z"] }]
+spring = [{ between = ["deck.x", "ground"], stiffness = "1e5 N/m" }, { between = ["deck.z", "ground"], stiffness = "1e5 N/m" }]
+motion = [{ on = "ground", data = "record", along = "z", column = "force_N" }]
+study = { kind = "transient", duration = "1 s", time_step = "0.1 s" }
 "#;
 
 /// A mass that moves in a plane, with a rotated face.
@@ -116,6 +138,10 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
         ("disk", "boundary" | "nodes" | "axis") => (SECTOR, "", &[]),
         ("disk", "blade") => (SECTOR, "mistuning = { of = \"blade.stiffness\", deviation = \"1 %\" }", &[]),
         ("disk.mistuning", "file") => (RING, "", &["deviation", "seed"]),
+        ("force", "data" | "column") => (RECORDS, "", &[]),
+        ("motion", "data") => (RECORDS, "", &[]),
+        ("motion", "column") => (RECORDS, "", &["/force"]),
+        ("motion", "along") => (QUAKE, "column = \"a\"", &[]),
         ("force" | "motion", "nodal_diameter" | "sector") => (RING, "", &["engine_order"]),
         ("disk" | "disk.mistuning", _) | ("force" | "motion", "engine_order") => (RING, "", &[]),
         _ if table.starts_with("structure") || table == "place" => (MATRICES, "", &[]),
@@ -141,6 +167,8 @@ fn write_files(folder: &Path) {
             text
         })
     };
+    write("sweep.csv", b"frequency_Hz,F,response\n118,1,2e-3\n119,1,3e-3\n121,1,1e-3\n");
+    write("record.csv", b"time_s,force_N,displacement_m,a\n0,0,0,0\n1,1,1e-3,2\n");
     write("blade.sti", lines(&mut entries(1e3)).as_bytes());
     write("blade_6000.sti", lines(&mut entries(1.1e3)).as_bytes());
     write("blade.mas", lines(&mut (0..9).map(|i| (i, i, 1e-6))).as_bytes());

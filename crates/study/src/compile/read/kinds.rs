@@ -21,7 +21,7 @@ pub(super) fn tables_with_key(name: &str, own: &[Key]) -> Vec<String> {
     let tables = FILE.iter().filter_map(|table| {
         let (keys, title) = match table.takes {
             ValueType::Table(keys) => (names(keys), format!("[{}]", table.name)),
-            ValueType::List(keys) => (names(keys), format!("[[{}]]", table.name)),
+            ValueType::List(keys) | ValueType::Tables(keys) => (names(keys), format!("[[{}]]", table.name)),
             ValueType::Study => {
                 let of_kinds = kinds::TABLE.iter().flat_map(|row| names(row.info.keys));
                 (names(STUDY).into_iter().chain(of_kinds).collect(), format!("[{}]", table.name))

@@ -79,6 +79,8 @@ impl Reader {
                 _ => {}
             }
         }
+        self.require_amplitudes("force", &lists.force, "\"10 N\"");
+        self.require_amplitudes("motion", &lists.motion, "\"2 mm\"");
         lists.use_rotation_dimensions();
         lists.spring.iter_mut().for_each(percent);
         for spring in &lists.spring {
@@ -93,6 +95,28 @@ impl Reader {
             }
         }
         Some(lists)
+    }
+
+    /// Reports forces or motions with neither an amplitude nor a record, or with both.
+    fn require_amplitudes(&mut self, list: &str, tables: &[CompiledTable], example: &str) {
+        for (i, table) in tables.iter().enumerate() {
+            let problem = match (table.entry("amplitude"), table.entry("data")) {
+                (None, None) => {
+                    let message = format!("`amplitude` is missing in {list} {}", i + 1);
+                    Problem::new(&table.location, "amplitude", message)
+                        .help(format!("add amplitude = {example}, or data = \"record\" in a transient"))
+                }
+                (Some(_), Some(data)) => {
+                    Problem::new(&data.location, "data", "`amplitude` and `data` exclude each other")
+                        .help("remove one of them")
+                }
+                _ => continue,
+            };
+            // an unreadable amplitude was reported already
+            if self.problems.is_empty() {
+                self.problems.push(problem);
+            }
+        }
     }
 
     /// Reads the entries that one repeated entry states, up to the first error.

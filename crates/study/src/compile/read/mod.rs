@@ -4,12 +4,14 @@
 //! - `reader`: state of the reader while it reads a file;
 //! - `values`: from a node of the tree to a stated value;
 //! - `kinds`: tables whose `kind` determines their keys;
+//! - `data`: `[[data]]` and the files that it names;
 //! - `disk`: `[disk]` and the pattern file that it names;
 //! - `lists`: the lists of a model, and repeated entries;
 //! - `parameters`: `[parameters]`, `vary`, and overrides;
 //! - `structure`: `[structure]` and its files;
 //! - `template`: the model of a template.
 
+mod data;
 mod disk;
 mod kinds;
 mod lists;
@@ -26,6 +28,7 @@ use crate::case::values::ResolvedValue;
 use crate::compile::compiled::CompiledValue;
 use crate::compile::source_model::SourceModel;
 use crate::compile::template_errors;
+use crate::kinds::check_data;
 use crate::syntax::document::{self, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::schema::{self, FILE, MAX_FILE_BYTES};
@@ -181,6 +184,7 @@ fn read(name: &str, text: &str, overrides: &[(String, String)], mut reader: Read
     match study {
         Some(study) if reader.problems.is_empty() => {
             study.check()?;
+            check_data(&study)?;
             Ok(study)
         }
         _ => Err(reader.error(name)),
@@ -272,6 +276,7 @@ impl Reader {
         let (kind, study, vary) = self.request(&root)?;
         let method = self.method(&root);
         let figure = self.figure(&root);
+        let data = self.data(&root);
         let mut parameters = parameters?;
         let listed = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
         let (sample, mut varied) = self.sample(&root, &mut parameters, &listed).unwrap_or_default();
@@ -310,6 +315,7 @@ impl Reader {
             study,
             method: method?,
             figure,
+            data: Arc::new(data?),
             memory: None,
         })
     }

@@ -5,12 +5,15 @@ use super::kinds::tables_with_key;
 use super::reader::Reader;
 use crate::case::values::ResolvedValue;
 use crate::compile::bare_numbers::bare_number_problem;
-use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, RangeOrder, Weights};
+use crate::compile::compiled::{
+    CompiledEntry, CompiledFitRange, CompiledQuantity, CompiledTable, CompiledValue, RangeOrder, Weights,
+};
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::Expression;
 use crate::syntax::schema::{self, Bounds, Key, MAX_POINTS, Presence, ValueType};
 use crate::syntax::suggest::{alternatives, excerpt, suggest};
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use stickslip::model::{NEXT, is_identifier, is_place};
 
@@ -218,6 +221,9 @@ impl Reader {
             (ValueType::Table(keys), TomlValue::Table(table)) => {
                 Some(CompiledValue::Table(self.table(table, keys, &format!("`{}`", key.name))))
             }
+            (ValueType::Tables(keys), TomlValue::List(list)) if !list.is_empty() => self.tables(key, keys, list),
+            (ValueType::Texts, TomlValue::Table(table)) => self.texts(key, table),
+            (ValueType::Fit, TomlValue::Table(table)) => self.fit(key, table),
             (ValueType::Law, TomlValue::Table(table)) => self.law(table),
             (ValueType::Choice(words), TomlValue::Text { text, .. }) => {
                 let words = words();
@@ -229,6 +235,84 @@ impl Reader {
             }
             _ => self.wrong_type(key, node),
         }
+    }
+
+    /// Reads a list of tables.
+    fn tables(&mut self, key: &Key, keys: &[Key], list: &[TomlNode]) -> Option<CompiledValue> {
+        let table = |(i, node): (usize, &TomlNode)| match &node.value {
+            TomlValue::Table(table) => Some(self.table(table, keys, &format!("{} {}", key.name, i + 1))),
+            _ => {
+                self.wrong_type(key, node);
+                None
+            }
+        };
+        Some(CompiledValue::Tables(list.iter().enumerate().map(table).collect::<Option<_>>()?))
+    }
+
+    /// Reads a table from names to texts.
+    fn texts(&mut self, key: &Key, table: &TomlTable) -> Option<CompiledValue> {
+        let mut texts = BTreeMap::new();
+        for entry in &table.entries {
+            let TomlValue::Text { text, .. } = &entry.node.value else {
+                let message = format!("expected a text in quotes, found {}", entry.node.value.described());
+                let help = format!("write it as in {} = {}", key.name, key.example);
+                self.problems.push(Problem::new(&entry.node.location, excerpt(&entry.key), message).help(help));
+                return None;
+            };
+            texts.insert(entry.key.clone(), text.clone());
+        }
+        Some(CompiledValue::Fixed(ResolvedValue::Texts(texts)))
+    }
+
+    /// Reads the fitted parameters and the ranges of their values.
+    fn fit(&mut self, key: &Key, table: &TomlTable) -> Option<CompiledValue> {
+        let mut ranges = Vec::new();
+        for entry in &table.entries {
+            if !self.index.contains_key(&entry.key) {
+                let message = format!("there is no parameter `{}` to fit", excerpt(&entry.key));
+                let help = match suggest(&entry.key, self.names.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("add it to [parameters] and use it in the model: {} = \"…\"", excerpt(&entry.key)),
+                };
+                self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message).help(help));
+                return None;
+            }
+            let TomlValue::Table(range) = &entry.node.value else {
+                let message = format!("expected a range, found {}", entry.node.value.described());
+                let help = format!("write it as in {} = {}", key.name, key.example);
+                self.problems.push(Problem::new(&entry.node.location, excerpt(&entry.key), message).help(help));
+                return None;
+            };
+            let before = self.problems.len();
+            let mut stated = self.table(range, schema::FIT_RANGE, &format!("the range of `{}`", excerpt(&entry.key)));
+            if self.problems.len() > before {
+                return None;
+            }
+            let is_log = matches!(
+                stated.entry("scale").map(|entry| &entry.value),
+                Some(CompiledValue::Fixed(ResolvedValue::Text(text))) if text == "log"
+            );
+            let mut take = |key: &str| {
+                let at = stated.entries.iter().position(|entry| entry.key == key)?;
+                match stated.entries.swap_remove(at).value {
+                    CompiledValue::Quantity { quantity, .. } => Some(quantity),
+                    _ => None,
+                }
+            };
+            let (from, to) = (take("from")?, take("to")?);
+            ranges.push(CompiledFitRange {
+                name: entry.key.clone(),
+                location: entry.key_location.clone(),
+                from,
+                to,
+                is_log,
+            });
+        }
+        if ranges.is_empty() {
+            self.problems.push(Problem::new(&table.location, key.name, "no parameter is fitted: name at least one"));
+            return None;
+        }
+        Some(CompiledValue::Fit(ranges))
     }
 
     /// Reads a whole number within limits.

@@ -2,6 +2,7 @@
 //! switched-on excitation, or run-up.
 
 mod figure;
+pub(super) mod record;
 
 use super::orbit::write_sample;
 use super::shared::keys::MAX_SAMPLES;
@@ -19,10 +20,11 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::describe_location;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optional, required};
+use record::Records;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::method::WIDTH;
-use stickslip::method::time_history::{Excitation, TimeHistory, TimeHistoryError, TimeSample};
+use stickslip::method::time_history::{Excitation, SweepScale, TimeHistory, TimeHistoryError, TimeSample};
 use stickslip::model::Model;
 use stickslip::orbit::Sample;
 
@@ -35,8 +37,13 @@ const DURATION: ValueType = ValueType::Quantity(Dimension::TIME, Bounds::Positiv
 const RUN_UP: &[Key] = &[
     required("from", FREQUENCY, "excitation frequency at the start", "\"110 Hz\""),
     required("to", FREQUENCY, "excitation frequency at the end; it may be lower than `from`", "\"130 Hz\""),
-    required("duration", DURATION, "time of the linear ramp", "\"10 s\""),
+    required("duration", DURATION, "time of the change", "\"10 s\""),
+    default("scale", ValueType::Choice(sweep_scales), "linear", "linear or logarithmic in time", "\"log\""),
 ];
+
+fn sweep_scales() -> Vec<(&'static str, &'static str)> {
+    vec![("linear", "equal differences in equal times"), ("log", "equal ratios in equal times")]
+}
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -52,8 +59,8 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "run_up",
                 ValueType::Table(RUN_UP),
-                "excitation frequency that changes linearly in time, in steps of one cycle: each cycle has a \
-                 constant frequency and ends when the cycle of the linear ramp ends",
+                "excitation frequency that changes in time, in steps of one cycle: each cycle has a constant frequency \
+                 and ends when the cycle of the continuous change ends",
                 "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
             ),
             optional("duration", DURATION, "computed time; default for a run-up: its duration", "\"2 s\""),
@@ -203,7 +210,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         from: table.quantity("from").unwrap_or(0.0),
         to: table.quantity("to").unwrap_or(0.0),
         duration: table.quantity("duration").unwrap_or(0.0),
+        scale: if table.text("scale") == Some("log") { SweepScale::Logarithmic } else { SweepScale::Linear },
     });
+    // errors of records are found before the run
+    let records = Records::new(work.study, case).unwrap_or(None);
     let drives: Vec<Option<f64>> = match &case.frequencies {
         Some(frequencies) => frequencies.iter().map(Some).collect(),
         None => vec![None],
@@ -220,6 +230,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     }
     let start = start_state
         .unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, start_values), states: Vec::new() });
+    if records.as_ref().is_some_and(|records| records.ground_moves) {
+        let text = "the ground moves; displacements and velocities are relative to it.";
+        part.notes.push(Note::for_case(&case.label(), text));
+    }
     let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
     let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
     let motions = drives.len() as f64;
@@ -249,7 +263,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         // largest displacement of every place, and its time
         let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
-        let end = transient.visit(&prepared.system, &mut |instant| {
+        let is_free = excitation == Excitation::Free && records.is_none();
+        let mut visitor = |instant: TimeSample<'_>| {
             let TimeSample { time, omega, state: sample, between: since } = instant;
             rows.varied(case);
             if work.several_frequencies() {
@@ -261,7 +276,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.end_row();
             sampled = true;
             // the turning points are located exactly only for the place that moves most
-            let most = largest_range(&decays).filter(|_| excitation == Excitation::Free);
+            let most = largest_range(&decays).filter(|_| is_free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.place_axes()).enumerate() {
                 let motion_along =
                     |sample: &Sample| [&sample.displacement, &sample.velocity].map(|x| along.component(x));
@@ -275,7 +290,14 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             work.share.reach((number as f64 + time / duration) / motions);
             stopped = work.context.stopped();
             !stopped
-        });
+        };
+        let end = match &records {
+            Some(records) => {
+                let rest = duration + 2.0 * step;
+                transient.visit_intervals(&mut |begin| records.interval(begin, rest), &mut visitor)
+            }
+            None => transient.visit(&prepared.system, &mut visitor),
+        };
         // a motion without a sample has no largest displacement
         let displacements = prepared.system.place_axes().iter().map(|along| !along.is_rotation());
         let places = prepared.system.places().iter().zip(largest).zip(displacements).filter(|(_, counts)| *counts);
@@ -293,7 +315,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         if let Some(reduction) = prepared.system.reduction_evidence().filter(|_| !prepared.system.joints().is_empty()) {
             Note::TimeHistory(reduction.up_to).merge_into(&mut part.notes);
         }
-        if excitation == Excitation::Free {
+        if is_free {
             let unread = write_decay(prepared, &decays, step, &mut decay, &mut summary);
             part.notes.extend(unread.map(|text| Note::for_case(&case.label(), text)));
         }

@@ -1,0 +1,103 @@
+//! Files of data that other programs wrote, read to the last bit; and damaged ones.
+
+use proptest::prelude::*;
+use std::path::{Path, PathBuf};
+use stickslip_formats::data::{TABLE, read, read_bytes};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/measured")
+}
+
+/// A column by its name, with its values.
+type ExpectedColumn = (String, Vec<f64>);
+
+/// Returns the blocks of `expected.txt`: a file, and its columns.
+fn expected() -> Vec<(String, Vec<ExpectedColumn>)> {
+    let text = std::fs::read_to_string(folder().join("expected.txt")).expect("the expected values");
+    let column = |line: &str| {
+        let mut words = line.split(' ');
+        let name = words.next().expect("a name").to_owned();
+        (name, words.map(|word| word.parse().expect("a number")).collect())
+    };
+    let block = |block: &str| {
+        let mut lines = block.trim_end().lines();
+        (lines.next().expect("a file").to_owned(), lines.map(column).collect())
+    };
+    text.split("\n\n").map(block).collect()
+}
+
+#[test]
+fn files_of_other_programs_are_read_to_the_last_bit() {
+    let mut formats = Vec::new();
+    for (name, columns) in expected() {
+        let file = read(folder().join(&name)).unwrap_or_else(|error| panic!("{error}"));
+        let found: Vec<ExpectedColumn> =
+            file.columns.iter().map(|column| (column.name.clone(), column.values.clone())).collect();
+        for (column, values) in &columns {
+            let found = found.iter().find(|(name, _)| name == column).unwrap_or_else(|| panic!("{name}: no {column}"));
+            assert_eq!(&found.1, values, "{name}, {column}");
+        }
+        assert_eq!(
+            found.len(),
+            columns.len(),
+            "{name}: {:?}",
+            file.columns.iter().map(|c| &c.name).collect::<Vec<_>>()
+        );
+        formats.push(file.format);
+    }
+    for format in TABLE {
+        assert!(formats.contains(&format.name), "no file of {}", format.name);
+    }
+}
+
+#[test]
+fn what_is_not_read_is_listed() {
+    let file = read(folder().join("packed.mat")).expect("a file");
+    assert_eq!(file.notes, ["run(1).title = first", "run(2).title = ", "cells{2} = word"]);
+    let file = read(folder().join("geometry.uff")).expect("a file");
+    assert!(file.notes.iter().any(|note| note.starts_with("units: 1 SI; 1 m is 1")), "{:?}", file.notes);
+    let file = read(folder().join("germany.csv")).expect("a file");
+    assert_eq!(file.notes, ["line 5 is left out: it has 2 of 3 fields", "Prüfstand 3"]);
+}
+
+fn files() -> Vec<Vec<u8>> {
+    expected().iter().map(|(name, _)| std::fs::read(folder().join(name)).expect("a file")).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Damaged files give data or an error; columns never outgrow the file.
+    #[test]
+    fn damaged_files_are_read_or_refused(
+        which in any::<prop::sample::Index>(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        cut in prop::option::of(any::<prop::sample::Index>()),
+    ) {
+        let files = files();
+        let mut bytes = files[which.index(files.len())].clone();
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        if let Ok(file) = read_bytes(&bytes) {
+            let numbers: usize = file.columns.iter().map(|column| column.values.len()).sum();
+            prop_assert!(numbers <= 1_000 * bytes.len().max(1000), "{numbers} numbers of {} bytes", bytes.len());
+        }
+    }
+
+    /// Any bytes after the beginning of a format give data or an error.
+    #[test]
+    fn random_bytes_are_read_or_refused(
+        start in prop::sample::select(vec![
+            &b""[..], b"    -1\n    58\n", b"    -1\n    58b     1     2          11    16\n", b"    -1\n  2412\n", b"    -1\n    55\n",
+            b"RIFF\x00\x00\x00\x00WAVEfmt ", b"\x93NUMPY\x01\x00", b"PK\x03\x04", b"a;b\n1;2\n",
+        ]),
+        rest in prop::collection::vec(any::<u8>(), 0..400),
+    ) {
+        let _ = read_bytes(&[start, &rest].concat());
+    }
+}

@@ -1,0 +1,107 @@
+//! Loops of force over displacement of a joint, under the measured displacements.
+//!
+//! Springs and joints between the same two places act in parallel to the joint. A motion is
+//! straight between two rows; laws that depend on velocity need the time of each row.
+
+use super::law_path::{LoadPath, forces_along};
+use super::targets::{Fitted, Measured, RowStates, Target, TargetInput};
+use crate::case::study::Case;
+use crate::data::ColumnError;
+use stickslip::dimension::Dimension;
+
+/// Rows of a loop.
+#[derive(Debug)]
+pub(super) struct LoopTarget {
+    data: String,
+    joint: String,
+    predict: bool,
+    cycle: bool,
+    path: LoadPath,
+    measured: Vec<Measured>,
+}
+
+impl LoopTarget {
+    pub fn new(input: &TargetInput<'_>) -> Result<Self, ColumnError> {
+        let displacement = input.column("displacement", Dimension::LENGTH)?;
+        let forces = input.column("force", Dimension::FORCE)?;
+        let time = input.optional_column("time", Dimension::TIME)?;
+        let error = |message: String, help: &str| Err(ColumnError { message, help: help.to_owned() });
+        if let Some(time) = &time
+            && let Some(row) = time.windows(2).position(|pair| pair[0] >= pair[1])
+        {
+            let row = input.measured(row + 1, 0.0, 0.0, 1.0).row;
+            return error(format!("the time of row {row} does not rise"), "sort the rows, or remove the column `time`");
+        }
+        let model = &input.case.model;
+        let joint = model.joints.iter().find(|joint| joint.name == input.at);
+        if joint.is_some_and(|joint| joint.law.directions() > 1) {
+            let help = "a loop has one displacement; use a law of one direction";
+            return error(format!("the law of `{}` has several directions", input.at), help);
+        }
+        let deviations = input.deviations(&forces, Dimension::FORCE)?;
+        let measured =
+            (0..forces.len()).map(|i| input.measured(i, displacement[i], forces[i], deviations[i])).collect();
+        let target = LoopTarget {
+            data: input.data.name.clone(),
+            joint: input.at.to_owned(),
+            predict: input.predict,
+            cycle: input.values.flag("cycle") == Some(true),
+            path: LoadPath { displacement, time },
+            measured,
+        };
+        // a law that cannot follow a path is refused before the run
+        target
+            .fitted(input.case, &Vec::new())
+            .map(|_| target)
+            .map_err(|message| ColumnError { message, help: "add the column `time`, or use another target".to_owned() })
+    }
+}
+
+impl Target for LoopTarget {
+    fn data(&self) -> &str {
+        &self.data
+    }
+    fn abscissa(&self) -> &'static str {
+        "displacement_m"
+    }
+    fn quantities(&self) -> Vec<String> {
+        vec!["force_N".to_owned()]
+    }
+    fn measured(&self) -> &[Measured] {
+        &self.measured
+    }
+    fn is_predicted(&self) -> bool {
+        self.predict
+    }
+
+    fn fitted(&self, case: &Case, _: &RowStates) -> Result<Fitted, String> {
+        let joints = &case.model.joints;
+        let Some(own) = joints.iter().find(|joint| joint.name == self.joint) else {
+            return Err(format!("there is no joint `{}`", self.joint));
+        };
+        // an element between the same places in the other order has the opposite displacement
+        let sign = |between: &[String; 2]| match between {
+            [a, b] if [a, b] == [&own.between[0], &own.between[1]] => Some(1.0),
+            [a, b] if [b, a] == [&own.between[0], &own.between[1]] => Some(-1.0),
+            _ => None,
+        };
+        let path = if self.cycle { self.path.twice() } else { self.path.clone() };
+        let skipped = path.displacement.len() - self.path.displacement.len();
+        let mut values = vec![0.0; self.measured.len()];
+        for joint in joints {
+            let Some(sign) = sign(&joint.between) else { continue };
+            let forces = forces_along(&*joint.law, &path.scaled(sign))?;
+            values.iter_mut().zip(&forces[skipped..]).for_each(|(value, force)| *value += sign * force);
+        }
+        for spring in case.model.springs.iter().filter(|spring| sign(&spring.between).is_some()) {
+            let viscous = spring.damping != 0.0 && self.path.time.is_some();
+            for (i, value) in values.iter_mut().enumerate() {
+                *value += spring.stiffness * self.path.displacement[i];
+                if viscous {
+                    *value += spring.damping * self.path.velocity(i);
+                }
+            }
+        }
+        Ok(Fitted { values, states: Vec::new() })
+    }
+}

@@ -1,0 +1,232 @@
+//! The least-squares problem: weighted residuals over scaled parameters, and their derivatives.
+//!
+//! A scaled parameter runs from 0 to 1 over its range, by differences or by ratios. Derivatives
+//! are central differences of a fraction [`Problem::DIFFERENCE`] of the range; the orbits at both
+//! ends begin from the orbit between them.
+
+use super::targets::{Fitted, RowStates, Target};
+use crate::case::study::{Case, Study};
+use crate::case::values::FitRange;
+use crate::run::work::UnitTask;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// The residuals of a case.
+#[derive(Debug)]
+pub(super) struct Problem<'a> {
+    study: &'a Study,
+    case: &'a Case,
+    pub targets: Vec<Box<dyn Target>>,
+    pub ranges: &'a [FitRange],
+    stop: Arc<AtomicBool>,
+    evaluations: AtomicU64,
+    /// The last reason why the model had no residuals.
+    failure: Mutex<Option<String>>,
+    /// Warm starts of every target, from the last successful evaluation of the search.
+    states: Mutex<Vec<RowStates>>,
+}
+
+impl<'a> Problem<'a> {
+    /// Fraction of a range by which derivatives change a parameter. The error is of the order of
+    /// its square; orbits have errors of 1e-10.
+    pub const DIFFERENCE: f64 = 1e-5;
+
+    pub fn new(work: &'a UnitTask<'_>, targets: Vec<Box<dyn Target>>) -> Self {
+        let case = &work.case().case;
+        let states = vec![RowStates::new(); targets.len()];
+        Problem {
+            study: work.study,
+            case,
+            targets,
+            ranges: case.values.fit("fit").unwrap_or_default(),
+            stop: work.context.stop.clone(),
+            evaluations: AtomicU64::new(0),
+            failure: Mutex::new(None),
+            states: Mutex::new(states),
+        }
+    }
+
+    /// Returns the number of computed models.
+    pub fn evaluations(&self) -> u64 {
+        self.evaluations.load(Ordering::Relaxed)
+    }
+
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Returns the last reason why the model had no residuals.
+    pub fn failure(&self) -> Option<String> {
+        self.failure.lock().ok().and_then(|failure| failure.clone())
+    }
+
+    /// Returns the parameters in SI.
+    pub fn parameters(&self, x: &[f64]) -> Vec<f64> {
+        self.ranges.iter().zip(x).map(|(range, x)| range.at(*x)).collect()
+    }
+
+    /// Returns the stated values of the parameters on the scale from 0 to 1, within it.
+    pub fn stated(&self) -> Vec<f64> {
+        let stated = |range: &FitRange| {
+            let si = self.case.parameters.get(&range.name).map_or(range.from, |(si, _)| *si);
+            range.scaled(si).clamp(0.01, 0.99)
+        };
+        self.ranges.iter().map(stated).collect()
+    }
+
+    /// Computes the model in place of all measured numbers, target by target.
+    ///
+    /// # Errors
+    /// The reason why the model has no such numbers.
+    pub fn fitted(&self, x: &[f64]) -> Result<Vec<Fitted>, String> {
+        let states = self.states.lock().map_err(|_| "another computation failed".to_owned())?.clone();
+        let found = self.fitted_from(x, &states, &|_| true)?;
+        if let Ok(mut states) = self.states.lock() {
+            *states = found.iter().map(|fitted| fitted.states.clone()).collect();
+        }
+        Ok(found)
+    }
+
+    /// Computes the targets that `of` selects from given warm starts; the others are empty.
+    fn fitted_from(
+        &self,
+        x: &[f64],
+        states: &[RowStates],
+        of: &dyn Fn(&dyn Target) -> bool,
+    ) -> Result<Vec<Fitted>, String> {
+        if self.is_stopped() {
+            return Err("the run was stopped".to_owned());
+        }
+        self.evaluations.fetch_add(1, Ordering::Relaxed);
+        let values = self.parameters(x);
+        let named: Vec<(&str, f64)> = self.ranges.iter().map(|range| range.name.as_str()).zip(values).collect();
+        let computed = self.study.case_with_parameters(self.case.index, &named).map_err(|error| error.to_string());
+        let computed = computed.and_then(|case| {
+            let one = |(target, states): (&dyn Target, &RowStates)| {
+                if of(target) { target.fitted(&case, states) } else { Ok(Fitted::default()) }
+            };
+            self.targets.iter().map(|target| &**target).zip(states).map(one).collect::<Result<Vec<_>, String>>()
+        });
+        if let (Err(reason), Ok(mut failure)) = (&computed, self.failure.lock()) {
+            *failure = Some(reason.clone());
+        }
+        computed
+    }
+
+    /// Returns the residuals `(fitted - measured)/deviation` of the fitted targets.
+    pub fn residuals_of(&self, fitted: &[Fitted]) -> Vec<f64> {
+        let fitted = self.targets.iter().zip(fitted).filter(|(target, _)| !target.is_predicted());
+        fitted
+            .flat_map(|(target, fitted)| {
+                target
+                    .measured()
+                    .iter()
+                    .zip(&fitted.values)
+                    .map(|(measured, value)| (value - measured.value) / measured.deviation)
+            })
+            .collect()
+    }
+
+    /// Returns the number of residuals.
+    pub fn count(&self) -> usize {
+        self.targets.iter().filter(|target| !target.is_predicted()).map(|target| target.measured().len()).sum()
+    }
+
+    /// Returns the residuals; NaN if the model has none.
+    pub fn residuals(&self, x: &[f64]) -> Vec<f64> {
+        let fit = |target: &dyn Target| !target.is_predicted();
+        let states = self.states.lock().map(|states| states.clone()).unwrap_or_default();
+        match self.fitted_from(x, &states, &fit) {
+            Ok(found) => {
+                let residuals = self.residuals_of(&found);
+                if let Ok(mut states) = self.states.lock() {
+                    *states = found.into_iter().map(|fitted| fitted.states).collect();
+                }
+                residuals
+            }
+            Err(_) => vec![f64::NAN; self.count()],
+        }
+    }
+
+    /// Forgets the warm starts, for a search from elsewhere.
+    pub fn forget(&self) {
+        if let Ok(mut states) = self.states.lock() {
+            states.iter_mut().for_each(Vec::clear);
+        }
+    }
+
+    /// Returns the derivatives of all numbers of all targets by the scaled parameters, one column
+    /// each; of predicted targets only if `with_predicted`. NaN where the model has none.
+    pub fn derivatives(&self, x: &[f64], with_predicted: bool) -> Vec<DMatrix<f64>> {
+        let used = |target: &dyn Target| with_predicted || !target.is_predicted();
+        let before = self.states.lock().map(|states| states.clone()).unwrap_or_default();
+        let states: Vec<RowStates> = match self.fitted_from(x, &before, &used) {
+            Ok(found) => found.into_iter().map(|fitted| fitted.states).collect(),
+            Err(_) => before,
+        };
+        let column = |k: usize| -> Vec<Vec<f64>> {
+            let (mut low, mut high) = (x.to_vec(), x.to_vec());
+            low[k] = (x[k] - Self::DIFFERENCE).max(0.0);
+            high[k] = (x[k] + Self::DIFFERENCE).min(1.0);
+            let run = high[k] - low[k];
+            let ends = (self.fitted_from(&low, &states, &used), self.fitted_from(&high, &states, &used));
+            let (Ok(low), Ok(high)) = ends else {
+                return self.targets.iter().map(|target| vec![f64::NAN; target.measured().len()]).collect();
+            };
+            let slope = |(low, high): (&Fitted, &Fitted)| {
+                low.values.iter().zip(&high.values).map(|(low, high)| (high - low) / run).collect()
+            };
+            low.iter().zip(&high).map(slope).collect()
+        };
+        let columns: Vec<Vec<Vec<f64>>> = (0..x.len()).into_par_iter().map(column).collect();
+        (0..self.targets.len())
+            .map(|target| {
+                let rows = columns.first().map_or(0, |column| column[target].len());
+                DMatrix::from_fn(rows, x.len(), |row, k| columns[k][target][row])
+            })
+            .collect()
+    }
+
+    /// Returns the derivatives of the residuals by the scaled parameters.
+    pub fn jacobian(&self, x: &[f64]) -> DMatrix<f64> {
+        self.jacobian_of(&self.derivatives(x, false))
+    }
+
+    /// Returns the derivatives of the residuals from those of the numbers.
+    pub fn jacobian_of(&self, derivatives: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(self.count(), self.ranges.len());
+        let mut at = 0;
+        for (target, derivatives) in self.targets.iter().zip(derivatives).filter(|(target, _)| !target.is_predicted()) {
+            for (row, measured) in target.measured().iter().enumerate() {
+                for k in 0..self.ranges.len() {
+                    jacobian[(at, k)] = derivatives[(row, k)] / measured.deviation;
+                }
+                at += 1;
+            }
+        }
+        jacobian
+    }
+}
+
+impl FitRange {
+    /// Returns the value at a scaled parameter.
+    pub(super) fn at(&self, x: f64) -> f64 {
+        if self.is_log { self.from * (self.to / self.from).powf(x) } else { self.from + (self.to - self.from) * x }
+    }
+
+    /// Returns the scaled parameter of a value.
+    pub(super) fn scaled(&self, si: f64) -> f64 {
+        if self.is_log {
+            (si / self.from).ln() / (self.to / self.from).ln()
+        } else {
+            (si - self.from) / (self.to - self.from)
+        }
+    }
+
+    /// Returns the derivative of the value by the scaled parameter.
+    pub(super) fn slope(&self, x: f64) -> f64 {
+        if self.is_log { self.at(x) * (self.to / self.from).ln() } else { self.to - self.from }
+    }
+}

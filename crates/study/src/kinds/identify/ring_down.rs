@@ -1,0 +1,101 @@
+//! Free decays in time, from the initial state that `start` and `start_velocity` state.
+//!
+//! The first row is the initial instant. The rows have equal distances.
+
+use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
+use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, held_equilibrium, state_vector};
+use crate::case::study::Case;
+use crate::data::ColumnError;
+use stickslip::dimension::Dimension;
+use stickslip::method::WIDTH;
+use stickslip::method::time_history::{Excitation, TimeHistory};
+use stickslip_formats::data::Column;
+
+/// Rows of a free decay.
+#[derive(Debug)]
+pub(super) struct RingDown {
+    data: String,
+    place: String,
+    quantity: Quantity,
+    predict: bool,
+    step: f64,
+    measured: Vec<Measured>,
+}
+
+impl RingDown {
+    pub fn new(input: &TargetInput<'_>) -> Result<Self, ColumnError> {
+        let quantity = input.quantity;
+        let time = input.column("time", Dimension::TIME)?;
+        let response = input.column("response", quantity.dimension())?;
+        let sampling = Column { values: time.clone(), ..Column::default() }.sampling().ok_or_else(|| ColumnError {
+            message: format!("the times of `{}` do not rise in equal steps", input.data.name),
+            help: "resample the decay; a gap or a second record is a `group` of its own".to_owned(),
+        })?;
+        let deviations = input.deviations(&response, quantity.dimension())?;
+        let measured =
+            (0..time.len()).map(|i| input.measured(i, time[i] - time[0], response[i], deviations[i])).collect();
+        Ok(RingDown {
+            data: input.data.name.clone(),
+            place: input.at.to_owned(),
+            quantity,
+            predict: input.predict,
+            step: sampling.step,
+            measured,
+        })
+    }
+}
+
+impl Target for RingDown {
+    fn data(&self) -> &str {
+        &self.data
+    }
+    fn abscissa(&self) -> &'static str {
+        "time_s"
+    }
+    fn quantities(&self) -> Vec<String> {
+        vec![self.quantity.column.to_owned()]
+    }
+    fn measured(&self) -> &[Measured] {
+        &self.measured
+    }
+    fn is_predicted(&self) -> bool {
+        self.predict
+    }
+
+    fn fitted(&self, case: &Case, _: &RowStates) -> Result<Fitted, String> {
+        let system = case.model.assemble().map_err(|error| error.to_string())?;
+        let place = system.places().iter().position(|place| *place == self.place);
+        let along = place.map(|place| system.place_axes()[place].clone());
+        let along = along.ok_or_else(|| format!("there is no place `{}`", self.place))?;
+        let values = &case.values;
+        let start = values.by_name("start");
+        let begin = values.text("begin").unwrap_or(if start.is_some() { EQUILIBRIUM } else { UNLOADED });
+        let held = if begin == EQUILIBRIUM { held_equilibrium(&case.model, &system, start) } else { None };
+        let held = held.unwrap_or_else(|| Start { displacement: state_vector(&system, start), states: Vec::new() });
+        let history = TimeHistory {
+            displacement: held.displacement,
+            velocity: state_vector(&system, values.by_name("start_velocity")),
+            states: held.states,
+            excitation: Excitation::Free,
+            // half a step more, so that the last row is not lost by rounding
+            duration: self.step * (self.measured.len() as f64 - 0.5),
+            step: self.step,
+            width: case.method.options.get(WIDTH).copied(),
+        };
+        let mut fitted = Vec::with_capacity(self.measured.len());
+        let run = history.run(&system, &mut |_, _, sample| {
+            let of = match self.quantity.derivatives {
+                0 => &sample.displacement,
+                1 => &sample.velocity,
+                _ => &sample.acceleration,
+            };
+            fitted.push(along.component(of));
+            fitted.len() < self.measured.len()
+        });
+        run.map_err(|error| error.to_string())?;
+        if fitted.len() < self.measured.len() {
+            return Err(format!("the decay ends after {} of {} rows", fitted.len(), self.measured.len()));
+        }
+        Ok(Fitted { values: fitted, states: Vec::new() })
+    }
+}

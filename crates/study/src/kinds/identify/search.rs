@@ -1,0 +1,179 @@
+//! The minimization: starts from the stated values and from a Sobol sequence, and the trust
+//! region reflective method from the best of them.
+//!
+//! Source: M. A. Branch, T. F. Coleman, Y. Li (1999), by the crate `basin`.
+
+use super::problem::Problem;
+use super::statistics::Loss;
+use crate::case::sample::Design;
+use crate::case::values::Values;
+use basin::{
+    BoxBounds, CauchyLoss, ConstraintDescription, ConstraintSet, Constraints, CostFunction, DenseMatrix, Executor,
+    HuberLoss, Jacobian, LossFunction, Residual, RobustLeastSquares, SoftL1Loss, SquaredLoss, TrustRegionReflective,
+};
+use std::convert::Infallible;
+
+/// Settings of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct SearchSettings {
+    /// Starts in addition to the stated values. Default 16.
+    pub starts: usize,
+    /// Starts that are followed to a minimum, in addition to the stated values. Default 4: of 64
+    /// starts of a loop with three parameters over four decades, 47 lead to the right minimum.
+    pub followed: usize,
+    /// Largest number of steps of one minimization. Default 100.
+    pub steps: u64,
+    /// Relative decrease of the sum of squares below which a minimization ends. Default 1e-10.
+    pub tolerance: f64,
+    /// Weight of large residuals.
+    pub loss: Loss,
+}
+
+impl SearchSettings {
+    pub fn of(values: &Values) -> Self {
+        let loss = values.text("loss").and_then(|name| LOSSES.iter().find(|row| row.0 == name));
+        SearchSettings {
+            starts: values.count("starts").unwrap_or(16) as usize,
+            followed: 4,
+            steps: 100,
+            tolerance: 1e-10,
+            loss: loss.map_or(Loss::Squares, |row| row.2),
+        }
+    }
+}
+
+const LOSSES: [(&str, &str, Loss); 4] = [
+    ("squares", "sum of squares", Loss::Squares),
+    ("soft-l1", "grows linearly beyond one standard deviation, smooth", Loss::SoftL1),
+    ("huber", "squares up to one standard deviation, linear beyond", Loss::Huber),
+    ("cauchy", "grows logarithmically; outliers hardly count", Loss::Cauchy),
+];
+
+/// The values of the key `loss`.
+pub(super) fn losses() -> Vec<(&'static str, &'static str)> {
+    LOSSES.iter().map(|(name, summary, _)| (*name, *summary)).collect()
+}
+
+/// The best minimum.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found {
+    /// Scaled parameters.
+    pub x: Vec<f64>,
+    /// Loss at the minimum.
+    pub cost: f64,
+    /// Minimizations, and those that ended at this minimum.
+    pub searches: usize,
+    pub agreeing: usize,
+}
+
+/// Loss difference below which two minima are the same, relative.
+const SAME_COST: f64 = 1e-4;
+
+/// Finds the minimum with the smallest loss.
+///
+/// # Errors
+/// The model has no residuals at any start, or no minimization converged.
+pub(super) fn search(problem: &Problem<'_>, settings: &SearchSettings) -> Result<Found, String> {
+    let stated = problem.stated();
+    let dimensions = stated.len();
+    let sobol = |index: usize| -> Vec<f64> {
+        (0..dimensions).map(|k| Design::Sobol.coordinate(1, index, settings.starts, k)).collect()
+    };
+    let mut starts: Vec<(f64, Vec<f64>)> = Vec::new();
+    for x in (0..settings.starts).map(sobol) {
+        problem.forget();
+        let cost = settings.loss.sum(&problem.residuals(&x));
+        if cost.is_finite() {
+            starts.push((cost, x));
+        }
+        if problem.is_stopped() {
+            return Err("the run was stopped".to_owned());
+        }
+    }
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let chosen = std::iter::once(stated).chain(starts.into_iter().take(settings.followed).map(|(_, x)| x));
+    let mut minima: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut searches = 0;
+    for start in chosen {
+        problem.forget();
+        if !settings.loss.sum(&problem.residuals(&start)).is_finite() {
+            continue;
+        }
+        searches += 1;
+        minima.extend(minimize(problem, settings, start));
+        if problem.is_stopped() {
+            return Err("the run was stopped".to_owned());
+        }
+    }
+    let Some(best) = minima.iter().min_by(|a, b| a.0.total_cmp(&b.0)).cloned() else {
+        let reason = problem.failure().unwrap_or_else(|| "no minimization converged".to_owned());
+        return Err(format!("no parameters explain the data: {reason}"));
+    };
+    let agreeing = minima.iter().filter(|(cost, _)| cost - best.0 <= SAME_COST * best.0 + 1e-12).count();
+    Ok(Found { x: best.1, cost: best.0, searches, agreeing })
+}
+
+/// Minimizes from one start. Returns loss and scaled parameters.
+fn minimize(problem: &Problem<'_>, settings: &SearchSettings, start: Vec<f64>) -> Option<(f64, Vec<f64>)> {
+    fn run<L: LossFunction<f64>>(
+        loss: L,
+        problem: &Problem<'_>,
+        settings: &SearchSettings,
+        start: Vec<f64>,
+    ) -> Option<Vec<f64>> {
+        let bounded = Bounded { problem, lower: vec![0.0; start.len()], upper: vec![1.0; start.len()] };
+        let solver = TrustRegionReflective::new().with_relative_cost_change_tolerance(settings.tolerance);
+        let executor = Executor::from_start(RobustLeastSquares::new(bounded, loss), solver, start);
+        let result = executor.max_iter(settings.steps).run().ok()?;
+        Some(result.best_param().clone())
+    }
+    let x = match settings.loss {
+        Loss::Squares => run(SquaredLoss, problem, settings, start),
+        Loss::SoftL1 => run(SoftL1Loss, problem, settings, start),
+        Loss::Huber => run(HuberLoss, problem, settings, start),
+        Loss::Cauchy => run(CauchyLoss, problem, settings, start),
+    }?;
+    let cost = settings.loss.sum(&problem.residuals(&x));
+    cost.is_finite().then_some((cost, x))
+}
+
+/// The problem in the form of the solver.
+struct Bounded<'p, 'a> {
+    problem: &'p Problem<'a>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl Constraints for Bounded<'_, '_> {
+    type Set = ConstraintSet<BoxBounds<Vec<f64>>>;
+    fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
+        ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.lower), Some(&self.upper)))
+    }
+}
+
+impl CostFunction for Bounded<'_, '_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+    type Error = Infallible;
+    fn cost(&self, x: &Vec<f64>) -> Result<f64, Infallible> {
+        Ok(Loss::Squares.sum(&self.problem.residuals(x)))
+    }
+}
+
+impl Residual for Bounded<'_, '_> {
+    type Param = Vec<f64>;
+    type Output = Vec<f64>;
+    type Error = Infallible;
+    fn residual(&self, x: &Vec<f64>) -> Result<Vec<f64>, Infallible> {
+        Ok(self.problem.residuals(x))
+    }
+}
+
+impl Jacobian for Bounded<'_, '_> {
+    type Jacobian = DenseMatrix;
+    fn jacobian(&self, x: &Vec<f64>) -> Result<DenseMatrix, Infallible> {
+        let jacobian = self.problem.jacobian(x);
+        let rows: Vec<f64> = jacobian.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect();
+        Ok(DenseMatrix::from_row_slice(jacobian.nrows(), jacobian.ncols(), &rows))
+    }
+}

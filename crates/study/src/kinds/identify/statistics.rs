@@ -1,0 +1,369 @@
+//! Statistics at the minimum: covariance, intervals, directions that the data do not determine,
+//! and structure of the residuals.
+//!
+//! With the weighted derivatives `J` of the residuals `r` by the scaled parameters, the covariance
+//! is `s² (JᵀJ)⁻¹`, `s² = Σ r² / (n - p)`: the weights state relative sizes of the errors, and the
+//! residuals their common size. Intervals use Student's distribution. They hold for residuals
+//! without structure and a model that is nearly linear within them.
+//! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
+
+use super::problem::Problem;
+use super::search::Found;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Weight of a residual that is larger than its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Loss {
+    Squares,
+    SoftL1,
+    Huber,
+    Cauchy,
+}
+
+impl Loss {
+    /// Returns `Σ ρ(r²)/2`.
+    pub fn sum(self, residuals: &[f64]) -> f64 {
+        let one = |r: &f64| {
+            let z = r * r;
+            0.5 * match self {
+                Loss::Squares => z,
+                Loss::SoftL1 => 2.0 * ((1.0 + z).sqrt() - 1.0),
+                Loss::Huber => {
+                    if z <= 1.0 {
+                        z
+                    } else {
+                        2.0 * r.abs() - 1.0
+                    }
+                }
+                Loss::Cauchy => z.ln_1p(),
+            }
+        };
+        residuals.iter().map(one).sum()
+    }
+
+    /// Returns `ρ'(r²)`, the weight of a residual in the linearized problem.
+    fn weight(self, r: f64) -> f64 {
+        let z = r * r;
+        match self {
+            Loss::Squares => 1.0,
+            Loss::SoftL1 => 1.0 / (1.0 + z).sqrt(),
+            Loss::Huber => {
+                if z <= 1.0 {
+                    1.0
+                } else {
+                    1.0 / r.abs()
+                }
+            }
+            Loss::Cauchy => 1.0 / (1.0 + z),
+        }
+    }
+}
+
+/// What a parameter's estimate is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Estimate {
+    Determined,
+    /// At an end of its range, so that it has no standard error.
+    AtBound,
+    /// Changes along a direction that the data do not determine.
+    NotDetermined,
+}
+
+impl Estimate {
+    pub fn word(self) -> &'static str {
+        match self {
+            Estimate::Determined => "determined",
+            Estimate::AtBound => "at-bound",
+            Estimate::NotDetermined => "not-determined",
+        }
+    }
+}
+
+/// A fitted parameter in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ParameterEstimate {
+    pub value: f64,
+    pub standard_error: f64,
+    /// Ends of the 95 % interval.
+    pub low: f64,
+    pub high: f64,
+    pub estimate: Estimate,
+}
+
+/// Statistics of a minimum.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Statistics {
+    pub parameters: Vec<ParameterEstimate>,
+    pub correlations: DMatrix<f64>,
+    /// Covariance of the scaled parameters.
+    covariance: DMatrix<f64>,
+    /// Quantile of Student's distribution for a 95 % interval.
+    quantile: f64,
+    /// Number of residuals.
+    pub count: usize,
+    /// Root mean square of the residuals, in standard deviations.
+    pub rms: f64,
+    /// Correlation of residuals in neighbouring rows.
+    pub autocorrelation: f64,
+    /// Information criteria of Akaike and of Schwarz, for laws that compete over the same data.
+    pub aic: f64,
+    pub bic: f64,
+    /// Length of the remaining Gauss-Newton step, in standard errors.
+    distance: f64,
+    /// Directions that the data do not determine: changes of the scaled parameters.
+    undetermined: Vec<Vec<f64>>,
+    searches: usize,
+    agreeing: usize,
+}
+
+/// A scaled parameter closer than this to an end of its range is at the end.
+const AT_BOUND: f64 = 2e-3;
+/// A standard error of this fraction of the range makes a direction undetermined.
+const UNDETERMINED: f64 = 0.3;
+/// Smallest eigenvalue of the correlations of the derivatives that differs from zero. Derivatives
+/// have relative errors of about 1e-6.
+const SINGULAR: f64 = 1e-10;
+/// Remaining step, in standard errors, above which the minimum was not reached.
+const LARGEST_STEP: f64 = 0.5;
+/// Root mean square of residuals that are rounding, in standard deviations.
+const EXACT: f64 = 1e-5;
+
+impl Statistics {
+    pub fn new(problem: &Problem<'_>, found: &Found, loss: Loss) -> Self {
+        let (x, p) = (&found.x, found.x.len());
+        let residuals = problem.residuals(x);
+        let jacobian = problem.jacobian(x);
+        let at_bound: Vec<bool> = x.iter().map(|x| *x < AT_BOUND || *x > 1.0 - AT_BOUND).collect();
+        let free: Vec<usize> = (0..p).filter(|k| !at_bound[*k]).collect();
+        let n = residuals.len();
+        let weights: Vec<f64> = residuals.iter().map(|r| loss.weight(*r)).collect();
+        let sum: f64 = residuals.iter().zip(&weights).map(|(r, w)| w * r * r).sum();
+        let freedom = n.saturating_sub(free.len()).max(1);
+        let variance = sum / freedom as f64;
+        // normal equations with columns of unit length
+        let length = |k: usize| (0..n).map(|i| weights[i] * jacobian[(i, k)].powi(2)).sum::<f64>().sqrt();
+        let lengths: Vec<f64> = free.iter().map(|k| length(*k)).collect();
+        let unit = |a: usize, i: usize| if lengths[a] > 0.0 { jacobian[(i, free[a])] / lengths[a] } else { 0.0 };
+        let normal = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+            (0..n).map(|i| weights[i] * unit(a, i) * unit(b, i)).sum::<f64>()
+        });
+        let gradient =
+            DVector::from_fn(free.len(), |a, _| (0..n).map(|i| weights[i] * unit(a, i) * residuals[i]).sum::<f64>());
+        let eigen = SymmetricEigen::new(normal);
+        let mut covariance: DMatrix<f64> = DMatrix::zeros(p, p);
+        let mut undetermined = Vec::new();
+        let mut squared_step = 0.0;
+        for (index, value) in eigen.eigenvalues.iter().enumerate() {
+            let vector = eigen.eigenvectors.column(index);
+            // change of the scaled parameters along the eigenvector
+            let change = |a: usize| if lengths[a] > 0.0 { vector[a] / lengths[a] } else { vector[a] };
+            let size = (0..free.len()).map(|a| change(a).powi(2)).sum::<f64>().sqrt();
+            let deviation = if *value > SINGULAR { (variance / value).sqrt() * size } else { f64::INFINITY };
+            if deviation > UNDETERMINED || !lengths.iter().all(|length| *length > 0.0) && *value <= SINGULAR {
+                let mut direction = vec![0.0; p];
+                free.iter().enumerate().for_each(|(a, k)| direction[*k] = change(a) / size);
+                undetermined.push(direction);
+            }
+            if *value > SINGULAR {
+                for (a, k) in free.iter().enumerate() {
+                    for (b, l) in free.iter().enumerate() {
+                        covariance[(*k, *l)] += variance / value * change(a) * change(b);
+                    }
+                }
+                squared_step += gradient.dot(&vector).powi(2) / value;
+            }
+        }
+        let quantile = student_quantile(freedom as f64);
+        let in_undetermined = |k: usize| undetermined.iter().any(|direction: &Vec<f64>| direction[k].abs() > 0.1);
+        let estimate = |k: usize| {
+            if at_bound[k] {
+                Estimate::AtBound
+            } else if in_undetermined(k) {
+                Estimate::NotDetermined
+            } else {
+                Estimate::Determined
+            }
+        };
+        let parameters = problem.ranges.iter().enumerate().map(|(k, range)| {
+            let estimate = estimate(k);
+            let scaled_error = if estimate == Estimate::Determined { covariance[(k, k)].sqrt() } else { f64::NAN };
+            let value = range.at(x[k]);
+            let standard_error = scaled_error * range.slope(x[k]);
+            let end = |sign: f64| {
+                if range.is_log {
+                    value * (sign * quantile * standard_error / value).exp()
+                } else {
+                    value + sign * quantile * standard_error
+                }
+            };
+            ParameterEstimate { value, standard_error, low: end(-1.0), high: end(1.0), estimate }
+        });
+        let correlations = DMatrix::from_fn(p, p, |k, l| {
+            let size = (covariance[(k, k)] * covariance[(l, l)]).sqrt();
+            if size > 0.0 { covariance[(k, l)] / size } else { f64::NAN }
+        });
+        let (count, parameter_count) = (n as f64, free.len() as f64 + 1.0);
+        let likelihood = count * (sum / count).ln();
+        Statistics {
+            parameters: parameters.collect(),
+            correlations,
+            covariance,
+            quantile,
+            count: n,
+            rms: (residuals.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
+            autocorrelation: autocorrelation(problem, &residuals),
+            aic: likelihood + 2.0 * parameter_count,
+            bic: likelihood + count.ln() * parameter_count,
+            distance: (squared_step / variance / free.len().max(1) as f64).sqrt(),
+            undetermined,
+            searches: found.searches,
+            agreeing: found.agreeing,
+        }
+    }
+
+    /// Returns why the minimum was not reached, if it was not.
+    pub fn failure(&self) -> Option<String> {
+        let reached = self.rms <= EXACT || self.distance <= LARGEST_STEP;
+        (!reached).then(|| {
+            format!(
+                "the search ended {:.1} standard errors before the minimum: use more `starts`, or narrower ranges",
+                self.distance
+            )
+        })
+    }
+
+    /// Returns half the width of the 95 % band of a number with these derivatives by the scaled
+    /// parameters.
+    pub fn band(&self, derivatives: &[f64]) -> f64 {
+        let g = DVector::from_column_slice(derivatives);
+        self.quantile * (g.transpose() * &self.covariance * &g)[(0, 0)].max(0.0).sqrt()
+    }
+
+    /// Returns what a reader must know of the estimates, as sentences.
+    pub fn warnings(&self, problem: &Problem<'_>) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (range, parameter) in problem.ranges.iter().zip(&self.parameters) {
+            if parameter.estimate == Estimate::AtBound {
+                warnings.push(format!(
+                    "`{}` ended at an end of its range, so it is not an estimate; the errors of the others hold for this \
+                     value. Widen the range, or fix the parameter.",
+                    range.name
+                ));
+            }
+        }
+        warnings.extend(self.undetermined.iter().map(|direction| undetermined_text(problem, direction)));
+        let significant = 3.0 / (self.count as f64).sqrt();
+        if self.autocorrelation > significant && self.rms > EXACT {
+            warnings.push(format!(
+                "neighbouring residuals are correlated ({:.2}), so the model leaves out part of the measured behaviour; the \
+                 parameters are less certain than their standard errors.",
+                self.autocorrelation
+            ));
+        }
+        if self.agreeing == 1 && self.searches > 1 {
+            warnings.push(format!(
+                "only one of {} searches ended at this minimum; use more `starts`, or narrower ranges.",
+                self.searches
+            ));
+        }
+        warnings
+    }
+}
+
+/// Describes a direction that the data do not determine.
+fn undetermined_text(problem: &Problem<'_>, direction: &[f64]) -> String {
+    let largest = direction.iter().fold(0.0f64, |largest, change| largest.max(change.abs()));
+    let taking_part: Vec<usize> = (0..direction.len()).filter(|k| direction[*k].abs() > 0.1 * largest).collect();
+    let name = |k: &usize| format!("`{}`", problem.ranges[*k].name);
+    match taking_part.as_slice() {
+        [one] => format!("the data do not determine {}: the residuals do not depend on it.", name(one)),
+        several => {
+            let names: Vec<String> = several.iter().map(name).collect();
+            // relative changes: a step of the scaled parameter on a logarithmic scale is a ratio
+            let relative = |k: usize| {
+                let range = &problem.ranges[k];
+                if range.is_log { direction[k] * (range.to / range.from).ln() } else { direction[k] }
+            };
+            let all_log = several.iter().all(|k| problem.ranges[*k].is_log);
+            let first = relative(several[0]);
+            let changes: Vec<String> = several
+                .iter()
+                .map(|k| {
+                    let change = relative(*k) / first;
+                    let (word, unit) =
+                        (if change > 0.0 { "raised" } else { "lowered" }, if all_log { "%" } else { "% of its range" });
+                    format!("{} {word} by {:.2} {unit}", name(k), change.abs())
+                })
+                .collect();
+            format!(
+                "the data do not determine {} separately: {} changes no residual noticeably. Fix one of them, or add data.",
+                names.join(" and "),
+                changes.join(" with ")
+            )
+        }
+    }
+}
+
+/// Returns the correlation of residuals in neighbouring rows of the same group.
+fn autocorrelation(problem: &Problem<'_>, residuals: &[f64]) -> f64 {
+    let (mut products, mut squares, mut at) = (0.0, 0.0, 0);
+    for target in problem.targets.iter().filter(|target| !target.is_predicted()) {
+        let (measured, per_row) = (target.measured(), target.quantities().len());
+        for i in 0..measured.len() {
+            let here = residuals[at + i];
+            squares += here * here;
+            if i + per_row < measured.len() && measured[i].group == measured[i + per_row].group {
+                products += here * residuals[at + i + per_row];
+            }
+        }
+        at += measured.len();
+    }
+    if squares > 0.0 { products / squares } else { 0.0 }
+}
+
+/// Returns the 97.5 % quantile of Student's distribution with `nu` degrees of freedom.
+/// Source: G. W. Hill (1970), Algorithm 396: expansion about the normal quantile, to 1e-3 from five
+/// degrees of freedom on; below, the exact values.
+fn student_quantile(nu: f64) -> f64 {
+    let few = [12.706_204_736, 4.302_652_730, 3.182_446_305, 2.776_445_105];
+    if let Some(exact) = few.get(nu as usize - 1) {
+        return *exact;
+    }
+    let z = 1.959_963_984_540_054f64;
+    let (z2, z3) = (z * z, z * z * z);
+    z + (z3 + z) / (4.0 * nu)
+        + (5.0 * z3 * z2 + 16.0 * z3 + 3.0 * z) / (96.0 * nu * nu)
+        + (3.0 * z3 * z2 * z2 + 19.0 * z3 * z2 + 17.0 * z3 - 15.0 * z) / (384.0 * nu * nu * nu)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles from tables of Student's distribution.
+    #[test]
+    fn quantiles_of_students_distribution() {
+        for (nu, quantile) in [
+            (1.0, 12.7062),
+            (2.0, 4.3027),
+            (3.0, 3.1824),
+            (5.0, 2.5706),
+            (10.0, 2.2281),
+            (30.0, 2.0423),
+            (1e9, 1.95996),
+        ] {
+            assert!((student_quantile(nu) - quantile).abs() < 5e-3, "{nu} {}", student_quantile(nu));
+        }
+    }
+
+    #[test]
+    fn weights_are_derivatives_of_the_losses() {
+        for loss in [Loss::Squares, Loss::SoftL1, Loss::Huber, Loss::Cauchy] {
+            for r in [0.3, 0.9, 2.0, 7.0] {
+                let h = 1e-5;
+                let slope = (loss.sum(&[r + h]) - loss.sum(&[r - h])) / (2.0 * h);
+                assert!((slope - loss.weight(r) * r).abs() < 1e-8, "{loss:?} {r}");
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Tables of an identification.
+
+use super::problem::Problem;
+use super::search::Found;
+use super::statistics::Statistics;
+use super::targets::{Fitted, Measured, Target};
+use crate::case::values::table_unit;
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::UnitTask;
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use stickslip::dimension::Dimension;
+
+/// The fitted parameters.
+pub(super) const PARAMETERS: &str = "parameters";
+/// Measured and fitted values, row by row.
+pub(super) const FIT: &str = "fit";
+/// Quality of the fit.
+pub(super) const SUMMARY: &str = "fit_summary";
+/// Correlations of the parameters.
+pub(super) const CORRELATIONS: &str = "correlations";
+
+/// The result of a case.
+pub(super) struct Outcome<'a> {
+    pub found: &'a Found,
+    pub statistics: &'a Statistics,
+    pub fitted: &'a [Fitted],
+}
+
+/// Writes the rows of all tables of a case.
+pub(super) fn write(work: &UnitTask<'_>, problem: &Problem<'_>, outcome: &Outcome<'_>) -> Vec<TableBuilder> {
+    let case = &work.case().case;
+    let statistics = outcome.statistics;
+    let (mut parameters, mut fit) = (TableBuilder::default(), TableBuilder::default());
+    let (mut summary, mut correlations) = (TableBuilder::default(), TableBuilder::default());
+    for (range, parameter) in problem.ranges.iter().zip(&statistics.parameters) {
+        parameters.varied(case);
+        parameters.text("parameter", &range.name);
+        parameters.number("value", parameter.value);
+        parameters.number("standard_error", parameter.standard_error);
+        parameters.number("low_95", parameter.low);
+        parameters.number("high_95", parameter.high);
+        parameters.text("unit", &si_unit(range.dimension));
+        parameters.text("status", parameter.estimate.word());
+        parameters.end_row();
+    }
+    let derivatives = problem.derivatives(&outcome.found.x, true);
+    for (number, (target, fitted)) in problem.targets.iter().zip(outcome.fitted).enumerate() {
+        let (per_row, names) = (target.quantities().len(), target.quantities());
+        let rows = target.measured().chunks(per_row).zip(fitted.values.chunks(per_row));
+        for (row, (measured, values)) in rows.enumerate() {
+            let slopes =
+                |part: usize| -> Vec<f64> { derivatives[number].row(row * per_row + part).iter().copied().collect() };
+            for shown in shown_values(&**target, measured, values, &slopes) {
+                fit.varied(case);
+                fit.text("target", &format!("{} {}", number + 1, target.data()));
+                fit.text("quantity", &names[shown.part]);
+                fit.number("group", measured[0].group);
+                fit.integer("row", measured[0].row as u64);
+                fit.text("x_name", target.abscissa());
+                fit.number("x", measured[0].x);
+                fit.number("measured", shown.measured);
+                fit.number("fitted", shown.fitted);
+                let half = statistics.band(&shown.slopes);
+                fit.number("fitted_low_95", shown.fitted - half);
+                fit.number("fitted_high_95", shown.fitted + half);
+                if problem.targets.iter().any(|target| target.is_complex()) {
+                    fit.number("measured_phase_deg", shown.phases[0]);
+                    fit.number("fitted_phase_deg", shown.phases[1]);
+                }
+                fit.number("normalized_residual", shown.residual);
+                fit.text("use", if target.is_predicted() { "prediction" } else { "fit" });
+                fit.end_row();
+            }
+        }
+    }
+    summary.varied(case);
+    summary.integer("residuals", statistics.count as u64);
+    summary.integer("parameters", problem.ranges.len() as u64);
+    summary.number("rms_residual", statistics.rms);
+    summary.number("autocorrelation", statistics.autocorrelation);
+    summary.number("aic", statistics.aic);
+    summary.number("bic", statistics.bic);
+    summary.integer("searches", outcome.found.searches as u64);
+    summary.integer("agreeing", outcome.found.agreeing as u64);
+    summary.integer("evaluations", problem.evaluations());
+    summary.end_row();
+    for (k, first) in problem.ranges.iter().enumerate() {
+        for (l, second) in problem.ranges.iter().enumerate() {
+            correlations.varied(case);
+            correlations.text("parameter", &first.name);
+            correlations.text("with", &second.name);
+            correlations.number("correlation", correlation(&statistics.correlations, k, l));
+            correlations.end_row();
+        }
+    }
+    vec![parameters, fit, summary, correlations]
+}
+
+fn correlation(correlations: &DMatrix<f64>, k: usize, l: usize) -> f64 {
+    if k == l { 1.0 } else { correlations[(k, l)] }
+}
+
+/// Returns the SI unit of a dimension, in which the table states values.
+fn si_unit(dimension: Option<Dimension>) -> String {
+    match dimension {
+        Some(Dimension::FREQUENCY) => "rad/s".to_owned(),
+        Some(Dimension::ANGLE) => "rad".to_owned(),
+        Some(Dimension::SWEEP_RATE) => "rad/s^2".to_owned(),
+        Some(other) => table_unit(other).map_or_else(String::new, |(_, unit)| unit),
+        None => String::new(),
+    }
+}
+
+/// A number as the table shows it: of a complex number the magnitude, with the phase beside it.
+struct ShownValue {
+    part: usize,
+    measured: f64,
+    fitted: f64,
+    slopes: Vec<f64>,
+    /// Measured and fitted phase, degrees.
+    phases: [f64; 2],
+    residual: f64,
+}
+
+fn shown_values(
+    target: &dyn Target,
+    measured: &[Measured],
+    values: &[f64],
+    slopes: &dyn Fn(usize) -> Vec<f64>,
+) -> Vec<ShownValue> {
+    let residual = |part: usize| (values[part] - measured[part].value) / measured[part].deviation;
+    if !target.is_complex() {
+        let one = |part: usize| ShownValue {
+            part,
+            measured: measured[part].value,
+            fitted: values[part],
+            slopes: slopes(part),
+            phases: [f64::NAN; 2],
+            residual: residual(part),
+        };
+        return (0..values.len()).map(one).collect();
+    }
+    let number = |re: f64, im: f64| Complex64::new(re, im);
+    let (found, given) = (number(values[0], values[1]), number(measured[0].value, measured[1].value));
+    let size = found.norm().max(f64::MIN_POSITIVE);
+    let slopes = slopes(0).iter().zip(slopes(1)).map(|(re, im)| (found.re * re + found.im * im) / size).collect();
+    vec![ShownValue {
+        part: 0,
+        measured: given.norm(),
+        fitted: found.norm(),
+        slopes,
+        phases: [given.arg().to_degrees(), found.arg().to_degrees()],
+        residual: residual(0).hypot(residual(1)),
+    }]
+}
+
+/// Returns sentences about the targets that were predicted: the largest value and its place, group
+/// by group, and the typical deviation.
+pub(super) fn predictions(problem: &Problem<'_>, fitted: &[Fitted]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for (target, fitted) in problem.targets.iter().zip(fitted).filter(|(target, _)| target.is_predicted()) {
+        let per_row = target.quantities().len();
+        let shown: Vec<(Measured, f64, f64)> = target
+            .measured()
+            .chunks(per_row)
+            .zip(fitted.values.chunks(per_row))
+            .flat_map(|(measured, values)| {
+                let one = shown_values(&**target, measured, values, &|_| Vec::new());
+                one.into_iter().take(1).map(|shown| (measured[0], shown.measured, shown.fitted)).collect::<Vec<_>>()
+            })
+            .collect();
+        for group in shown.chunk_by(|a, b| a.0.group == b.0.group) {
+            let highest = |of: &dyn Fn(&(Measured, f64, f64)) -> f64| {
+                group.iter().max_by(|a, b| of(a).abs().total_cmp(&of(b).abs())).map(|row| (of(row), row.0.x))
+            };
+            let (Some(measured), Some(predicted)) = (highest(&|row| row.1), highest(&|row| row.2)) else { continue };
+            let squares: f64 = group.iter().map(|row| (row.2 - row.1).powi(2)).sum();
+            let rms = (squares / group.len() as f64).sqrt() / measured.0.abs();
+            sentences.push(format!(
+                "prediction of `{}`, group {}: largest value {:.6} instead of {:.6} ({:+.2} %), at {} {:.6} instead of {:.6} \
+                 ({:+.3} %); the rows deviate by {:.2} % of the largest value.",
+                target.data(),
+                group[0].0.group,
+                predicted.0,
+                measured.0,
+                100.0 * (predicted.0 / measured.0 - 1.0),
+                target.abscissa(),
+                predicted.1,
+                measured.1,
+                100.0 * (predicted.1 / measured.1 - 1.0),
+                100.0 * rms
+            ));
+        }
+    }
+    sentences
+}

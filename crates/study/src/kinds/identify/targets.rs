@@ -1,0 +1,289 @@
+//! Targets: measured rows, and the values that the model has in their place.
+
+use super::backbone::Backbone;
+use super::loops::LoopTarget;
+use super::response::ResponseTarget;
+use super::ring_down::RingDown;
+use super::weight::Weight;
+use crate::case::names::ModelNames;
+use crate::case::study::{Case, Study};
+use crate::case::values::Values;
+use crate::data::{ColumnError, DataTable};
+use crate::kinds::info::KeyError;
+use crate::syntax::suggest::{alternatives, excerpt};
+use num_complex::Complex64;
+use std::fmt::Debug;
+use stickslip::dimension::Dimension;
+use stickslip::method::{self, Method};
+use stickslip::model::Model;
+use stickslip::orbit::Seed;
+
+/// Warm starts of the rows of a target: the seeds of their orbits.
+pub(super) type RowStates = Vec<Option<Seed>>;
+
+/// What the model has in place of the measured numbers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Fitted {
+    /// One number for each of [`Target::measured`].
+    pub values: Vec<f64>,
+    /// Warm starts for the same rows at similar parameters.
+    pub states: RowStates,
+}
+
+/// A measured number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    /// Number of the row of the data, from 1.
+    pub row: usize,
+    /// Value of the column `group`.
+    pub group: f64,
+    /// Value of [`Target::abscissa`], in its unit.
+    pub x: f64,
+    pub value: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+}
+
+/// Measured rows, and the model in their place.
+pub(super) trait Target: Debug + Send + Sync {
+    /// Returns the name of the data.
+    fn data(&self) -> &str;
+    /// Returns the column name of the abscissa, with its unit at the end.
+    fn abscissa(&self) -> &'static str;
+    /// Returns the column name of the measured quantity, with its unit at the end. If several
+    /// numbers belong to a row, there is one name for each of them.
+    fn quantities(&self) -> Vec<String>;
+    /// Returns the measured numbers, all numbers of a row one after the other.
+    fn measured(&self) -> &[Measured];
+    /// Returns whether the numbers of a row are real and imaginary part.
+    fn is_complex(&self) -> bool {
+        false
+    }
+    /// Returns whether the rows are predicted only, not fitted.
+    fn is_predicted(&self) -> bool;
+    /// Computes the numbers of the model.
+    ///
+    /// # Errors
+    /// The reason why the model has no such numbers.
+    fn fitted(&self, case: &Case, starts: &RowStates) -> Result<Fitted, String>;
+}
+
+/// The values of the key `is`.
+pub(super) fn kinds() -> Vec<(&'static str, &'static str)> {
+    vec![
+        (
+            "response",
+            "frequency response: the columns `frequency`, `response` (amplitude) and `phase`, or `response_real` and \
+             `response_imaginary`, and the measured `force` of each row",
+        ),
+        ("loop", "loops of a joint: the columns `displacement` and `force`, for laws with velocity also `time`"),
+        ("ring-down", "free decay: the columns `time` and `response`"),
+        ("backbone", "frequency over amplitude: the columns `amplitude`, `frequency` and `damping`"),
+    ]
+}
+
+/// The values of the keys `quantity` and `phase_of`.
+pub(super) fn quantities() -> Vec<(&'static str, &'static str)> {
+    QUANTITIES.iter().map(|quantity| (quantity.name, quantity.summary)).collect()
+}
+
+/// A quantity of a place: a time derivative of its displacement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Quantity {
+    pub name: &'static str,
+    summary: &'static str,
+    /// Number of time derivatives.
+    pub derivatives: i32,
+    /// Column name with the unit.
+    pub column: &'static str,
+}
+
+const QUANTITIES: [Quantity; 3] = [
+    Quantity { name: "displacement", summary: "displacement", derivatives: 0, column: "displacement_m" },
+    Quantity { name: "velocity", summary: "velocity", derivatives: 1, column: "velocity_m_per_s" },
+    Quantity { name: "acceleration", summary: "acceleration", derivatives: 2, column: "acceleration_m_per_s2" },
+];
+
+impl Quantity {
+    fn of(values: &Values, key: &str) -> Option<Quantity> {
+        let name = values.text(key)?;
+        QUANTITIES.into_iter().find(|quantity| quantity.name == name)
+    }
+
+    pub fn dimension(self) -> Dimension {
+        Dimension { kg: 0, m: 1, s: -self.derivatives as i8, rad: 0 }
+    }
+
+    /// Returns the factor `(jω)^n` from the displacement.
+    pub fn displacement_factor(self, omega: f64) -> Complex64 {
+        Complex64::new(0.0, omega).powi(self.derivatives)
+    }
+}
+
+/// A target that cannot be used.
+#[derive(Debug)]
+pub(super) struct TargetError {
+    /// Number of the target, from 1.
+    pub number: usize,
+    pub message: String,
+    pub help: String,
+}
+
+/// What all kinds of targets have in common, with the data in SI.
+#[derive(Debug)]
+pub(super) struct TargetInput<'a> {
+    pub data: &'a DataTable,
+    pub values: &'a Values,
+    pub case: &'a Case,
+    pub at: &'a str,
+    pub quantity: Quantity,
+    pub phase_of: Quantity,
+    pub predict: bool,
+    /// Numbers of the rows in `groups`, from 0, and their groups.
+    rows: Vec<usize>,
+    groups: Vec<f64>,
+}
+
+impl TargetInput<'_> {
+    /// Returns the numbers of a column in the rows of the target.
+    pub fn column(&self, role: &str, dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
+        let all = self.data.values(role, dimension)?;
+        let missing = self.rows.iter().find(|row| !all.get(**row).is_some_and(|value| value.is_finite()));
+        if let Some(row) = missing {
+            let message = format!("row {} of `{}` has no number in the column `{role}`", row + 1, self.data.name);
+            return Err(ColumnError { message, help: "remove the row, or state `groups` without it".to_owned() });
+        }
+        Ok(self.rows.iter().map(|row| all[*row]).collect())
+    }
+
+    /// Returns a column if the data have it.
+    pub fn optional_column(&self, role: &str, dimension: Dimension) -> Result<Option<Vec<f64>>, ColumnError> {
+        if self.data.has(role) { self.column(role, dimension).map(Some) } else { Ok(None) }
+    }
+
+    /// Returns the standard deviations of values with these magnitudes, group by group.
+    pub fn deviations(&self, magnitudes: &[f64], dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
+        let text = self.values.text("weight").unwrap_or("1 % of largest");
+        let weight = Weight::read(text, dimension).map_err(|message| ColumnError {
+            message,
+            help: "write `relative 2 %`, `1 % of largest`, or a quantity with its unit".to_owned(),
+        })?;
+        let mut all = vec![0.0; magnitudes.len()];
+        for group in self.distinct_groups() {
+            let own: Vec<usize> = (0..magnitudes.len()).filter(|i| self.groups[*i] == group).collect();
+            let values: Vec<f64> = own.iter().map(|i| magnitudes[*i]).collect();
+            own.iter().zip(weight.deviations(&values)).for_each(|(i, deviation)| all[*i] = deviation);
+        }
+        Ok(all)
+    }
+
+    fn distinct_groups(&self) -> Vec<f64> {
+        let mut groups: Vec<f64> = self.groups.clone();
+        groups.sort_by(f64::total_cmp);
+        groups.dedup();
+        groups
+    }
+
+    /// Returns a measured number of row `i` of the target.
+    pub fn measured(&self, i: usize, x: f64, value: f64, deviation: f64) -> Measured {
+        Measured { row: self.rows[i] + 1, group: self.groups[i], x, value, deviation }
+    }
+
+    pub fn group(&self, i: usize) -> f64 {
+        self.groups[i]
+    }
+}
+
+/// Returns the number of measured rows of a study, for its size.
+pub(super) fn rows(study: &Study, values: &Values) -> usize {
+    let data = |target: &Values| {
+        let name = target.text("data")?;
+        study.data.iter().find(|data| data.name == name).map(DataTable::rows)
+    };
+    values.tables("targets").unwrap_or_default().iter().filter_map(data).sum()
+}
+
+/// Checks the names in a target.
+pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(), KeyError> {
+    let at = target.text("at").unwrap_or_default();
+    match target.text("is") {
+        Some("loop") => {
+            let joints: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
+            if !joints.contains(&at) {
+                return Err(KeyError::unknown_name("targets", "joint", at, &joints));
+            }
+        }
+        Some(kind) => {
+            ModelNames::places(model).single_label("targets", "place", at)?;
+            let moves = ["start", "start_velocity"].iter().any(|key| values.by_name(key).is_some());
+            if kind == "ring-down" && !moves {
+                let help = "add start = { tip = \"1 mm\" }, a parameter that is fitted too if it was not measured";
+                return Err(KeyError::new("start", "a ring-down needs an initial displacement or velocity", help));
+            }
+        }
+        None => {}
+    }
+    Ok(())
+}
+
+/// Builds the targets of a case. Without data, as in stored results, there are none.
+pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, TargetError> {
+    let stated = case.values.tables("targets").unwrap_or_default();
+    if study.data.iter().any(|data| !data.is_read()) {
+        return Ok(Vec::new());
+    }
+    let mut targets = Vec::new();
+    for (i, values) in stated.iter().enumerate() {
+        let error = |ColumnError { message, help }| TargetError { number: i + 1, message, help };
+        targets.push(build_one(study, case, values).map_err(error)?);
+    }
+    if targets.iter().all(|target| target.is_predicted()) {
+        let message = "no rows are fitted: every target has predict = true".to_owned();
+        return Err(TargetError { number: 1, message, help: "remove `predict` from one target".to_owned() });
+    }
+    Ok(targets)
+}
+
+fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Target>, ColumnError> {
+    let name = values.text("data").unwrap_or_default();
+    let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
+        let known: Vec<&str> = study.data.iter().map(|data| data.name.as_str()).collect();
+        let help = match known.as_slice() {
+            [] => "add [[data]] with `name` and `file`".to_owned(),
+            known => format!("the tables are {}", alternatives(known.iter().copied())),
+        };
+        ColumnError { message: format!("there is no [[data]] `{}`", excerpt(name)), help }
+    })?;
+    let all = if data.has("group") { data.plain_values("group")? } else { vec![0.0; data.rows()] };
+    let wanted = values.quantities("groups");
+    let rows: Vec<usize> =
+        (0..all.len()).filter(|row| wanted.is_none_or(|wanted| wanted.contains(&all[*row]))).collect();
+    if rows.is_empty() {
+        let message = format!("no row of `{name}` is in `groups`");
+        return Err(ColumnError { message, help: "state values of the column `group`".to_owned() });
+    }
+    let quantity = Quantity::of(values, "quantity").unwrap_or(QUANTITIES[0]);
+    let input = TargetInput {
+        data,
+        values,
+        case,
+        at: values.text("at").unwrap_or_default(),
+        quantity,
+        phase_of: Quantity::of(values, "phase_of").unwrap_or(quantity),
+        predict: values.flag("predict") == Some(true),
+        groups: rows.iter().map(|row| all[*row]).collect(),
+        rows,
+    };
+    Ok(match values.text("is").unwrap_or_default() {
+        "loop" => Box::new(LoopTarget::new(&input)?),
+        "ring-down" => Box::new(RingDown::new(&input)?),
+        "backbone" => Box::new(Backbone::new(&input)?),
+        _ => Box::new(ResponseTarget::new(&input)?),
+    })
+}
+
+/// Returns the method of a case.
+pub(super) fn method_of(case: &Case) -> Result<Box<dyn Method>, String> {
+    let row = method::find(&case.method.name).ok_or_else(|| format!("there is no method `{}`", case.method.name))?;
+    (row.build)(&case.method.options).map_err(|error| error.to_string())
+}

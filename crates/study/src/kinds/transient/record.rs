@@ -1,0 +1,223 @@
+//! Forces and motions from records: `data` in `[[force]]` and `[[motion]]`.
+//!
+//! A record is linear between its rows and zero outside of them. The motion is computed from row
+//! to row. Within an interval of length `h`, the linear part is
+//! `t = (3/2 sin ωt - 3/10 sin 2ωt + 1/30 sin 3ωt)/ω` with `ωh = 0.05`. The next term of the
+//! series is `(ωt)⁶/140`, so the relative error is 1e-10, and every integration takes it as an
+//! excitation of three harmonics.
+//!
+//! An acceleration of the ground acts as `-m a` on every mass, and displacements are those
+//! relative to the ground.
+
+use crate::case::study::{Case, Study};
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::data::ColumnError;
+use num_complex::Complex64;
+use std::sync::Arc;
+use stickslip::dimension::Dimension;
+use stickslip::method::time_history::DrivenInterval;
+use stickslip::model::{ExcitationSum, Force, GROUND, Model, Motion, System};
+
+/// Factors of `sin kωt` in the series of `ωt`.
+const SERIES: [f64; 3] = [1.5, -0.3, 1.0 / 30.0];
+
+/// Phase of the slow harmonics at the end of an interval, rad.
+const PHASE: f64 = 0.05;
+
+/// m/s².
+const ACCELERATION: Dimension = Dimension { kg: 0, m: 1, s: -2, rad: 0 };
+
+/// A column over time.
+#[derive(Debug, Clone)]
+struct Channel {
+    /// Harmonic of its unit excitation in [`Records::unit`].
+    harmonic: u32,
+    times: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Channel {
+    /// Returns the value at `begin` and the slope in the interval that begins there. `inside` is a
+    /// time shortly after the beginning, which rounding may shift before a row.
+    fn at(&self, begin: f64, inside: f64) -> (f64, f64) {
+        let above = self.times.partition_point(|row| *row <= inside);
+        if above == 0 || above == self.times.len() {
+            return (0.0, 0.0);
+        }
+        let (t0, t1) = (self.times[above - 1], self.times[above]);
+        let slope = (self.values[above] - self.values[above - 1]) / (t1 - t0);
+        (self.values[above - 1] + slope * (begin - t0), slope)
+    }
+}
+
+/// The records of a case.
+#[derive(Debug)]
+pub(super) struct Records {
+    /// The system under the constant forces, and a unit excitation of its own harmonic for every
+    /// channel.
+    unit: System,
+    channels: Vec<Channel>,
+    /// Times of all rows, rising.
+    knots: Vec<f64>,
+    /// True if the ground moves, so that displacements are relative to it.
+    pub ground_moves: bool,
+}
+
+/// A problem of a record: the list, the number of its entry, and the key.
+pub(in crate::kinds) struct RecordError {
+    pub list: &'static str,
+    pub index: usize,
+    pub key: &'static str,
+    pub error: ColumnError,
+}
+
+/// Returns the text of a key.
+fn text<'t>(table: &'t CompiledTable, key: &str) -> Option<&'t str> {
+    match &table.entry(key)?.value {
+        CompiledValue::Fixed(ResolvedValue::Text(text)) => Some(text),
+        _ => None,
+    }
+}
+
+impl Records {
+    /// Collects the records of a study; `None` if it has none, or if its data were not read.
+    pub fn new(study: &Study, case: &Case) -> Result<Option<Records>, RecordError> {
+        let lists = [("force", &study.structure.lists.force), ("motion", &study.structure.lists.motion)];
+        let mut model = case.model.clone();
+        let (mut channels, mut ground_moves): (Vec<Channel>, bool) = (Vec::new(), false);
+        for (list, tables) in lists {
+            for (index, table) in tables.iter().enumerate() {
+                let Some(name) = text(table, "data") else { continue };
+                let fail = |key: &'static str, error: ColumnError| RecordError { list, index, key, error };
+                let error =
+                    |key, message: String, help: &str| fail(key, ColumnError { message, help: help.to_owned() });
+                let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
+                    error("data", format!("there is no [[data]] `{name}`"), "add [[data]] with this name and `file`")
+                })?;
+                if !data.is_read() {
+                    return Ok(None);
+                }
+                // the records use the harmonics themselves
+                let forced = case.model.forces.iter().any(|force| force.harmonic > 0 && force.amplitude != 0.0);
+                let moved = case.model.motions.iter().any(|motion| motion.harmonic > 0 && motion.amplitude != 0.0);
+                if forced || moved {
+                    let help = "write all forces as records, or only constant ones (harmonic = 0) beside them";
+                    return Err(error("data", "a record and a harmonic force exclude each other".to_owned(), help));
+                }
+                let on = text(table, "on").unwrap_or_default().to_owned();
+                let harmonic = channels.len() as u32 + 1;
+                let on_ground = list == "motion" && on == GROUND;
+                ground_moves |= on_ground;
+                let (dimension, role) = match (list, on_ground, model.is_rotation(&on)) {
+                    ("force", _, false) => (Dimension::FORCE, "force"),
+                    ("force", _, true) => (Dimension::ENERGY, "force"),
+                    (_, true, _) => (ACCELERATION, "acceleration"),
+                    (_, _, false) => (Dimension::LENGTH, "displacement"),
+                    (_, _, true) => (Dimension::ANGLE, "displacement"),
+                };
+                let times = data.values("time", Dimension::TIME).map_err(|cause| fail("data", cause))?;
+                let values = data.values(text(table, "column").unwrap_or(role), dimension);
+                let values = values.map_err(|cause| fail("column", cause))?;
+                let finite = times.len() == values.len() && times.iter().chain(&values).all(|value| value.is_finite());
+                if !finite || times.len() < 2 || times.windows(2).any(|pair| pair[0] >= pair[1]) {
+                    let message =
+                        format!("the record `{name}` needs two rows or more with rising times and without gaps");
+                    return Err(error("data", message, "remove incomplete rows and sort the others by time"));
+                }
+                if on_ground {
+                    push_inertia(&mut model, text(table, "along"), harmonic).map_err(|cause| fail("on", cause))?;
+                } else if list == "force" {
+                    model.forces.push(Force { on, amplitude: 1.0, phase: 0.0, harmonic });
+                } else {
+                    model.motions.push(Motion { on, amplitude: 1.0, phase: 0.0, harmonic });
+                }
+                channels.push(Channel { harmonic, times, values });
+            }
+        }
+        if channels.is_empty() {
+            return Ok(None);
+        }
+        let unit = model.assemble().map_err(|cause| RecordError {
+            list: "force",
+            index: 0,
+            key: "data",
+            error: ColumnError { message: cause.to_string(), help: "check the places of the records".to_owned() },
+        })?;
+        let mut knots: Vec<f64> = channels.iter().flat_map(|channel| channel.times.iter().copied()).collect();
+        knots.push(0.0);
+        knots.retain(|time| *time >= 0.0);
+        knots.sort_by(f64::total_cmp);
+        knots.dedup();
+        Ok(Some(Records { unit, channels, knots, ground_moves }))
+    }
+
+    /// Returns the time of the last row, s.
+    pub fn end(&self) -> f64 {
+        self.knots.last().copied().unwrap_or(0.0)
+    }
+
+    /// Returns the excitation in the interval that begins at `begin`; `rest` is the length of the
+    /// interval after the last row.
+    pub fn interval(&self, begin: f64, rest: f64) -> DrivenInterval {
+        // the beginning of an interval is a row, to rounding
+        let tolerance = 1e-9 * self.end();
+        let next = self.knots.partition_point(|knot| *knot <= begin + tolerance);
+        let length = self.knots.get(next).map_or(rest, |knot| knot - begin);
+        let omega = PHASE / length;
+        let mut constant = vec![(0, Complex64::new(1.0, 0.0))];
+        let mut slow = vec![Vec::new(); SERIES.len()];
+        for channel in &self.channels {
+            let (value, slope) = channel.at(begin, begin + tolerance);
+            constant.push((channel.harmonic, Complex64::new(value, 0.0)));
+            // a sin ωt is the real part of -j a e^(jωt)
+            for (sum, factor) in slow.iter_mut().zip(SERIES) {
+                sum.push((channel.harmonic, Complex64::new(0.0, -factor * slope / omega)));
+            }
+        }
+        let mut sums = vec![ExcitationSum { harmonic: 0, of: constant }];
+        let slow = slow.into_iter().zip(1..).map(|(of, harmonic)| ExcitationSum { harmonic, of });
+        sums.extend(slow.filter(|_| next < self.knots.len()));
+        let system = Arc::new(self.unit.with_excitation_sums(&sums));
+        let omega = if next < self.knots.len() { omega } else { 0.0 };
+        DrivenInterval { system, omega, reported: 0.0, length }
+    }
+}
+
+/// Checks the records of a case.
+pub(in crate::kinds) fn check(study: &Study, case: &Case) -> Result<(), RecordError> {
+    Records::new(study, case).map(drop)
+}
+
+/// Adds the inertia forces `-m a` of a unit acceleration of the ground.
+fn push_inertia(model: &mut Model, along: Option<&str>, harmonic: u32) -> Result<(), ColumnError> {
+    let error = |message: &str, help: &str| ColumnError { message: message.to_owned(), help: help.to_owned() };
+    if model.substructure.is_some() || model.ring.is_some() {
+        let help = "state a model of masses and bodies, or a motion of the places that the ground moves";
+        return Err(error("an acceleration of the ground needs a model of masses or bodies", help));
+    }
+    let nodes = model
+        .masses
+        .iter()
+        .map(|mass| (&mass.name, mass.mass, &mass.directions))
+        .chain(model.bodies.iter().map(|body| (&body.name, body.mass, &body.directions)));
+    let mut forces = Vec::new();
+    for (name, mass, directions) in nodes {
+        let on = match (along, directions.as_slice()) {
+            (None, []) => name.clone(),
+            (Some(along), directions) if directions.iter().any(|own| own == along) => format!("{name}.{along}"),
+            (Some(_), []) | (None, _) => {
+                let help = "add `along` with a direction of the masses, or remove it if the masses have no directions";
+                return Err(error("the direction of the acceleration does not fit the masses", help));
+            }
+            // the mass cannot move in this direction
+            (Some(_), _) => continue,
+        };
+        forces.push(Force { on, amplitude: -mass, phase: 0.0, harmonic });
+    }
+    if forces.is_empty() {
+        return Err(error("no mass can move in this direction", "choose another direction in `along`"));
+    }
+    model.forces.extend(forces);
+    Ok(())
+}

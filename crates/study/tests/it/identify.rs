@@ -1,0 +1,317 @@
+//! Identification from made data: known parameters come back, with errors that hold, and what the
+//! data do not determine is said.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use stickslip_study::dataset::{Dataset, Table};
+use stickslip_study::results::fitted_study;
+use stickslip_study::run::{Context, run};
+use stickslip_study::{read_file, read_study};
+
+/// Normally distributed numbers: the sum of twelve uniform ones of a linear congruential generator
+/// (Knuth, MMIX).
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// Writes data and study into a folder and runs the study.
+fn identify(data: &str, study: &str) -> Dataset {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("data.csv"), data).expect("the data");
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, study).expect("the study");
+    let study = read_file(&file, &[]).unwrap_or_else(|error| panic!("{error}"));
+    run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn table<'d>(dataset: &'d Dataset, name: &str) -> &'d Table {
+    let found = dataset.tables.iter().find(|table| table.name == name);
+    found.unwrap_or_else(|| panic!("no {name}: {:?} {:?}", dataset.failures, dataset.notes))
+}
+
+/// A fitted parameter: value, standard error, ends of the interval, status.
+struct Estimate {
+    value: f64,
+    error: f64,
+    low: f64,
+    high: f64,
+    status: String,
+}
+
+fn estimate(dataset: &Dataset, name: &str) -> Estimate {
+    let table = table(dataset, "parameters");
+    let row = table.texts("parameter").expect("names").iter().position(|own| own == name).expect(name);
+    let number = |column: &str| table.numbers(column).expect(column)[row];
+    let status = table.texts("status").expect("the status")[row].clone();
+    Estimate {
+        value: number("value"),
+        error: number("standard_error"),
+        low: number("low_95"),
+        high: number("high_95"),
+        status,
+    }
+}
+
+/// Force of a spring beside a Jenkins element under displacements of growing amplitude.
+fn loops(spring: f64, stiffness: f64, limit: f64, largest: f64) -> Vec<(f64, f64)> {
+    let (mut held, mut before) = (0.0f64, 0.0);
+    (1..=300)
+        .map(|i| {
+            let t = f64::from(i) / 100.0;
+            let u = largest * (0.4 + 0.2 * t) * (TAU * t).sin();
+            held = (held + stiffness * (u - before)).clamp(-limit, limit);
+            before = u;
+            (u, held + spring * u)
+        })
+        .collect()
+}
+
+fn csv(head: &str, rows: impl IntoIterator<Item = Vec<f64>>) -> String {
+    let mut text = format!("{head}\n");
+    for row in rows {
+        let _ = writeln!(text, "{}", row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+    }
+    text
+}
+
+/// A study of a loop, whose start is a factor of ten away from the truth.
+fn loop_study(extra: &str) -> String {
+    format!(
+        "schema = 1\n[[data]]\nname = \"rig\"\nfile = \"data.csv\"\n\
+         [parameters]\nkt = \"1e5 N/m\"   # a comment stays\nFt = \"0.2 N\"\nk = \"1e2 N/m\"\n\
+         [[mass]]\nname = \"slider\"\nmass = \"1 kg\"\n\
+         [[spring]]\nbetween = [\"slider\", \"ground\"]\nstiffness = \"k\"\n\
+         [[joint]]\nname = \"pad\"\nbetween = [\"slider\", \"ground\"]\nlaw = {{ kind = \"jenkins\", stiffness = \"kt\", limit = \"Ft\" }}\n\
+         [study]\nkind = \"identify\"\n\
+         fit.kt = {{ from = \"1e2 N/m\", to = \"1e6 N/m\", scale = \"log\" }}\n\
+         fit.Ft = {{ from = \"0.02 N\", to = \"200 N\", scale = \"log\" }}\n\
+         fit.k = {{ from = \"10 N/m\", to = \"1e5 N/m\", scale = \"log\" }}\n\
+         targets = [{{ data = \"rig\", is = \"loop\", at = \"pad\"{extra} }}]\n"
+    )
+}
+
+#[test]
+fn a_loop_gives_its_parameters_and_a_study_file() {
+    let mut noise = Noise(7);
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f + 0.02 * noise.normal()]);
+    let dataset = identify(&csv("displacement_m,force_N", rows), &loop_study(", weight = \"0.02 N\""));
+    for (name, truth) in [("kt", 1e4), ("Ft", 2.0), ("k", 1e3)] {
+        let found = estimate(&dataset, name);
+        assert_eq!(found.status, "determined");
+        assert!((found.value - truth).abs() < 4.0 * found.error, "{name}: {} ± {}", found.value, found.error);
+        assert!(found.error < 0.01 * truth && found.low < found.value && found.value < found.high, "{name}");
+    }
+    let summary = table(&dataset, "fit_summary");
+    let rms = summary.numbers("rms_residual").expect("the residual")[0];
+    assert!((rms - 1.0).abs() < 0.15, "{rms}");
+    assert!(summary.numbers("autocorrelation").expect("a number")[0].abs() < 0.2);
+    // the band of the fitted loop is far narrower than the noise
+    let fit = table(&dataset, "fit");
+    let width =
+        fit.numbers("fitted_high_95").expect("the band")[100] - fit.numbers("fitted_low_95").expect("the band")[100];
+    assert!(width > 0.0 && width < 0.02, "{width}");
+    let text = fitted_study(&dataset).expect("a study file");
+    assert!(text.contains("N/m\"   # a comment stays"), "{text}");
+    assert_eq!(dataset.figure.panels.len(), 1);
+}
+
+/// A coefficient of friction and a normal load act only by their product.
+#[test]
+fn undetermined_parameters_are_named() {
+    let mut noise = Noise(3);
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f + 0.02 * noise.normal()]);
+    let study = loop_study("").replace("Ft = \"0.2 N\"", "Ft = \"mu*N0\"\nmu = 0.1\nN0 = \"5 N\"").replace(
+        "fit.Ft = { from = \"0.02 N\", to = \"200 N\", scale = \"log\" }",
+        "fit.mu = { from = 0.001, to = 10, scale = \"log\" }\nfit.N0 = { from = \"0.1 N\", to = \"1 kN\", scale = \"log\" }",
+    );
+    let dataset = identify(&csv("displacement_m,force_N", rows), &study);
+    for name in ["mu", "N0"] {
+        let found = estimate(&dataset, name);
+        assert!(
+            found.status == "not-determined" && found.error.is_nan(),
+            "{name}: {} {:?}",
+            found.status,
+            dataset.notes
+        );
+    }
+    assert!((estimate(&dataset, "mu").value * estimate(&dataset, "N0").value - 2.0).abs() < 0.02);
+    assert!(
+        (estimate(&dataset, "kt").value / 1e4 - 1.0).abs() < 0.02 && estimate(&dataset, "kt").status == "determined"
+    );
+    let notes = dataset.notes.join("\n");
+    assert!(notes.contains("do not determine `mu` and `N0` separately"), "{notes}");
+    assert!(notes.contains("`mu` raised by 1.00 % with `N0` lowered by 1.00 %"), "{notes}");
+}
+
+/// The 95 % intervals contain the true value in 95 % of the cases.
+#[test]
+fn intervals_contain_the_truth() {
+    let mut noise = Noise(11);
+    let (mut inside, mut all) = (0, 0);
+    for _ in 0..120 {
+        let kt = 1e4 * 10f64.powf(noise.uniform() - 0.5);
+        let limit = kt * 1e-4 * (1.0 + 3.0 * noise.uniform());
+        let k = kt * (0.05 + 0.3 * noise.uniform());
+        let rows = loops(k, kt, limit, 1e-3);
+        let largest = rows.iter().fold(0.0f64, |most, row| most.max(row.1));
+        let rows = rows.into_iter().map(|(u, f)| vec![u, f + 0.05 * largest * noise.normal()]).collect::<Vec<_>>();
+        let dataset = identify(&csv("displacement_m,force_N", rows), &loop_study(""));
+        for (name, truth) in [("kt", kt), ("Ft", limit), ("k", k)] {
+            let found = estimate(&dataset, name);
+            all += 1;
+            inside += usize::from(found.low <= truth && truth <= found.high);
+        }
+    }
+    let share = inside as f64 / f64::from(all);
+    // 360 intervals: 95 % with a standard deviation of 1.1 %
+    assert!((0.92..=0.98).contains(&share), "{share}");
+}
+
+/// Study of an oscillator with one fitted spring and damper.
+fn oscillator(targets: &str, more: &str) -> String {
+    format!(
+        "schema = 1\n[[data]]\nname = \"test\"\nfile = \"data.csv\"\n\
+         [parameters]\nk = \"1e3 N/m\"\nc = \"0.1 kg/s\"\nx0 = \"1 mm\"\n\
+         [[mass]]\nname = \"m\"\nmass = \"2 kg\"\n\
+         [[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"k\"\ndamping = \"c\"\n{more}\
+         [study]\nkind = \"identify\"\n{targets}\n"
+    )
+}
+
+const FORCE: &str = "[[force]]\non = \"m\"\namplitude = \"1 N\"\nphase = \"30 deg\"\n";
+const FIT: &str = "fit.k = { from = \"1e2 N/m\", to = \"1e6 N/m\", scale = \"log\" }\n\
+    fit.c = { from = \"1e-2 kg/s\", to = \"1e3 kg/s\", scale = \"log\" }\n";
+
+/// Each row has its own force; the phase is that of the displacement, the amplitude that of the
+/// acceleration.
+#[test]
+fn a_response_with_the_force_of_each_row() {
+    let (m, k, c): (f64, f64, f64) = (2.0, 2e4, 3.0);
+    let rows = (0..60).map(|i| {
+        let f = 10.0 + 0.2 * f64::from(i);
+        let (omega, force) = (TAU * f, 1.0 + 0.5 * f64::from(i % 7));
+        let (re, im) = (k - omega * omega * m, omega * c);
+        let displacement = force / re.hypot(im);
+        vec![f, force, omega * omega * displacement, (-im).atan2(re)]
+    });
+    let targets = format!(
+        "{FIT}targets = [{{ data = \"test\", is = \"response\", at = \"m\", quantity = \"acceleration\", phase_of = \
+         \"displacement\", weight = \"relative 1 %\" }}]"
+    );
+    let dataset =
+        identify(&csv("frequency_Hz,force_N,response_m_per_s2,phase_rad", rows), &oscillator(&targets, FORCE));
+    for (name, truth) in [("k", k), ("c", c)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < 1e-6, "{name}: {}", found.value);
+    }
+}
+
+#[test]
+fn a_ring_down_with_an_unknown_start() {
+    let (m, k, c, x0): (f64, f64, f64, f64) = (2.0, 2e4, 3.0, 2.5e-3);
+    let (decay, omega) = (c / (2.0 * m), (k / m - (c / (2.0 * m)).powi(2)).sqrt());
+    let rows = (0..400).map(|i| {
+        let t = 2e-3 * f64::from(i);
+        vec![3.0 + t, x0 * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin())]
+    });
+    let targets = format!(
+        "{FIT}fit.x0 = {{ from = \"0.1 mm\", to = \"10 mm\" }}\nstart = {{ m = \"x0\" }}\n\
+         targets = [{{ data = \"test\", is = \"ring-down\", at = \"m\" }}]"
+    );
+    let dataset = identify(&csv("time_s,response_m", rows), &oscillator(&targets, ""));
+    for (name, truth) in [("k", k), ("c", c), ("x0", x0)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < 1e-5, "{name}: {}", found.value);
+    }
+}
+
+/// Backbone of a hardening spring: `ω² = k/m + 3/4 b a²/m` to first order.
+#[test]
+fn a_backbone_of_a_hardening_spring() {
+    let (m, k, b): (f64, f64, f64) = (2.0, 2e4, 3e7);
+    let rows = (0..15).map(|i| {
+        let a = 1e-4 * 10f64.powf(f64::from(i) / 20.0);
+        let omega2 = k / m + 0.75 * b * a * a / m;
+        vec![a, omega2.sqrt() / TAU]
+    });
+    let joint =
+        "[[joint]]\nname = \"hard\"\nbetween = [\"m\", \"ground\"]\nlaw = { kind = \"cubic\", stiffness = \"b\" }\n";
+    let targets = "fit.k = { from = \"1e3 N/m\", to = \"1e6 N/m\", scale = \"log\" }\n\
+        fit.b = { from = \"1e5 N/m^3\", to = \"1e9 N/m^3\", scale = \"log\" }\n\
+        targets = [{ data = \"test\", is = \"backbone\", at = \"m\", weight = \"relative 0.01 %\" }]";
+    let study = oscillator(targets, joint).replace("x0 = \"1 mm\"", "b = \"1e6 N/m^3\"");
+    let dataset = identify(&csv("amplitude_m,frequency_Hz", rows), &study);
+    for (name, truth, tolerance) in [("k", k, 1e-5), ("b", b, 1e-2)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < tolerance, "{name}: {}", found.value);
+    }
+}
+
+#[test]
+fn a_bound_is_no_estimate() {
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f]);
+    let study = loop_study("").replace("from = \"10 N/m\", to = \"1e5 N/m\"", "from = \"10 N/m\", to = \"500 N/m\"");
+    let dataset = identify(&csv("displacement_m,force_N", rows), &study);
+    let found = estimate(&dataset, "k");
+    assert!(found.status == "at-bound" && found.error.is_nan() && found.low.is_nan(), "{}", found.status);
+    assert!(dataset.notes.iter().any(|note| note.contains("end of its range")), "{:?}", dataset.notes);
+}
+
+#[test]
+fn rows_that_are_predicted_are_not_fitted() {
+    let rows =
+        loops(1e3, 1e4, 2.0, 1e-3).into_iter().enumerate().map(|(i, (u, f))| vec![u, f, f64::from(u8::from(i >= 200))]);
+    let study = loop_study(", groups = 0")
+        .replace("targets = [", "targets = [{ data = \"rig\", is = \"loop\", at = \"pad\", predict = true }, ");
+    let dataset = identify(&csv("displacement_m,force_N,group", rows), &study);
+    assert_eq!(
+        table(&dataset, "fit_summary")
+            .columns
+            .iter()
+            .find(|column| column.name == "residuals")
+            .map(|column| column.values.len()),
+        Some(1)
+    );
+    assert!(dataset.notes.iter().any(|note| note.starts_with("prediction of `rig`, group 1")), "{:?}", dataset.notes);
+}
+
+#[test]
+fn wrong_targets_are_refused_before_the_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |text: &str| std::fs::write(folder.path().join("data.csv"), text).expect("the data");
+    write("displacement_m,force_N\n0,0\n1,1\n0.5,0\n");
+    let refused = |study: &str| {
+        let name = folder.path().join("study.toml").display().to_string();
+        read_study(&name, study, &[]).map(|_| ()).expect_err(study)
+    };
+    let study = loop_study("");
+    for (from, to, part, help) in [
+        ("data = \"rig\"", "data = \"rigg\"", "no [[data]] `rigg`", "rig"),
+        ("at = \"pad\"", "at = \"pat\"", "no joint `pat`", "pad"),
+        ("data.csv", "date.csv", "date.csv", "path"),
+        ("is = \"loop\", at = \"pad\"", "is = \"response\", at = \"slider\"", "frequency", "columns"),
+        ("is = \"loop\"", "is = \"response\"", "no place `pad`", ""),
+        ("to = \"1e6 N/m\"", "to = \"1 N/m\"", "more than `from`", ""),
+        ("fit.kt", "fit.kk", "no parameter `kk` to fit", "kt"),
+        ("from = \"0.02 N\"", "from = \"0 N\"", "logarithmic", ""),
+        ("from = \"0.02 N\"", "from = \"0.02 m\"", "force", ""),
+        ("is = \"loop\"", "is = \"loop\", weight = \"1 mm\"", "`weight` must be", "relative"),
+        ("name = \"rig\"", "name = \"rig\"\ncolumns = { force = \"F\" }", "no column `F`", "force_N"),
+    ] {
+        let error = refused(&study.replacen(from, to, 1));
+        let said = format!("{error} {}", error.help_text().unwrap_or_default());
+        assert!(said.contains(part) && said.contains(help), "{to}: {said}");
+    }
+    write("displacement_m,force_N\n0,0\n1,1\n0.5,\n");
+    let said = refused(&study).to_string();
+    assert!(said.contains("row 3 of `rig` has no number"), "{said}");
+}

@@ -1,0 +1,150 @@
+//! Forces and motions from records, against closed forms.
+
+use std::fmt::Write;
+use stickslip_study::dataset::Dataset;
+use stickslip_study::run::{Context, run};
+use stickslip_study::{read_file, read_study};
+
+fn try_run(record: &str, study: &str) -> Result<Dataset, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("record.csv"), record).expect("the record");
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, format!("schema = 1\n[[data]]\nname = \"record\"\nfile = \"record.csv\"\n{study}"))
+        .expect("the study");
+    let study = read_file(&file, &[]).map_err(|error| format!("{error} {}", error.help_text().unwrap_or_default()))?;
+    run(&study, &Context::without_progress(1)).map_err(|error| error.to_string())
+}
+
+fn motion(record: &str, study: &str, column: &str) -> Vec<(f64, f64)> {
+    let dataset = try_run(record, study).unwrap_or_else(|error| panic!("{error}"));
+    let table = dataset.tables.iter().find(|table| table.name == "motion").expect("the motion");
+    let (time, values) = (table.numbers("time_s").expect("time"), table.numbers(column).expect(column));
+    time.iter().copied().zip(values.iter().copied()).collect()
+}
+
+const TRANSIENT: &str = "[study]\nkind = \"transient\"\nduration = \"2 s\"\ntime_step = \"10 ms\"\n";
+
+/// A mass under a rising force slides from `t0 = F/a` on: `x = a (t - t0)³/(6 m)`.
+#[test]
+fn a_free_mass_slides_under_a_ramp() {
+    let (m, limit, a): (f64, f64, f64) = (3.0, 1.5, 4.0);
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"{m} kg\"\n[[joint]]\nname = \"j\"\nbetween = [\"m\", \"ground\"]\n\
+         law = {{ kind = \"coulomb\", limit = \"{limit} N\" }}\n[[force]]\non = \"m\"\ndata = \"record\"\n{TRANSIENT}"
+    );
+    // rows that do not fall on the samples
+    let rows = [0.0, 0.137, 0.42, 0.9, 1.331, 2.5].iter().fold("time_s,force_N\n".to_owned(), |mut text, t| {
+        let _ = writeln!(text, "{t},{}", a * t);
+        text
+    });
+    let t0 = limit / a;
+    let mut worst = 0.0f64;
+    for (t, x) in motion(&rows, &study, "m_displacement_m") {
+        let expected = if t > t0 { a * (t - t0).powi(3) / (6.0 * m) } else { 0.0 };
+        worst = worst.max((x - expected).abs());
+    }
+    // the largest displacement is 0.95 m
+    assert!(worst < 1e-8, "{worst}");
+}
+
+/// A damped oscillator under a triangle of force: the sum of three ramp responses.
+#[test]
+fn an_oscillator_follows_a_triangle() {
+    let (m, k, c): (f64, f64, f64) = (2.0, 300.0, 4.0);
+    let (omega0, decay) = (f64::sqrt(k / m), c / (2.0 * m));
+    let omega = (omega0 * omega0 - decay * decay).sqrt();
+    // response to the force t from t = 0 on
+    let ramp = |t: f64| {
+        if t <= 0.0 {
+            return 0.0;
+        }
+        let lag = 2.0 * decay / (omega0 * omega0);
+        let (a, b) = (lag, (decay * lag - 1.0) / omega);
+        (t - lag + (-decay * t).exp() * (a * (omega * t).cos() + b * (omega * t).sin())) / k
+    };
+    let force = |t: f64| 20.0 * (ramp(t - 0.1) - 2.0 * ramp(t - 0.55) + ramp(t - 1.0));
+    let body = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"{m} kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"{k} N/m\"\n\
+         damping = \"{c} N s/m\"\n"
+    );
+    let study = format!("{body}[[force]]\non = \"m\"\ndata = \"record\"\n{TRANSIENT}");
+    let rows = "time_s,force_N\n0,0\n0.1,0\n0.55,9\n1,0\n1.2,0\n";
+    let found = motion(rows, &study, "m_displacement_m");
+    let worst = found.iter().map(|(t, x)| (x - force(*t)).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-9 * 0.03, "{worst}");
+    // the ground moves with the acceleration -F/m
+    let ground = format!("{body}[[motion]]\non = \"ground\"\ndata = \"record\"\n{TRANSIENT}");
+    let rows = "time_s,acceleration_m_per_s2\n0,0\n0.1,0\n0.55,-4.5\n1,0\n1.2,0\n";
+    let relative = motion(rows, &ground, "m_displacement_m");
+    for ((_, x), (_, y)) in found.iter().zip(&relative) {
+        assert!((x - y).abs() < 1e-12, "{x} {y}");
+    }
+}
+
+/// A mass on a belt sticks until the spring pulls with the slip limit, and then oscillates about
+/// `F/k` with the velocity of the belt as amplitude.
+#[test]
+fn a_belt_carries_a_mass_until_it_slips() {
+    let (m, k, limit, v): (f64, f64, f64, f64) = (1.0, 100.0, 2.0, 0.05);
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"{m} kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"{k} N/m\"\n\
+         [[motion]]\non = \"belt\"\ndata = \"record\"\n[[joint]]\nname = \"j\"\nbetween = [\"m\", \"belt\"]\n\
+         law = {{ kind = \"coulomb\", limit = \"{limit} N\" }}\n\
+         [study]\nkind = \"transient\"\nduration = \"0.9 s\"\ntime_step = \"10 ms\"\nstart_velocity = {{ m = \"{v} m/s\" }}\n"
+    );
+    let rows = format!("time_s,displacement_m\n0,0\n0.3,{}\n5,{}\n", 0.3 * v, 5.0 * v);
+    let (omega, slip) = (f64::sqrt(k / m), limit / k / v);
+    for (t, x) in motion(&rows, &study, "m_displacement_m") {
+        let expected = if t < slip { v * t } else { limit / k + v / omega * (omega * (t - slip)).sin() };
+        assert!((x - expected).abs() < 1e-9, "{t}: {x} {expected}");
+    }
+}
+
+/// Largest displacement of the continuous logarithmic run-up: 0.1676827 m at 41.507 s (DOP853 of
+/// SciPy). Cycles of constant frequency differ by a few 1e-4.
+#[test]
+fn a_logarithmic_run_up() {
+    let study = "schema = 1\n[[mass]]\nname = \"block\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"block\", \"ground\"]\n\
+        stiffness = \"800 N/m\"\ndamping = \"3 N s/m\"\n[[force]]\non = \"block\"\namplitude = \"12 N\"\n\
+        [study]\nkind = \"transient\"\nrun_up = { from = \"0.5 Hz\", to = \"8 Hz\", duration = \"60 s\", scale = \"log\" }\n";
+    let study = read_study("run_up.toml", study, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let dataset = run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"));
+    let table = dataset.tables.iter().find(|table| table.name == "motion_summary").expect("the summary");
+    let largest = table.numbers("largest_displacement_m").expect("a number")[0];
+    let time = table.numbers("time_s").expect("a number")[0];
+    assert!((largest / 0.1676827 - 1.0).abs() < 1e-3 && (time - 41.507).abs() < 0.2, "{largest} {time}");
+}
+
+#[test]
+fn wrong_records_are_refused() {
+    let rows = "time_s,force_N\n0,0\n1,1\n";
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"1 N/m\"\n\
+         [[force]]\non = \"m\"\ndata = \"record\"\n{TRANSIENT}"
+    );
+    assert!(try_run(rows, &study).is_ok());
+    for (from, to, part) in [
+        ("data = \"record\"", "data = \"recrd\"", "no [[data]] `recrd`"),
+        ("data = \"record\"", "data = \"record\"\namplitude = \"1 N\"", "exclude each other"),
+        ("data = \"record\"", "", "`amplitude` is missing in force 1"),
+        ("data = \"record\"", "data = \"record\"\ncolumn = \"force_kN\"", "no column `force_kN`"),
+        ("duration = \"2 s\"", "duration = \"2 s\"\nfrequency = \"1 Hz\"", "exclude each other"),
+        ("[study]", "[[force]]\non = \"m\"\namplitude = \"1 N\"\n[study]", "exclude each other"),
+        (
+            "kind = \"transient\"\nduration = \"2 s\"\ntime_step = \"10 ms\"",
+            "kind = \"response\"\nfrequency = \"1 Hz\"",
+            "transient",
+        ),
+    ] {
+        let error = try_run(rows, &study.replacen(from, to, 1)).expect_err(to);
+        assert!(error.contains(part), "{to}: {error}");
+    }
+    for rows in [
+        "time_s,force_N\n0,0\n0,1\n",
+        "time_s,force_N\n0,0\n",
+        "time_s,force_m\n0,0\n1,1\n",
+        "time_s,force_N\n0,0\n1,\n2,1\n",
+    ] {
+        assert!(try_run(rows, &study).is_err(), "{rows}");
+    }
+}
