@@ -14,6 +14,7 @@ mod campbell;
 pub mod hysteresis;
 pub(crate) mod info;
 pub(crate) mod kind;
+mod map;
 mod modes;
 mod nodal_diameter;
 mod orbit;
@@ -35,6 +36,7 @@ pub const TABLE: &[Kind] = &[
     response::KIND,
     transient::KIND,
     performance::KIND,
+    map::KIND,
     modes::KIND,
     branch::KIND,
     nodal_diameter::KIND,
