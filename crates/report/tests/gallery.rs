@@ -205,8 +205,7 @@ fn the_best_slip_force_is_that_of_the_closed_form() {
 #[test]
 fn the_map_is_lowest_at_the_closed_form_for_every_stiffness() {
     let found = dataset("damper_map", &text("damper_map"));
-    let [limits, stiffnesses, peaks] =
-        ["Ft_N", "kt_N_per_m", "amplitude_m"].map(|name| column(&found, "map", name));
+    let [limits, stiffnesses, peaks] = ["Ft_N", "kt_N_per_m", "amplitude_m"].map(|name| column(&found, "map", name));
     let rows = 9;
     for row in 0..rows {
         let cells = (row..peaks.len()).step_by(rows);

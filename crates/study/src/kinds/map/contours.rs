@@ -51,7 +51,7 @@ impl Grid {
         let crossing = |i: usize| {
             let (a, b) = (corners[i], corners[(i + 1) % 4]);
             let part = (level - a.value) / (b.value - a.value);
-            ((a.value >= level) != (b.value >= level)).then(|| [a.x + part * (b.x - a.x), a.y + part * (b.y - a.y)])
+            ((a.value >= level) != (b.value >= level)).then_some([a.x + part * (b.x - a.x), a.y + part * (b.y - a.y)])
         };
         let crossings: Vec<[f64; 2]> = (0..4).filter_map(crossing).collect();
         match crossings[..] {
