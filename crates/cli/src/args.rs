@@ -152,6 +152,22 @@ pub enum Command {
         #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
         set: Vec<(String, String)>,
     },
+    /// Explore a study in the browser: move its parameters and see the curves follow
+    Explore {
+        /// Study file, or name of a template; default: a page with the templates and the study
+        /// files of this folder
+        #[arg(value_name = "STUDY")]
+        study: Option<String>,
+        /// Port of 127.0.0.1; default: a free one
+        #[arg(long, default_value_t = 0, hide_default_value = true)]
+        port: u16,
+        /// Print the address and do not open the browser
+        #[arg(long)]
+        no_open: bool,
+        /// Number of threads; default: all cores
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
+    },
     /// Create a study file from a template
     New {
         /// Name of the template (see `stickslip list templates`)

@@ -1,4 +1,4 @@
-//! Opens a file in the browser, or in the program that the desktop uses for it.
+//! Opens a file or an address in the browser, or in the program that the desktop uses for it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -19,6 +19,20 @@ pub fn figure(files: &[PathBuf]) -> Option<&Path> {
 /// # Errors
 /// A text, if there is no desktop or no suitable program.
 pub fn show(file: &Path) -> Result<(), String> {
+    // An absolute path that starts with a dash is not read as an option.
+    let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+    open(&path, &file.display().to_string())
+}
+
+/// Asks the desktop to open an address in the browser.
+///
+/// # Errors
+/// A text, if there is no desktop or no browser.
+pub fn show_address(address: &str) -> Result<(), String> {
+    open(Path::new(address), address)
+}
+
+fn open(target: &Path, name: &str) -> Result<(), String> {
     let (program, arguments): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])
     } else if cfg!(windows) {
@@ -26,11 +40,9 @@ pub fn show(file: &Path) -> Result<(), String> {
     } else {
         ("xdg-open", &[])
     };
-    // An absolute path that starts with a dash is not read as an option.
-    let path = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
     let mut command = Command::new(program);
-    command.args(arguments).arg(path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    let said = |reason: String| format!("cannot open {}: {reason}; open it manually", file.display());
+    command.args(arguments).arg(target).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let said = |reason: String| format!("cannot open {name}: {reason}; open it manually");
     let mut child = command.spawn().map_err(|error| said(format!("{program}: {error}")))?;
     // A program that fails ends soon. A successful one may run as long as the browser.
     let until = std::time::Instant::now() + FAILURE_TIMEOUT;

@@ -10,6 +10,7 @@ macro_rules! complain {
 mod args;
 mod browser;
 mod exit_status;
+mod explore;
 mod inspect;
 mod inspect_data;
 mod list;
@@ -73,6 +74,10 @@ fn main() -> ExitCode {
         }
         Command::Inspect { files, format } => inspect::inspect(&files, format.as_deref()),
         Command::Reduce { file, out, set } => reduce::reduce(&file, &set, &out),
+        Command::Explore { study, port, no_open, threads } => {
+            let open = if no_open { explore::OpenBrowser::No } else { explore::OpenBrowser::Yes };
+            explore::explore(study.as_deref(), &explore::ExploreOptions { port, open, threads })
+        }
         Command::New { template, file } => new(&template, file.as_deref()),
         Command::List { what } => print(&list::text(what)),
         Command::Schema => match serde_json::to_string_pretty(&stickslip_study::schema::json_schema()) {

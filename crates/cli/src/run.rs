@@ -170,7 +170,7 @@ pub fn run(request: &Request<'_>, destination: &Destination, options: &RunOption
         complain!("error: --watch needs files, not standard input");
         return Exit::WrongInput;
     }
-    let threads = match pool(destination) {
+    let threads = match pool(destination.threads) {
         Ok(threads) => threads,
         Err(exit) => return exit,
     };
@@ -477,7 +477,7 @@ pub fn paper(destination: &Destination, open: bool) -> Exit {
     if let Err(error) = check_writable(&destination.out) {
         return Exit::Failed(error.to_string());
     }
-    let threads = match pool(destination) {
+    let threads = match pool(destination.threads) {
         Ok(threads) => threads,
         Err(exit) => return exit,
     };
@@ -508,9 +508,9 @@ pub fn paper(destination: &Destination, open: bool) -> Exit {
 }
 
 /// Creates the thread pool and returns its number of threads.
-fn pool(destination: &Destination) -> Result<usize, Exit> {
+pub(crate) fn pool(threads: Option<u16>) -> Result<usize, Exit> {
     let mut builder = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = destination.threads {
+    if let Some(threads) = threads {
         builder = builder.num_threads(usize::from(threads));
     }
     builder.build_global().map_err(|error| Exit::Failed(format!("cannot create threads: {error}")))?;

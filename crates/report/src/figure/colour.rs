@@ -69,6 +69,12 @@ impl Colour {
         Colour::pair(["#777777", "#9a9a9a"])
     }
 
+    /// Colour of contour lines, which is that of the page. Every colour of the sequential scale
+    /// contrasts with it.
+    pub(crate) fn background() -> Colour {
+        Colour::pair(["#ffffff", "#16181d"])
+    }
+
     /// Returns the colour at a relative position of the sequential scale, from 0 to 1.
     pub(crate) fn sequential(part: f64) -> Colour {
         let steps = (SCALE.len() - 1) as f64;

@@ -129,10 +129,17 @@ impl ColourScheme {
     pub(crate) fn colour(&self, series: &Series) -> Colour {
         match (&self.bar, series.value) {
             _ if series.emphasis == Emphasis::Reference => Colour::reference(),
+            _ if series.emphasis == Emphasis::Contour => Colour::background(),
             (Some((_, range)), Some(value)) if value.is_finite() => Colour::sequential(range.fraction(value)),
             _ => Colour::palette(series.colour),
         }
     }
+}
+
+/// Returns the lower and the upper edge of a stripe.
+pub(crate) fn stripe_edges(series: &Series) -> Option<[f64; 2]> {
+    let y = *series.y.first()?;
+    Some(series.base.first().map_or([y - 0.5, y + 0.5], |low| [*low, y]))
 }
 
 /// Cell of a stripe.
@@ -167,14 +174,17 @@ pub(crate) fn cells(series: &Series, x: AxisRange, scheme: &ColourScheme) -> Vec
 
 /// Returns the borders of the cells of ascending points.
 ///
-/// The first and last borders are at the first and last points. A single point occupies the
-/// whole axis.
+/// The first and last borders are at the first and last points. On a logarithmic axis the other
+/// borders are geometric means. A single point occupies the whole axis.
 pub(crate) fn edges(points: &[f64], x: AxisRange) -> Vec<f64> {
     match points {
         [] => Vec::new(),
         [_] => vec![x.from, x.to],
         [first, .., last] => {
-            let between = points.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+            let between = points.windows(2).map(|pair| match x.scale {
+                Scale::Linear => 0.5 * (pair[0] + pair[1]),
+                Scale::Log => (pair[0] * pair[1]).sqrt(),
+            });
             std::iter::once(*first).chain(between).chain([*last]).collect()
         }
     }
@@ -332,7 +342,8 @@ fn extent(panel: &Panel) -> Option<(AxisRange, AxisRange)> {
     let values = |reference: bool| {
         let shown = panel.series.iter().filter(|series| series.style != Style::Missing);
         shown.filter(move |s| s.emphasis.is_reference() == reference).flat_map(move |series| {
-            let area = matches!(series.style, Style::Band | Style::Bars);
+            let tiles = series.style == Style::Stripe && !series.base.is_empty();
+            let area = tiles || matches!(series.style, Style::Band | Style::Bars);
             points(panel, series)
                 .enumerate()
                 .filter(|(_, p)| drawable(p.0, p.1))

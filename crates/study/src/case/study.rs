@@ -5,12 +5,14 @@ use crate::case::model_builder::{build_model, refuse_without_disk};
 use crate::case::sample::{DrawnParameter, SampleSettings};
 use crate::case::stress_stiffening::StiffnessExports;
 use crate::case::substructure;
-use crate::case::values::{Frequencies, ResolvedValue, Values, in_table_unit, quantity_json, range_point, table_unit};
+use crate::case::values::{
+    Frequencies, ResolvedValue, Values, in_table_unit, log_range_point, quantity_json, range_point, table_unit,
+};
 use crate::check::overstiff::{overstiff_element, too_slow, too_soft};
 use crate::check::{figure, memory_limit};
 use crate::compile::bare_numbers::literal_unit;
 use crate::compile::compiled::{
-    CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, check_range,
+    CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, RangeScale, check_positive, check_range,
 };
 use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
@@ -83,7 +85,7 @@ pub(crate) struct ReplacedParameter {
 #[derive(Debug, Clone)]
 pub(crate) enum ParameterValues {
     List(Vec<CompiledQuantity>),
-    Range { from: CompiledQuantity, to: CompiledQuantity, points: usize },
+    Range { from: CompiledQuantity, to: CompiledQuantity, points: usize, scale: RangeScale },
     Drawn(DrawnParameter),
 }
 
@@ -326,6 +328,16 @@ impl Study {
     /// nothing is varied.
     pub(crate) fn values_per_curve(&self) -> usize {
         self.vary_parameters().next_back().map_or(1, |varied| varied.points.len())
+    }
+
+    /// Returns the number of values of every varied parameter, in the order of
+    /// [`Study::varied`], and their spacing if they are a range.
+    pub(crate) fn value_counts(&self) -> Vec<(usize, Option<RangeScale>)> {
+        let scale = |points: &ParameterValues| match points {
+            ParameterValues::Range { scale, .. } => Some(*scale),
+            ParameterValues::List(_) | ParameterValues::Drawn(_) => None,
+        };
+        self.varied.iter().map(|varied| (varied.points.len(), scale(&varied.points))).collect()
     }
 
     /// Returns the varied parameters of a case without its model; `None` if there is no such
@@ -831,14 +843,21 @@ pub(crate) fn evaluate(
             None => parameter.quantity.parameter_value(name, dimension, &environment)?,
             Some((ParameterValues::List(list), point)) => list[point].parameter_value(name, dimension, &environment)?,
             Some((ParameterValues::Drawn(drawn), point)) => drawn.value(name, dimension, point, &environment)?,
-            Some((ParameterValues::Range { from, to, points }, point)) => {
+            Some((ParameterValues::Range { from, to, points, scale }, point)) => {
                 let start = from.value("from", &environment)?;
                 let end = to.value("to", &environment)?;
                 let dimension = dimension.or(start.dimension).or(end.dimension);
                 let start = from.convert_parameter(start, name, dimension, &environment)?;
                 let end = to.convert_parameter(end, name, dimension, &environment)?;
                 check_range(start.si, end.si, to, dimension)?;
-                ExpressionValue { si: range_point(start.si, end.si, dimension, point, *points), ..start }
+                let si = match scale {
+                    RangeScale::Linear => range_point(start.si, end.si, dimension, point, *points),
+                    RangeScale::Log => {
+                        check_positive(start.si, from, dimension)?;
+                        log_range_point([start.si, end.si], point, *points)
+                    }
+                };
+                ExpressionValue { si, ..start }
             }
         };
         environment.values[index] = match fixed.iter().rfind(|(parameter, _)| *parameter == index) {

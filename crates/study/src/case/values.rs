@@ -214,6 +214,19 @@ pub(crate) fn range_point(from: f64, to: f64, dimension: Option<Dimension>, inde
     }
 }
 
+/// Returns point `index` of `points` points with equal ratios between two positive ends (SI).
+///
+/// Both ends are exact. The points between are rounded to six significant digits, which a user
+/// can type. `libm` gives the same values on every machine.
+pub(crate) fn log_range_point([from, to]: [f64; 2], index: usize, points: usize) -> f64 {
+    if index == 0 || index + 1 >= points {
+        return if index == 0 { from } else { to };
+    }
+    let part = index as f64 / (points - 1) as f64;
+    let value = from * libm::exp(part * libm::log(to / from));
+    format!("{value:.5e}").parse().unwrap_or(value).clamp(from, to)
+}
+
 /// One resolved value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ResolvedValue {

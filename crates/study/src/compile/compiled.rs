@@ -433,6 +433,24 @@ fn law(
     row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
 }
 
+/// The spacing of the values of a range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RangeScale {
+    /// Equal differences.
+    Linear,
+    /// Equal ratios.
+    Log,
+}
+
+/// Checks that a logarithmic range begins above zero.
+pub(crate) fn check_positive(from: f64, start: &CompiledQuantity, dimension: Option<Dimension>) -> Result<(), Problem> {
+    if from > 0.0 {
+        return Ok(());
+    }
+    let message = format!("a logarithmic range begins above zero, found {}", quantity_text(from, dimension));
+    Err(start.problem("from", message).help("use a positive value, or remove `scale`"))
+}
+
 /// Refuses a range whose end is not above its start.
 pub(crate) fn check_range(
     from: f64,

@@ -15,6 +15,7 @@ pub mod hysteresis;
 mod identify;
 pub(crate) mod info;
 pub(crate) mod kind;
+mod map;
 mod modes;
 mod nodal_diameter;
 mod orbit;
@@ -37,6 +38,7 @@ pub const TABLE: &[Kind] = &[
     response::KIND,
     transient::KIND,
     performance::KIND,
+    map::KIND,
     modes::KIND,
     branch::KIND,
     nodal_diameter::KIND,

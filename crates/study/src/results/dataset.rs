@@ -399,8 +399,8 @@ pub struct Series {
     /// colour scale and a colour bar in place of legend entries; `colour` is then ignored.
     #[serde(default)]
     pub value: Option<f64>,
-    /// Lower edge of a band or foot of a bar, in the unit of the axis. If empty: zero, or the
-    /// lower end of the axis.
+    /// Lower edge of a band, foot of a bar or lower edge of tiles, in the unit of the axis. If
+    /// empty: zero, or the lower end of the axis; a stripe then has the height one.
     #[serde(default)]
     pub base: Vec<f64>,
     /// For a stripe: the value at every point, in the unit of [`Figure::varied`].
@@ -438,6 +438,12 @@ impl Series {
         let y = vec![y; x.len()];
         Series { style: Style::Stripe, shades, ..Series::line("", x, y, 0) }
     }
+    /// Returns tiles between two heights, coloured along ascending `x` by the scale of
+    /// [`Figure::varied`]: a row of a heat map.
+    pub fn tiles(x: Vec<f64>, [low, high]: [f64; 2], shades: Vec<f64>) -> Series {
+        let base = vec![low; x.len()];
+        Series { base, ..Series::stripe(x, high, shades) }
+    }
     /// Makes the curve pale: one of many in the background of a main curve.
     pub fn pale(self) -> Series {
         Series { emphasis: Emphasis::Pale, ..self }
@@ -470,6 +476,8 @@ pub enum Emphasis {
     /// A reference for one result among several: in the colour of that result, thin, behind all
     /// others.
     OwnReference,
+    /// A contour line of a heat map: thin, in the colour of the background.
+    Contour,
 }
 
 impl Emphasis {
@@ -499,8 +507,8 @@ pub enum Style {
     /// A bar at every abscissa, from [`Series::base`] to `y`; several series of bars are drawn
     /// side by side.
     Bars,
-    /// A stripe of height one with the colours of [`Series::shades`]; several stripes form a
-    /// map.
+    /// A stripe with the colours of [`Series::shades`], around `y` with height one, or from
+    /// [`Series::base`] to `y`; several stripes form a map.
     Stripe,
 }
 

@@ -435,6 +435,11 @@ mod tests {
             of("orbit"),
             of("hysteresis"),
             of("performance"),
+            format!(
+                "{}\nover = {{ Ft = {{ from = \"1 N\", to = \"2 N\", points = 2 }}, F0 = {{ from = \"9 N\", to = \"10 N\", \
+                 points = 2 }} }}",
+                of("map")
+            ),
             drive.replace("points = 241", "tolerance = \"10 %\""),
             "kind = \"transient\"\nfrequency = \"121 Hz\"\ncycles = 20".to_owned(),
             "kind = \"campbell\"\nspeed = { from = \"10 Hz\", to = \"120 Hz\", points = 12 }".to_owned(),

@@ -75,6 +75,8 @@ pub enum ValueType {
     Parameters,
     /// `vary`: lists of quantities, or ranges, by parameter.
     Vary,
+    /// `over`: the ranges of the two parameters of a map.
+    Over,
     /// `[sample]`: the number of draws and the distributions.
     Sample,
     /// `of` in `[sample]`: distributions by parameter.
@@ -198,6 +200,25 @@ const POINTS: Key =
 
 /// Keys of a range of frequencies.
 pub const FREQUENCY_RANGE: &[Key] = &[FROM, TO, POINTS];
+
+/// Keys of the range of a parameter of a map.
+pub const MAP_RANGE: &[Key] = &[
+    FROM,
+    TO,
+    POINTS,
+    default(
+        "scale",
+        ValueType::Choice(range_scales),
+        "linear",
+        "spacing of the values: equal differences, or equal ratios",
+        "\"log\"",
+    ),
+];
+
+/// The spacings of the values of a range.
+fn range_scales() -> Vec<(&'static str, &'static str)> {
+    vec![("linear", "equal differences between neighbours"), ("log", "equal ratios of neighbours")]
+}
 
 /// Keys of a range of speeds, which may begin at zero.
 pub const SPEED_RANGE: &[Key] = &[

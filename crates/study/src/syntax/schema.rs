@@ -15,8 +15,8 @@ use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
 pub use crate::syntax::key::{
-    ADAPTIVE_RANGE, Bounds, END_POINTS_RANGE, FREQUENCY_RANGE, Key, MAX_CASES, MAX_MASSES, MAX_POINTS, Presence,
-    VERSION, ValueType, default, optional, required, unsupported,
+    ADAPTIVE_RANGE, Bounds, END_POINTS_RANGE, FREQUENCY_RANGE, Key, MAP_RANGE, MAX_CASES, MAX_MASSES, MAX_POINTS,
+    Presence, VERSION, ValueType, default, optional, required, unsupported,
 };
 
 /// Largest number of elements in one list (`[[spring]]`, …), repetitions included.
@@ -749,6 +749,9 @@ pub fn describe_value(takes: &ValueType) -> String {
         }
         ValueType::Parameters => "a table of quantities by name".to_owned(),
         ValueType::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
+        ValueType::Over => {
+            "a table from two parameters to ranges { from, to, points }, each also with scale = \"log\"".to_owned()
+        }
         ValueType::Sample => "a table with `count`, `of`, `seed` and `design`".to_owned(),
         ValueType::Distributions => {
             let all = DISTRIBUTIONS.map(|(name, numbers, _)| format!("{{ {name} = [{numbers}] }}"));
@@ -886,6 +889,9 @@ fn takes_schema(takes: &ValueType) -> Value {
             "additionalProperties": {
                 "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(FREQUENCY_RANGE)],
             },
+        }),
+        ValueType::Over => json!({
+            "type": "object", "additionalProperties": object(MAP_RANGE), "minProperties": 2, "maxProperties": 2,
         }),
         ValueType::Sample => object(SAMPLE),
         ValueType::Distributions => {

@@ -15,6 +15,11 @@ const STUDIES: &[(&str, &str)] = &[
     ("response", "frequency = [\"12 Hz\", \"15 Hz\"]\n[figure]\nreferences = true"),
     ("hysteresis", "frequency = \"15 Hz\"\nsamples = 16"),
     ("performance", "frequency = { from = \"14 Hz\", to = \"16 Hz\", points = 3 }\nvary = { m = [1, 2, 3] }"),
+    (
+        "map",
+        "frequency = { from = \"14 Hz\", to = \"16 Hz\", points = 3 }\nover = { m = { from = 1, to = 2, points = 2 }, \
+         f = { from = 1, to = 2, points = 2 } }",
+    ),
     ("branch", "frequency = { from = \"12 Hz\", to = \"13 Hz\", points = 2 }\nsteps = 2\nharmonics = 3\nsamples = 64"),
     ("modes", "amplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\nharmonics = 3\nsamples = 64"),
     ("transient", "frequency = \"15 Hz\"\ncycles = 1"),
@@ -29,13 +34,14 @@ fn model(row: &LawInfo, mass: &str) -> String {
     let directions = &["x", "y", "z"][..count];
     let places: Vec<String> =
         directions.iter().map(|d| if count > 1 { format!("a.{d}") } else { "a".to_owned() }).collect();
-    let mut text = format!("schema = 1\n[parameters]\nm = {mass}\n[[mass]]\nname = \"a\"\nmass = \"m * 1 kg\"\n");
+    let mut text =
+        format!("schema = 1\n[parameters]\nm = {mass}\nf = 1\n[[mass]]\nname = \"a\"\nmass = \"m * 1 kg\"\n");
     if count > 1 {
         text += &format!("directions = {directions:?}\n");
     }
     for place in &places {
         text += &format!("[[spring]]\nbetween = [\"{place}\", \"ground\"]\nstiffness = 1e4\ndamping = 20\n");
-        text += &format!("[[force]]\non = \"{place}\"\namplitude = 5\n");
+        text += &format!("[[force]]\non = \"{place}\"\namplitude = \"f * 5 N\"\n");
     }
     let values: Vec<String> =
         row.parameters.iter().zip(row.sample).map(|(p, value)| format!("{} = {value:?}", p.key)).collect();

@@ -824,6 +824,13 @@ fn every_result_has_its_reduction_error() {
         ("orbit\"\nfrequency = \"500 Hz\"\nmultipliers = true", true),
         (&format!("response\"\n{range}\n[figure]\nreferences = true"), true),
         (&format!("performance\"\n{range}\nvary = {{ Ft = [\"1 mN\", \"4 mN\", \"20 mN\"] }}"), true),
+        (
+            &format!(
+                "map\"\n{range}\nover = {{ Ft = {{ from = \"1 mN\", to = \"4 mN\", points = 2 }}, F0 = {{ from = \"1 N\", \
+                 to = \"2 N\", points = 2 }} }}"
+            ),
+            true,
+        ),
         (&format!("branch\"\n{}\nharmonics = 1\nsamples = 64", range.replace(", points = 5", "")), false),
         ("transient\"\nduration = \"20 ms\"\ntime_step = \"0.05 ms\"\nstart = { hung = \"1 mm\" }", false),
         ("modes\"\namplitude = { from = \"0.01 mm\", to = \"1 mm\", points = 4 }", false),
@@ -831,7 +838,7 @@ fn every_result_has_its_reduction_error() {
     ] {
         let free = kind.starts_with("transient");
         let text =
-            "[parameters]\nFt = \"4 mN\"\n".to_owned()
+            "[parameters]\nFt = \"4 mN\"\nF0 = \"1 N\"\n".to_owned()
                 + &structure("npz", "rows.csv", "m-kg-s", "modal_damping = 0.01\nreduce = { up_to = \"3 kHz\" }")
                     .replacen("schema = 1\n", "", 1)
                 + &place("tip", &tip(&brick, 0, 1))
@@ -862,6 +869,7 @@ fn every_result_has_its_reduction_error() {
         "references",
         "performance",
         "optimum",
+        "map",
         "branch",
         "motion_summary",
         "modes",

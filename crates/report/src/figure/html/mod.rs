@@ -156,16 +156,8 @@ pub fn script_name() -> String {
 
 /// Returns the figure for a page: interactive on screen, static in print or without the script.
 pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
-    let (columns, _) = panels::grid(figure);
-    let mut palette = Palette::new(figure);
-    let data = traces(figure, &mut palette);
-    let wide = layout(figure, PageWidth::Wide, &mut palette);
-    let narrow = layout(figure, PageWidth::Narrow, &mut palette);
-    let height = wide["height"].as_f64().unwrap_or(0.0);
-    let data = json!({
-        "data": data, "wide": wide, "narrow": narrow, "dark": palette.dark, "title": plain(&figure.title),
-        "break": NARROW[columns.clamp(1, 3) - 1],
-    });
+    let data = traces_and_layouts(figure);
+    let height = data["wide"]["height"].as_f64().unwrap_or(0.0);
     // A `<` in a label could close the script element.
     let data = data.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029");
     format!(
@@ -174,6 +166,35 @@ pub(crate) fn fragment(figure: &Figure, id: &str) -> String {
         legend(figure, id),
         crate::figure::svg::to_svg(figure)
     )
+}
+
+/// Returns the figure as data for plotly.js: the traces, a layout for wide and one for narrow
+/// pages, and the dark counterpart of every light colour.
+fn traces_and_layouts(figure: &Figure) -> serde_json::Value {
+    let (columns, _) = panels::grid(figure);
+    let mut palette = Palette::new(figure);
+    let data = traces(figure, &mut palette);
+    let wide = layout(figure, PageWidth::Wide, &mut palette);
+    let narrow = layout(figure, PageWidth::Narrow, &mut palette);
+    json!({
+        "data": data, "wide": wide, "narrow": narrow, "dark": palette.dark, "title": plain(&figure.title),
+        "break": NARROW[columns.clamp(1, 3) - 1],
+    })
+}
+
+/// Returns the figure as data for plotly.js, for a program that draws it itself.
+///
+/// The object has the traces (`data`), a layout for `wide` and for `narrow` pages, the dark
+/// counterpart of every light colour (`dark`), and the `axes` of every panel: quantity, unit,
+/// scale, and the power of ten that the traces leave out.
+pub fn plot(figure: &Figure) -> serde_json::Value {
+    let mut plot = traces_and_layouts(figure);
+    let axis = |axis: &stickslip_study::dataset::Axis, range| json!({ "quantity": axis.quantity, "unit": axis.unit, "scale": axis.scale, "power": palette::power(range) });
+    let axes = figure.panels.iter().zip(panels::axes(figure));
+    plot["axes"] = axes
+        .map(|(panel, axes)| json!({ "title": panel.title, "x": axis(&panel.x, axes.x), "y": axis(&panel.y, axes.y) }))
+        .collect();
+    plot
 }
 
 /// Returns the legend: buttons that show and hide curves.

@@ -98,11 +98,17 @@ impl PanelTraces<'_> {
             Style::Stripe => return self.stripe(series, palette).into_iter().collect(),
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let dots = self.isolated_points(series, &trace, &colour);
-                let thin = matches!(series.emphasis, Emphasis::Pale | Emphasis::OwnReference);
+                let contour = series.emphasis == Emphasis::Contour;
+                let thin = contour || matches!(series.emphasis, Emphasis::Pale | Emphasis::OwnReference);
                 let width = if thin || crowd { 1.0 } else { 2.0 };
                 let dash = dash(panels::line_style(series));
                 trace["mode"] = json!("lines");
                 trace["line"] = json!({ "color": colour, "width": width, "simplify": false, "dash": dash });
+                if contour {
+                    // the tiles below state the value
+                    trace["hoverinfo"] = json!("skip");
+                    trace["hovertemplate"] = Value::Null;
+                }
                 return dots.into_iter().chain([trace]).collect();
             }
         }
@@ -162,16 +168,19 @@ impl PanelTraces<'_> {
     /// Returns a stripe as a heat map with one row.
     fn stripe(&self, series: &Series, palette: &Palette) -> Option<Value> {
         let ((shown, range), y) = (palette.scheme.bar.as_ref()?, series.y.first()?);
+        let [low, high] = panels::stripe_edges(series)?;
+        let tiles = !series.base.is_empty();
         let count = series.x.len().min(series.shades.len());
         let shades = NumberFormat::of(*range);
-        let name = self.panel.y.names.get(*y as usize).cloned().unwrap_or_default();
+        let name = self.panel.y.names.get(*y as usize).filter(|_| !tiles).cloned().unwrap_or_default();
+        let over = if tiles { format!("<br>{}", hover("y", &self.panel.y, self.y.power)) } else { String::new() };
         let value = format!("{} = %{{z:.4~g}} {}", plain(&shown.quantity), plain(&axis::unit(shown, 0)));
         Some(json!({
             "type": "heatmap", "xaxis": axis_name("x", self.index), "yaxis": axis_name("y", self.index),
             // Overlap of stripes, which hides seams.
-            "x": self.x.numbers(panels::edges(&series.x[..count], self.axes.x).into_iter()), "y": [y - 0.5, y + 0.5 + 0.03],
+            "x": self.x.numbers(panels::edges(&series.x[..count], self.axes.x).into_iter()), "y": self.y.numbers([low, high + 0.03 * (high - low)].into_iter()),
             "z": [shades.numbers(series.shades[..count].iter().copied())], "coloraxis": "coloraxis", "showlegend": false,
-            "hovertemplate": format!("{}<br>{value}<extra>{}</extra>", hover("x", &self.panel.x, self.x.power), plain(&name)),
+            "hovertemplate": format!("{}{over}<br>{value}<extra>{}</extra>", hover("x", &self.panel.x, self.x.power), plain(&name)),
         }))
     }
 

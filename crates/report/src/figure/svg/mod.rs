@@ -212,7 +212,7 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
             }
             Style::Solid | Style::Dashed | Style::Dotted => {
                 let pale = series.emphasis == Emphasis::Pale;
-                let thin = pale || crowd || series.emphasis == Emphasis::OwnReference;
+                let thin = pale || crowd || matches!(series.emphasis, Emphasis::OwnReference | Emphasis::Contour);
                 let width = if thin { 1.0 } else { LINE };
                 let opacity = if pale { PALE } else { 1.0 };
                 let pen = Pen { colour, width, dashes: dashes(panels::line_style(series)), opacity };
@@ -261,9 +261,9 @@ fn draw_band(svg: &mut Svg, panel: &Panel, series: &Series, plot: &PlotArea, col
 
 /// Draws the cells of a stripe, as high as the distance between stripes.
 fn draw_stripe(svg: &mut Svg, series: &Series, plot: &PlotArea, scheme: &ColourScheme) {
-    let Some(y) = series.y.first() else { return };
+    let Some([low, high]) = panels::stripe_edges(series) else { return };
     for cell in panels::cells(series, plot.x, scheme) {
-        let ((left, top), (right, bottom)) = (plot.map((cell.from, y + 0.5)), plot.map((cell.to, y - 0.5)));
+        let ((left, top), (right, bottom)) = (plot.map((cell.from, high)), plot.map((cell.to, low)));
         let corners = box_around(left, top, right - left, bottom - top);
         svg.tile(&plot.clip_rect().polygon(&corners), &cell.colour.light);
     }

@@ -38,6 +38,17 @@ pub(super) fn tables_with_key(name: &str, own: &[Key]) -> Vec<String> {
     tables.collect()
 }
 
+/// The table `[study]`.
+pub(super) struct StudyRequest<'a> {
+    pub kind: &'static KindInfo,
+    /// The values of the keys of the kind.
+    pub stated: CompiledTable,
+    /// The parameters of `vary`.
+    pub vary: Option<&'a TomlEntry>,
+    /// The two parameters of a map.
+    pub over: Option<&'a TomlEntry>,
+}
+
 impl Reader {
     /// Returns the row that `kind` names in a table of laws, methods or study kinds.
     fn kind<T: 'static>(
@@ -133,10 +144,7 @@ impl Reader {
         Some(stated)
     }
 
-    pub(super) fn request<'a>(
-        &mut self,
-        root: &'a TomlTable,
-    ) -> Option<(&'static KindInfo, CompiledTable, Option<&'a TomlEntry>)> {
+    pub(super) fn request<'a>(&mut self, root: &'a TomlTable) -> Option<StudyRequest<'a>> {
         let node = &root.get("study")?.node;
         let TomlValue::Table(table) = &node.value else {
             let message = format!("expected a table, found {}", node.value.described());
@@ -147,12 +155,14 @@ impl Reader {
         let kind = &self.kind(table, "[study]", "response", kinds::TABLE, |row| row.info.name)?.info;
         let mut keys = STUDY.to_vec();
         keys.extend(kind.keys);
-        // `vary` is not a value of the kind: it defines the cases
+        // `vary` and `over` are no values of the kind: they define the cases
         let owner = format!("a study of kind `{}`", kind.name);
         self.check_keys(table, &keys, &owner);
-        let rest: Vec<Key> = keys.into_iter().filter(|key| !matches!(key.takes, ValueType::Vary)).collect();
+        let defines_cases = |key: &Key| matches!(key.takes, ValueType::Vary | ValueType::Over);
+        let over = keys.iter().any(|key| matches!(key.takes, ValueType::Over)).then(|| table.get("over")).flatten();
+        let rest: Vec<Key> = keys.into_iter().filter(|key| !defines_cases(key)).collect();
         let stated = self.compile_table(table, &rest);
-        Some((kind, stated, table.get("vary")))
+        Some(StudyRequest { kind, stated, vary: table.get("vary"), over })
     }
 
     /// Reads `[figure]`; the result is empty if the table is absent.

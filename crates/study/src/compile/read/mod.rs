@@ -33,6 +33,7 @@ use crate::syntax::document::{self, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::schema::{self, FILE, MAX_FILE_BYTES};
 use crate::syntax::suggest::suggest;
+use kinds::StudyRequest;
 use reader::Reader;
 use std::io::Read;
 use std::path::Path;
@@ -273,12 +274,16 @@ impl Reader {
                 (parameters, self.model_from_lists(&root, file))
             }
         };
-        let (kind, study, vary) = self.request(&root)?;
+        let StudyRequest { kind, stated: study, vary, over } = self.request(&root)?;
         let method = self.method(&root);
         let figure = self.figure(&root);
         let data = self.data(&root);
         let mut parameters = parameters?;
-        let listed = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
+        let mut listed = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
+        if let Some(over) = over {
+            let mapped = self.over(&root, over, &mut parameters, &listed).unwrap_or_default();
+            listed.extend(mapped);
+        }
         let (sample, mut varied) = self.sample(&root, &mut parameters, &listed).unwrap_or_default();
         varied.extend(listed);
         if !self.problems.is_empty() {

@@ -3,6 +3,7 @@
 //! It determines the parameters, the order of their evaluation, and the number of cases.
 
 use super::reader::Reader;
+use super::values::StatedRange;
 use crate::case::sample::{DESIGNS, DISTRIBUTIONS, Design, DrawnParameter, MAX_SOBOL, SampleSettings, WITHIN};
 use crate::case::study::{Parameter, ParameterValues, ReplacedParameter, VariedParameter, evaluate, stated_parameters};
 use crate::case::values::ResolvedValue;
@@ -135,9 +136,9 @@ impl Reader {
                 TomlValue::List(list) => {
                     self.quantities(&entry.key, list, &entry.node.location).map(ParameterValues::List)
                 }
-                TomlValue::Table(table) => self
-                    .range(table, schema::FREQUENCY_RANGE, &entry.key)
-                    .map(|(from, to, points)| ParameterValues::Range { from, to, points }),
+                TomlValue::Table(table) => {
+                    self.range(table, schema::FREQUENCY_RANGE, &entry.key).map(ParameterValues::from)
+                }
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| ParameterValues::List(vec![quantity])),
             };
             // the unit in [parameters] counts too, but not that in a template, which the user
@@ -159,6 +160,61 @@ impl Reader {
             self.fix_dimensions(parameters, &indices)?;
         }
         Some(varied)
+    }
+
+    /// Reads `over`: the ranges of the two parameters of a map. `listed` are those of `vary`.
+    pub(super) fn over(
+        &mut self,
+        root: &TomlTable,
+        entry: &TomlEntry,
+        parameters: &mut [Parameter],
+        listed: &[VariedParameter],
+    ) -> Option<Vec<VariedParameter>> {
+        let example = "write it as in over = { Ft = { from = \"1 N\", to = \"20 N\", points = 25 }, kt = { from = \
+            \"1 N/mm\", to = \"100 N/mm\", points = 25, scale = \"log\" } }";
+        let table = match &entry.node.value {
+            TomlValue::Table(table) if table.entries.len() == 2 => table,
+            found => {
+                let found = match found {
+                    TomlValue::Table(table) => format!("{} of them", table.entries.len()),
+                    other => other.described(),
+                };
+                let message = format!("a map needs the ranges of two parameters, found {found}");
+                self.problems.push(Problem::new(&entry.node.location, "over", message).help(example));
+                return None;
+            }
+        };
+        if let Some(sample) = root.get("sample") {
+            let message = "a map has no random draws";
+            let help = "remove [sample], or use kind = \"performance\", whose figure shows percentiles";
+            self.problems.push(Problem::new(&sample.key_location, "sample", message).help(help));
+        }
+        let mut mapped = Vec::new();
+        for entry in &table.entries {
+            let Some(index) = self.parameter(entry, "map") else { continue };
+            let TomlValue::Table(range) = &entry.node.value else {
+                let message = format!("expected a range, found {}", entry.node.value.described());
+                self.problems.push(Problem::new(&entry.node.location, excerpt(&entry.key), message).help(example));
+                continue;
+            };
+            if listed.iter().any(|varied| varied.index == index) {
+                let message = format!("`{}` is also in `vary`: remove it from one of them", excerpt(&entry.key));
+                self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message));
+                continue;
+            }
+            let Some(range) = self.range(range, schema::MAP_RANGE, &entry.key) else { continue };
+            let own = &parameters[index].quantity;
+            if self.template != Some(own.location.source) {
+                self.problems.extend(bare_number_problem(&entry.key, [own, &range.from, &range.to]));
+            }
+            let (location, points) = (entry.node.location.clone(), range.into());
+            mapped.push(VariedParameter { index, location, points });
+        }
+        let indices: Vec<usize> = mapped.iter().map(|varied| varied.index).collect();
+        if self.problems.is_empty() {
+            self.fix_dimensions(parameters, &indices)?;
+        }
+        Some(mapped)
     }
 
     /// Reads `[sample]`: the design of the draws, and the drawn parameters.
@@ -374,6 +430,12 @@ impl Reader {
         );
         self.problems.push(Problem::new(location, key, message).help("split the study, or use fewer points"));
         None
+    }
+}
+
+impl From<StatedRange> for ParameterValues {
+    fn from(StatedRange { from, to, points, scale }: StatedRange) -> ParameterValues {
+        ParameterValues::Range { from, to, points, scale }
     }
 }
 

@@ -6,7 +6,7 @@ use super::reader::Reader;
 use crate::case::values::ResolvedValue;
 use crate::compile::bare_numbers::bare_number_problem;
 use crate::compile::compiled::{
-    CompiledEntry, CompiledFitRange, CompiledQuantity, CompiledTable, CompiledValue, RangeOrder, Weights,
+    CompiledEntry, CompiledFitRange, CompiledQuantity, CompiledTable, CompiledValue, RangeOrder, RangeScale, Weights,
 };
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem};
@@ -161,7 +161,7 @@ impl Reader {
                 self.adaptive(key, table)
             }
             (ValueType::Frequencies(keys), TomlValue::Table(table)) => {
-                let (from, to, points) = self.range(table, keys, key.name)?;
+                let StatedRange { from, to, points, .. } = self.range(table, keys, key.name)?;
                 // if only the ends matter, their order gives the direction
                 let ends = |key: &Key| key.name == "points" && matches!(key.presence, Presence::Default(_));
                 let order = if keys.iter().any(ends) { RangeOrder::Any } else { RangeOrder::Rising };
@@ -507,12 +507,7 @@ impl Reader {
         Some(quantities)
     }
 
-    pub(super) fn range(
-        &mut self,
-        table: &TomlTable,
-        keys: &[Key],
-        owner: &str,
-    ) -> Option<(CompiledQuantity, CompiledQuantity, usize)> {
+    pub(super) fn range(&mut self, table: &TomlTable, keys: &[Key], owner: &str) -> Option<StatedRange> {
         let before = self.problems.len();
         let mut stated = self.table(table, keys, &format!("the range of `{}`", excerpt(owner)));
         if self.problems.len() > before {
@@ -522,6 +517,10 @@ impl Reader {
             let at = stated.entries.iter().position(|entry| entry.key == key)?;
             Some(stated.entries.swap_remove(at).value)
         };
+        let scale = match take("scale") {
+            Some(CompiledValue::Fixed(ResolvedValue::Text(word))) if word == "log" => RangeScale::Log,
+            _ => RangeScale::Linear,
+        };
         match (take("from")?, take("to")?, take("points")?) {
             (
                 CompiledValue::Quantity { quantity: from, .. },
@@ -529,11 +528,19 @@ impl Reader {
                 CompiledValue::Fixed(ResolvedValue::Count(points)),
             ) => {
                 self.problems.extend(bare_number_problem(owner, [&from, &to]));
-                Some((from, to, usize::try_from(points).ok()?))
+                Some(StatedRange { from, to, points: usize::try_from(points).ok()?, scale })
             }
             _ => None,
         }
     }
+}
+
+/// A range as stated: its ends, the number of its values and their spacing.
+pub(super) struct StatedRange {
+    pub from: CompiledQuantity,
+    pub to: CompiledQuantity,
+    pub points: usize,
+    pub scale: RangeScale,
 }
 
 /// Returns the limits of the frequencies in a range with these keys.

@@ -8,33 +8,30 @@ mod tables;
 
 pub use tables::{Optimum, PeakCurve, PerformancePoint, curves};
 
-use super::shared::keys::{FREQUENCY, check_masses, no_requirements};
+use super::shared::keys::{FREQUENCY, no_requirements};
 use super::shared::orbit_sweep;
-use super::shared::peak_of::{PEAK_OF, check_peak_of, peak_places};
+use super::shared::peak_of::{PEAK_OF, moving_amplitudes, peak_places};
+use super::shared::peak_search::{self, FEWEST_VALUES};
 use crate::case::study::{VariedValue, varied_text};
-use crate::case::values::{Values, hertz};
+use crate::case::values::hertz;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::sampling_warnings;
-use crate::kinds::info::{KeyError, KindInfo};
+use crate::kinds::info::KindInfo;
 use crate::kinds::kind::{Kind, Probe};
-use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP};
+use crate::results::columns::{AMPLITUDE, FREQUENCY as DRIVE};
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
-use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use stickslip::curve::bidirectional_sweep;
-use stickslip::curve::peak::held_amplitude;
-use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError, PerformanceRow};
+use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
+use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
-use stickslip::model::Model;
-use stickslip::orbit::Accuracy;
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: tables::NAME,
         summary: "the resonance peak over a design parameter (the last one of `vary`), with the optimum refined",
         keys: &[FREQUENCY, PEAK_OF],
-        check,
+        check: peak_search::check,
         axes: [None, Some(Dimension::LENGTH)],
         uses_method: true,
         needs: no_requirements,
@@ -61,19 +58,6 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     }
 }
 
-/// Smallest number of parameter values, and of frequencies, that form a curve.
-const FEWEST_VALUES: usize = 3;
-
-fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
-    check_masses(model)?;
-    check_peak_of(values, model)?;
-    if values.frequencies("frequency").is_some_and(|f| f.len() < FEWEST_VALUES) {
-        let help = "write frequency = { from = …, to = …, points = … } around the resonance";
-        return Err(KeyError::new("frequency", "a peak needs a range of frequencies", help));
-    }
-    Ok(())
-}
-
 fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     if work.case().case.varied.is_empty() || work.cases.len() < FEWEST_VALUES {
@@ -92,31 +76,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let (mut rows, mut optima) = (TableBuilder::default(), TableBuilder::default());
     for (&case, row) in listed {
         let prepared = &work.cases[case];
-        let (failed, status) = (row.failed > 0 || row.peak.is_none(), status(row));
-        let reason = || match row.peak.and_then(|peak| peak.unresolved) {
-            Some(why) => why.to_string(),
-            None => format!("{} of the orbits on the frequency grid did not converge", row.failed),
-        };
-        part.count(|| prepared.case.label(), status, failed.then(reason));
-        if row.inaccurate > 0 {
-            let text = format!(
-                "at {} frequencies of the grid the series is too short: its truncation error exceeds the `tolerance` \
-                 of the method; examine one of them with kind = \"response\".",
-                row.inaccurate
-            );
-            Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
-        }
-        rows.varied(&prepared.case);
-        rows.number(DRIVE, row.peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
-        rows.number(AMPLITUDE, row.peak.map_or(f64::NAN, |peak| peak.value));
-        rows.flag(AT_RANGE_END, row.peak.map(|peak| peak.at_end));
-        if bidirectional_sweep::is_followed(&prepared.system) {
-            rows.flag(REVERSE_SWEEP, row.peak.map(|_| row.reverse_sweep_only));
-        }
-        rows.integer(tables::FAILED, row.failed as u64);
-        rows.reduction_error(prepared.system.reduction_evidence());
-        rows.text("status", status);
-        rows.end_row();
+        peak_search::count(prepared, row, &mut part);
+        peak_search::write(prepared, row, &mut rows);
     }
     if let Some((outer, inner)) = split(work.case()) {
         let best = curve.optimum;
@@ -127,7 +88,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         optima.number(DRIVE, peak.map_or(f64::NAN, |peak| hertz(peak.omega)));
         optima.number(AMPLITUDE, peak.map_or(f64::NAN, |peak| peak.value));
         optima.reduction_error(work.case().system.reduction_evidence());
-        optima.text("status", best.as_ref().map_or("none", status));
+        optima.text("status", best.as_ref().map_or("none", peak_search::status));
         optima.end_row();
         if best.is_none() {
             let why = no_optimum(work, &curve, &inner.name, &order);
@@ -169,15 +130,6 @@ fn no_optimum(work: &UnitTask<'_>, curve: &PerformanceCurve, parameter: &str, or
     }
 }
 
-/// Returns the status of the orbits that support a peak.
-fn status(row: &PerformanceRow) -> &'static str {
-    match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
-        (true, _) => "some-failed",
-        (false, 0) => CONVERGED,
-        (false, _) => Accuracy::Truncated.status(),
-    }
-}
-
 /// Returns the outer varied parameters of a case, and the last one.
 fn split(prepared: &PreparedCase) -> Option<(&[VariedValue], &VariedValue)> {
     prepared.case.varied.split_last().map(|(last, outer)| (outer, last))
@@ -186,8 +138,6 @@ fn split(prepared: &PreparedCase) -> Option<(&[VariedValue], &VariedValue)> {
 fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, MethodError> {
     let first = work.case();
     let places = peak_places(first);
-    let frequencies: Vec<f64> = work.points.clone().map(|index| work.omega(index)).collect();
-    let range = frequencies.iter().fold((f64::INFINITY, 0.0f64), |(a, b), w| (a.min(*w), b.max(*w)));
     let parameter = split(first).map(|(_, inner)| inner.name.clone());
     let build = |value: f64| {
         let Some(name) = &parameter else { return Ok(first.system.clone()) };
@@ -197,16 +147,12 @@ fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, Method
     let performance = Performance {
         system: &build,
         method: &*first.method,
-        range,
-        points: frequencies.len(),
-        quantities: &|orbit| {
-            let held = held_amplitude(&first.system, orbit.omega);
-            let amplitudes = places.iter().map(|place| orbit.places[*place].amplitude());
-            amplitudes.map(|amplitude| if amplitude > held { amplitude } else { 0.0 }).collect()
-        },
+        range: peak_search::range(work),
+        points: work.points.len(),
+        quantities: &|orbit| moving_amplitudes(&first.system, orbit, &places),
     };
     let result = performance.curve(values);
-    (0..work.cases.len() * frequencies.len()).for_each(|_| (work.context.finished)());
+    (0..work.cases.len() * work.points.len()).for_each(|_| (work.context.finished)());
     match result {
         Ok(curve) => Ok(curve),
         Err(PerformanceError::Method(error)) => Err(error),

@@ -1,6 +1,7 @@
 //! The tables of performance curves: names, columns, and their content as typed values.
 
 use crate::case::study::{Study, VariedValue};
+use crate::kinds::shared::peak_search::FAILED;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY};
 use crate::results::dataset::Dataset;
 use crate::results::{Peak, Results, ResultsError};
@@ -11,8 +12,6 @@ pub(super) const NAME: &str = "performance";
 pub(super) const PERFORMANCE: &str = "performance";
 /// One row per curve.
 pub(super) const OPTIMUM: &str = "optimum";
-/// Number of orbits on the frequency grid that were not found.
-pub(super) const FAILED: &str = "failed_orbits";
 
 /// The resonance peak over a parameter, the last one of `vary`.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,6 +2,7 @@
 //!
 //! - `keys`: keys of `[study]`, and checks of their values;
 //! - `peak_of`: the key `peak_of`;
+//! - `peak_search`: the resonance peak of a case, and its row in a table;
 //! - `orbit_sweep`: the orbits of a unit, their instants, and failures;
 //! - `contact_states`: panels of contact states;
 //! - `disk_shape`: pictures of a disk.
@@ -11,3 +12,4 @@ pub(super) mod disk_shape;
 pub(super) mod keys;
 pub(super) mod orbit_sweep;
 pub(super) mod peak_of;
+pub(super) mod peak_search;

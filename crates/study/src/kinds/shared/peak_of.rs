@@ -7,6 +7,7 @@ use crate::case::values::Values;
 use crate::kinds::info::KeyError;
 use crate::run::work::PreparedCase;
 use crate::syntax::key::{Key, ValueType, optional};
+use stickslip::curve::peak::held_amplitude;
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
 
@@ -64,6 +65,15 @@ pub(in crate::kinds) fn peak_places(prepared: &PreparedCase) -> Vec<usize> {
 pub(in crate::kinds) fn displacements(system: &System) -> Vec<usize> {
     let seen = system.place_axes().iter().enumerate();
     seen.filter(|(_, place)| !place.is_rotation()).map(|(place, _)| place).collect()
+}
+
+/// Returns the amplitudes of some places whose highest peak is sought, m.
+///
+/// An amplitude that is only the rounding error of a place at rest is zero.
+pub(in crate::kinds) fn moving_amplitudes(system: &System, orbit: &Orbit, places: &[usize]) -> Vec<f64> {
+    let held = held_amplitude(system, orbit.omega);
+    let amplitudes = places.iter().map(|place| orbit.places[*place].amplitude());
+    amplitudes.map(|amplitude| if amplitude > held { amplitude } else { 0.0 }).collect()
 }
 
 /// Returns the largest amplitude of some places, m.

@@ -77,7 +77,9 @@ struct Names {
 pub fn study_text(chance: &mut Chance) -> String {
     let scales =
         Scales { mass: chance.decade(-3.0, 1.5), hertz: chance.decade(0.0, 3.0), force: chance.decade(-1.0, 3.0) };
-    let kind = chance.of(&kinds::TABLE.iter().map(|kind| kind.info.name).collect::<Vec<_>>());
+    // the cells of a map are those of a performance curve
+    let names: Vec<&str> = kinds::TABLE.iter().map(|kind| kind.info.name).filter(|name| *name != "map").collect();
+    let kind = chance.of(&names);
     let mut model = String::new();
     let (names, scales) = if chance.one_in(8) {
         let (names, scales) = template(chance, &mut model);

@@ -1,0 +1,193 @@
+// The third tab: the structure, animated over one period. Joints are coloured by stick and slip.
+
+import { make } from "./dom.js";
+import { digits } from "./format.js";
+import { colour, isDark } from "./plot.js";
+import { present } from "./orbit.js";
+import { sceneOf } from "./scene.js";
+import { on, state } from "./store.js";
+
+let panel, canvas, play, speed, size, position, status, empty, box;
+let visible = false;
+let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+let phase = 0;
+let last = 0;
+
+/** @param {any} place */
+export function start(place) {
+  panel = place;
+  play = make("button", { type: "button", text: playing ? "Pause" : "Play", onclick: () => { playing = !playing; play.textContent = playing ? "Pause" : "Play"; last = 0; } });
+  const step = (/** @type {number} */ by) => () => { playing = false; play.textContent = "Play"; phase = (phase + by + 1) % 1; draw(); };
+  speed = make("input", { type: "range", min: "0.02", max: "1", step: "0.02", value: "0.3", "aria-label": "Cycles per second" });
+  size = make("input", { type: "range", min: "0", max: "2", step: "0.05", value: "1", "aria-label": "Scale of the displacements", oninput: () => draw() });
+  position = make("input", { type: "range", min: "0", max: "1", step: "0.002", value: "0", "aria-label": "Time in the period", oninput: () => { playing = false; play.textContent = "Play"; phase = Number(position.value); draw(); } });
+  status = make("span", { class: "state" });
+  canvas = make("canvas", { role: "img", "aria-label": "The structure in motion", height: "420" });
+  empty = make("p", { class: "empty", hidden: true });
+  box = make("div", {}, make("div", { class: "tools" }, play, make("button", { type: "button", text: "◂ Step", onclick: step(-0.01) }), make("button", { type: "button", text: "Step ▸", onclick: step(0.01) }),
+    make("label", {}, "Speed", speed), make("label", {}, "Scale", size), make("label", {}, "Time", position), status), canvas,
+    make("p", { class: "hint", text: "Blue: the joint sticks. Orange: it slips. Pink, dashed: it is open. Grey: springs. The arrow shows a force." }));
+  panel.append(empty, box);
+  on("orbit", () => draw());
+  on("theme", () => draw());
+  on("tab", (/** @type {string} */ name) => { visible = name === "motion"; if (visible) { last = 0; requestAnimationFrame(frame); } });
+  new ResizeObserver(() => draw()).observe(canvas);
+}
+
+/** @param {number} now */
+function frame(now) {
+  if (!visible) { return; }
+  if (playing && last > 0) { phase = (phase + (now - last) / 1000 * Number(speed.value)) % 1; }
+  last = now;
+  if (playing) { draw(); }
+  requestAnimationFrame(frame);
+}
+
+/** The value of a column at the present time. @param {any} orbit @param {string} name */
+function at(orbit, name) {
+  const values = orbit.columns.get(name);
+  if (!values) { return null; }
+  const time = phase * orbit.time.at(-1);
+  let high = orbit.time.findIndex((/** @type {number} */ one) => one >= time);
+  if (high <= 0) { high = high < 0 ? orbit.time.length - 1 : 1; }
+  if (typeof values[0] !== "number") { return values[high - 1]; }
+  const part = (time - orbit.time[high - 1]) / (orbit.time[high] - orbit.time[high - 1] || 1);
+  return values[high - 1] + part * (values[high] - values[high - 1]);
+}
+
+function draw() {
+  if (!visible || !panel || panel.hidden) { return; }
+  const orbit = present();
+  const model = state.description?.model;
+  const reason = !model ? "This study has no model to draw." : !orbit ? "Choose a point of a response curve: its orbit is animated here." : "";
+  empty.hidden = reason === "";
+  empty.textContent = reason;
+  box.hidden = reason !== "";
+  if (reason) { return; }
+  const scene = sceneOf(model);
+  const width = canvas.clientWidth;
+  const bounds = [...scene.masses, ...scene.ground];
+  const [left, right] = [Math.min(...bounds.map((one) => one.x)) - 1.3, Math.max(...bounds.map((one) => one.x)) + 1.3];
+  const [top, bottom] = [Math.min(...bounds.map((one) => one.y)) - 1.2, Math.max(...bounds.map((one) => one.y)) + 0.8];
+  const unit = Math.min(width / (right - left), Math.min(560, window.innerHeight * 0.62) / (bottom - top), 90);
+  const height = Math.max(240, (bottom - top) * unit);
+  const ratio = devicePixelRatio || 1;
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    canvas.style.height = `${height}px`;
+  }
+  const pen = canvas.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  const shift = (width - (right - left) * unit) / 2;
+  const to = (/** @type {number} */ x, /** @type {number} */ y) => [shift + (x - left) * unit, (y - top) * unit];
+  const most = Math.max(1e-30, ...orbit.places.map((/** @type {string} */ name) => Math.max(...orbit.columns.get(`${name}_displacement_m`).map(Math.abs))));
+  const gain = 0.75 * Number(size.value) / most;
+  const places = new Map(bounds.map((one) => [one.name, { ...one, ...moved(orbit, one, gain) }]));
+  const dark = isDark();
+  const [text, grey] = dark ? ["#e4e6ea", "#9aa0a8"] : ["#1a1a1a", "#777777"];
+  pen.lineCap = "round";
+  for (const link of scene.links) {
+    const [a, b] = [places.get(link.from), places.get(link.to)];
+    if (!a || !b) { continue; }
+    const [from, end] = [to(a.x, a.y), to(b.x, b.y)];
+    if (link.kind === "spring") { pen.strokeStyle = grey; pen.lineWidth = 1.5; pen.setLineDash([]); zigzag(pen, from, end, unit * 0.13, link.bend * unit * 0.42); }
+    else { joint(pen, from, end, at(orbit, `${link.name}_contact`), link.bend * unit * 0.42); }
+  }
+  pen.setLineDash([]);
+  for (const one of scene.ground) {
+    const [x, y] = to(one.x, one.y);
+    pen.strokeStyle = grey;
+    pen.lineWidth = 2;
+    line(pen, [x - 0.35 * unit, y], [x + 0.35 * unit, y]);
+    for (let i = -2; i <= 2; i += 1) { line(pen, [x + i * 0.15 * unit, y], [x + (i * 0.15 - 0.12) * unit, y + 0.16 * unit], 1); }
+  }
+  pen.textAlign = "center";
+  pen.font = `${Math.max(11, Math.min(14, unit * 0.24))}px system-ui, sans-serif`;
+  scene.masses.forEach((mass, index) => {
+    const place = places.get(mass.name);
+    const [x, y] = to(place.x, place.y);
+    const r = 0.45 * mass.radius * unit;
+    pen.fillStyle = scene.wheel ? colour(0) : colour(index);
+    pen.beginPath();
+    if (pen.roundRect) { pen.roundRect(x - r, y - r, 2 * r, 2 * r, 0.3 * r); } else { pen.rect(x - r, y - r, 2 * r, 2 * r); }
+    pen.fill();
+    pen.fillStyle = text;
+    if (scene.masses.length <= 16) { pen.fillText(mass.name, x, y - r - 6); }
+    for (const force of scene.forces.filter((force) => force.on === mass.name)) {
+      const size = Math.cos(2 * Math.PI * phase * force.harmonic + force.phase) * 0.6 * unit;
+      arrow(pen, [x + (r + 4) * mass.along[0], y + (r + 4) * mass.along[1]], mass.along, size, text);
+    }
+  });
+  position.value = String(phase);
+  status.textContent = `${digits(phase * orbit.time.at(-1) * 1e3, 3)} ms of ${digits(orbit.time.at(-1) * 1e3, 4)} ms, displacements × ${digits(gain, 2)}`;
+}
+
+/** The displaced position of a mass. @param {any} orbit @param {any} one @param {number} gain */
+function moved(orbit, one, gain) {
+  const along = { x: [1, 0], y: [0, -1], z: [0, -1], r: one.along, t: one.along, n: [0, -1] };
+  let [x, y] = [one.x, one.y];
+  const own = at(orbit, `${one.name}_displacement_m`);
+  if (own !== null) { return { x: x + gain * own * one.along[0], y: y + gain * own * one.along[1] }; }
+  for (const [name, direction] of Object.entries(along)) {
+    const value = at(orbit, `${one.name}.${name}_displacement_m`) ?? at(orbit, `${one.name}_${name}_displacement_m`);
+    if (value !== null) { x += gain * value * direction[0]; y += gain * value * direction[1]; }
+  }
+  return { x, y };
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} to @param {number} [width] */
+function line(pen, from, to, width = pen.lineWidth) {
+  pen.lineWidth = width;
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  pen.lineTo(to[0], to[1]);
+  pen.stroke();
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} to @param {number} size @param {number} aside */
+function zigzag(pen, from, to, size, aside) {
+  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+  const length = Math.hypot(dx, dy) || 1;
+  const [nx, ny] = [-dy / length, dx / length];
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  for (let i = 0; i <= 12; i += 1) {
+    const part = 0.22 + 0.56 * i / 12;
+    const off = aside + (i === 0 || i === 12 ? 0 : (i % 2 ? size : -size));
+    pen.lineTo(from[0] + part * dx + off * nx, from[1] + part * dy + off * ny);
+  }
+  pen.lineTo(to[0], to[1]);
+  pen.stroke();
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} to @param {string | null} contact @param {number} aside */
+function joint(pen, from, to, contact, aside) {
+  const sticks = contact === "stick" || contact === "touch";
+  const open = contact === "open";
+  pen.strokeStyle = open ? colour(3) : sticks ? colour(0) : contact ? colour(1) : colour(2);
+  pen.setLineDash(open ? [5, 5] : []);
+  pen.lineWidth = 4;
+  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+  const length = Math.hypot(dx, dy) || 1;
+  const [ax, ay] = [-dy / length * aside, dx / length * aside];
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  pen.quadraticCurveTo(from[0] + dx / 2 + 2 * ax, from[1] + dy / 2 + 2 * ay, to[0], to[1]);
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} along @param {number} length @param {string} text */
+function arrow(pen, [x, y], [ax, ay], length, text) {
+  pen.strokeStyle = pen.fillStyle = text;
+  const [tx, ty] = [x + length * ax, y + length * ay];
+  line(pen, [x, y], [tx, ty], 2);
+  const head = Math.sign(length) * 6;
+  pen.beginPath();
+  pen.moveTo(tx + head * ax, ty + head * ay);
+  pen.lineTo(tx - 5 * ay, ty + 5 * ax);
+  pen.lineTo(tx + 5 * ay, ty - 5 * ax);
+  pen.fill();
+}

@@ -1,0 +1,278 @@
+// The second tab: one orbit. Loops, motion over the period with stick, slip and separation,
+// harmonics, energies, Floquet multipliers, and its evidence in words.
+
+import { run } from "./api.js";
+import { make } from "./dom.js";
+import { digits, evidence, scale, si } from "./format.js";
+import { mark } from "./response.js";
+import { colour, drawOwn, isDark } from "./plot.js";
+import { changeList, on, state, tell } from "./store.js";
+
+let panel, tools, grid, empty, frequency, caseMenu, status;
+/** @type {Record<string, any>} */
+const plots = {};
+/** The orbit on the screen. @type {any} */
+let orbit = null;
+let visible = false;
+let wanted = "";
+
+/** @param {any} place */
+export function start(place) {
+  panel = place;
+  frequency = make("input", {
+    type: "text", id: "orbit-frequency", inputmode: "decimal", size: "10", autocomplete: "off",
+    onchange: () => { const value = Number(frequency.value.replace(",", ".")); frequency.setAttribute("aria-invalid", String(!(value > 0))); if (value > 0) { mark(value, state.marker?.case ?? 0, true); } },
+    onkeydown: (/** @type {KeyboardEvent} */ event) => step(event),
+  });
+  caseMenu = make("select", { id: "orbit-case", onchange: () => mark(state.marker.frequency, Number(caseMenu.value), true) });
+  status = make("span", { class: "state", role: "status" });
+  tools = make("div", { class: "tools" }, make("label", {}, "Frequency", frequency, "Hz"), make("label", { id: "case-label" }, "Case", caseMenu),
+    make("button", { type: "button", text: "At the peak", onclick: () => atPeak() }), status);
+  grid = make("div", { class: "grid" });
+  empty = make("p", { class: "empty" });
+  panel.append(tools, empty, grid);
+  for (const [name, title] of [["loops", "Hysteresis loops"], ["words", "Evidence"], ["time", "Motion over one period"], ["spectrum", "Harmonics of the displacement"], ["energy", "Energy per cycle"], ["multipliers", "Floquet multipliers"]]) {
+    plots[name] = name === "words" ? make("ul", { id: "orbit-words" }) : make("div", { class: "plot", id: `orbit-${name}` });
+    grid.append(make("section", { class: `tile${name === "time" ? " wide" : ""}`, "aria-label": title }, make("h3", { text: title }), plots[name]));
+  }
+  on("opened", () => { orbit = null; wanted = ""; });
+  on("marker", () => { follow(); });
+  on("result", () => { atPeakFirst(); follow(); });
+  on("theme", () => show());
+  on("tab", (/** @type {string} */ name) => { visible = name === "orbit" || name === "motion"; if (visible) { atPeakFirst(); follow(); show(); } });
+}
+
+/** The orbit that is shown, for the animation. */
+export const present = () => orbit;
+
+/** Arrow keys move the frequency. @param {KeyboardEvent} event */
+function step(event) {
+  const range = state.description.frequency;
+  const by = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+  if (!by || !state.marker || !range) { return; }
+  event.preventDefault();
+  mark(state.marker.frequency + by * (range.to - range.from) / 400, state.marker.case, true);
+}
+
+/** The frequency of the highest peak of a case. @param {number} index */
+function peakFrequency(index) {
+  const table = state.result?.tables?.peaks;
+  const column = (/** @type {string} */ name) => table?.find((/** @type {any} */ one) => one.name === name)?.values;
+  const [frequencies, amplitudes] = [column("frequency_Hz"), column("amplitude_m")];
+  const chosen = state.result?.cases?.[index]?.values ?? [];
+  let best = null;
+  for (let row = 0; row < (frequencies?.length ?? 0); row += 1) {
+    const same = chosen.every((/** @type {any} */ one, /** @type {number} */ k) => Math.abs(table[k].values[row] - siLike(table[k], one)) <= 1e-9 * Math.abs(table[k].values[row]));
+    if (same && frequencies[row] !== null && (best === null || amplitudes[row] > amplitudes[best])) { best = row; }
+  }
+  if (best !== null) { return frequencies[best]; }
+  const range = state.description.frequency;
+  return range ? (range.from + range.to) / 2 : null;
+}
+
+/** The number of a case in the unit of its column. @param {any} column @param {any} one */
+function siLike(column, one) {
+  const list = [...new Set(column.values.filter((/** @type {any} */ value) => value !== null))];
+  if (one.unit === "" || list.includes(one.value)) { return one.value; }
+  // the unit of the file differs from SI: the order of the values is the same
+  const all = [...new Set(state.result.cases.map((/** @type {any} */ other) => other.values.find((/** @type {any} */ v) => v.name === one.name)?.value))].sort((a, b) => a - b);
+  return list.sort((a, b) => a - b)[all.indexOf(one.value)] ?? NaN;
+}
+
+function atPeakFirst() {
+  if (state.marker || !canShow()) { return; }
+  const at = peakFrequency(0);
+  if (at !== null) { mark(at, 0, true); }
+}
+
+function atPeak() {
+  const at = peakFrequency(state.marker?.case ?? 0);
+  if (at !== null) { mark(at, state.marker?.case ?? 0, true); }
+}
+
+const canShow = () => state.description?.frequency && !["campbell", "nodal-diameter", "modes", "transient"].includes(state.description.kind);
+
+async function follow() {
+  if (!visible) { return; }
+  const shown = canShow() && state.marker;
+  empty.hidden = Boolean(shown);
+  grid.hidden = tools.hidden = !shown;
+  if (!shown) {
+    empty.textContent = `A study of kind ${state.description.kind} has no orbits at an excitation frequency.`;
+    return;
+  }
+  frequency.value = digits(state.marker.frequency, 9);
+  const cases = state.result?.cases ?? state.description.cases;
+  caseMenu.parentElement.hidden = cases.length < 2;
+  caseMenu.replaceChildren(...cases.map((/** @type {any} */ one, /** @type {number} */ index) => make("option", { value: index, text: one.label, selected: index === state.marker.case })));
+  const fixed = (cases[state.marker.case]?.values ?? []).map((/** @type {any} */ one) => ({ name: one.name, value: one.text }));
+  const request = { study: state.study, changes: changeList(), tables: true, view: { kind: "orbit", frequency: state.marker.frequency, case: fixed } };
+  const key = JSON.stringify(request);
+  if (key === wanted) { return; }
+  wanted = key;
+  const late = setTimeout(() => { status.textContent = "computing …"; }, 250);
+  try {
+    const event = await run("orbit", request);
+    if (event === null) { return; }
+    status.textContent = "";
+    if (event.event === "error") { fail(event.message); return; }
+    const summary = table(event, "orbits");
+    if (!summary || !table(event, "orbit")) { fail(event.failures[0]?.reason ?? "There is no orbit at this frequency."); return; }
+    orbit = read(event);
+    empty.hidden = true;
+    grid.hidden = false;
+    show();
+    tell("orbit", orbit);
+  } catch (error) {
+    wanted = "";
+    tell("offline", error);
+  } finally {
+    clearTimeout(late);
+  }
+}
+
+/** @param {string} reason */
+function fail(reason) {
+  orbit = null;
+  empty.hidden = false;
+  grid.hidden = true;
+  status.textContent = "";
+  empty.textContent = `No orbit: ${reason}`;
+  tell("orbit", null);
+}
+
+/** @param {any} event @param {string} name */
+const table = (event, name) => event.tables[name];
+
+/** Sorts the columns of the tables by place and joint. @param {any} event */
+function read(event) {
+  const motion = table(event, "orbit");
+  const one = table(event, "orbits");
+  const columns = new Map(motion.map((/** @type {any} */ column) => [column.name, column.values]));
+  const first = new Map(one.map((/** @type {any} */ column) => [column.name, column.values[0]]));
+  const joints = [...columns.keys()].filter((name) => name.endsWith("_contact")).map((name) => name.slice(0, -8));
+  const labels = [...columns.keys()].filter((name) => name.endsWith("_force_N")).map((name) => name.slice(0, -8));
+  const places = [...columns.keys()].filter((name) => name.endsWith("_displacement_m")).map((name) => name.slice(0, -15)).filter((name) => !labels.includes(name));
+  return {
+    event, columns, first, joints, labels, places, time: columns.get("time_s"),
+    multipliers: event.tables.multipliers ?? null,
+  };
+}
+
+function show() {
+  if (!orbit || panel.hidden || !visible) { return; }
+  loops();
+  time();
+  spectrum();
+  energy();
+  multipliers();
+  plots.words.replaceChildren(...words().map((text) => make("li", { text })));
+}
+
+/** Values with one prefix for all. @param {string[]} names @param {string} end @param {string} unit */
+function lines(names, end, unit) {
+  const all = names.map((name) => orbit.columns.get(name + end));
+  const { factor, unit: shown } = scale(all.flatMap((values) => [Math.max(...values), Math.min(...values)]), unit);
+  return { unit: shown, values: all.map((values) => values.map((/** @type {number} */ value) => value * factor)) };
+}
+
+function loops() {
+  const [x, y] = [lines(orbit.labels, "_displacement_m", "m"), lines(orbit.labels, "_force_N", "N")];
+  const data = orbit.labels.map((/** @type {string} */ name, /** @type {number} */ i) => ({ x: x.values[i], y: y.values[i], name, mode: "lines", line: { color: colour(orbit.places.length + i), width: 2, simplify: false } }));
+  drawOwn(plots.loops, data, { height: 320, xaxis: { title: `relative displacement (${x.unit})`, range: around(x.values.flat()) }, yaxis: { title: `joint force (${y.unit})`, range: around(y.values.flat()) }, ...legendIf(data) });
+}
+
+/** A range with a margin. @param {number[]} values */
+function around(values) {
+  const [low, high] = values.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
+  const margin = 0.06 * (high - low || 1);
+  return [low - margin, high + margin];
+}
+
+const legendIf = (/** @type {any[]} */ data) => (data.length > 1 && data.length <= 12 ? { showlegend: true, legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, margin: { l: 60, r: 12, t: 34, b: 44 } } : {});
+
+const SHADES = { stick: "#0072b2", open: "#cc79a7", touch: "#e69f00" };
+
+function time() {
+  const { factor, unit } = scale([orbit.time.at(-1)], "s");
+  const t = orbit.time.map((/** @type {number} */ value) => value * factor);
+  const rows = [
+    { what: "displacement", list: lines(orbit.places, "_displacement_m", "m"), names: orbit.places, first: 0 },
+    { what: "velocity", list: lines(orbit.places, "_velocity_m_per_s", "m/s"), names: orbit.places, first: 0 },
+    { what: "joint force", list: lines(orbit.labels, "_force_N", "N"), names: orbit.labels, first: orbit.places.length },
+  ].filter((row) => row.names.length > 0);
+  const layout = /** @type {any} */ ({ height: 150 * rows.length + 80, margin: { l: 62, r: 12, t: 40, b: 42 }, xaxis: { title: `time (${unit})`, range: [0, t.at(-1)], anchor: `y${rows.length > 1 ? rows.length : ""}` }, shapes: shading(t, rows.length) });
+  const data = rows.flatMap((row, r) => {
+    const axis = r === 0 ? "" : String(r + 1);
+    const height = 1 / rows.length;
+    layout[`yaxis${axis}`] = { title: `${row.what}<br>(${row.list.unit})`, domain: [1 - (r + 1) * height + 0.03, 1 - r * height - 0.02] };
+    return row.names.map((/** @type {string} */ name, /** @type {number} */ i) => ({ x: t, y: row.list.values[i], yaxis: `y${axis}`, name, legendgroup: name, showlegend: row.names.length <= 10 && r !== 1, mode: "lines", line: { color: colour(row.first + i), width: 2, simplify: false } }));
+  });
+  Object.assign(layout, { showlegend: true, legend: { orientation: "h", y: 1.01, yanchor: "bottom" } });
+  drawOwn(plots.time, data, layout);
+}
+
+/** Shades the times in which a joint sticks or is open. The strip of each joint is a part of the height. @param {number[]} t @param {number} rows */
+function shading(t, rows) {
+  const joints = orbit.joints.filter((/** @type {string} */ joint) => orbit.columns.get(`${joint}_contact`)?.some((/** @type {string} */ word) => word !== "")).slice(0, 6);
+  return joints.flatMap((/** @type {string} */ joint, /** @type {number} */ j) => {
+    const states = orbit.columns.get(`${joint}_contact`).map((/** @type {string} */ word) => (word.startsWith("slip") ? "slip" : word));
+    const shapes = [];
+    let from = 0;
+    for (let i = 1; i <= states.length; i += 1) {
+      if (i < states.length && states[i] === states[from]) { continue; }
+      const fill = SHADES[/** @type {keyof typeof SHADES} */ (states[from])];
+      if (fill) {
+        shapes.push({ type: "rect", xref: "x", yref: "paper", x0: t[from], x1: t[Math.min(i, states.length - 1)], y0: j / joints.length, y1: (j + 1) / joints.length, fillcolor: fill, opacity: isDark() ? 0.28 : 0.14, line: { width: 0 }, layer: "below" });
+      }
+      from = i;
+    }
+    return shapes;
+  });
+}
+
+function spectrum() {
+  const data = orbit.places.map((/** @type {string} */ name, /** @type {number} */ i) => {
+    const values = [1, 2, 3, 4, 5].map((h) => orbit.first.get(`${name}_harmonic${h}_m`) ?? null);
+    return { x: [1, 2, 3, 4, 5], y: values.map((value) => (value === null ? null : value * 1e3)), name, type: "bar", marker: { color: colour(i) } };
+  });
+  drawOwn(plots.spectrum, data, { xaxis: { title: "harmonic", dtick: 1 }, yaxis: { title: "amplitude (mm)", type: "log", exponentformat: "power", nticks: 6 }, bargap: 0.3, ...legendIf(data) });
+}
+
+function energy() {
+  const names = ["work of the forces", "viscous loss", "friction loss"];
+  const values = ["work_in_J", "viscous_J", "friction_J"].map((name) => orbit.first.get(name));
+  const { factor, unit } = scale(values, "J");
+  drawOwn(plots.energy, [{ x: names, y: values.map((value) => value * factor), type: "bar", marker: { color: [colour(0), colour(2), colour(1)] }, text: values.map((value) => si(value, "J", 3)), textposition: "auto", hoverinfo: "x+text" }], { xaxis: {}, yaxis: { title: `energy per cycle (${unit})` }, bargap: 0.4 });
+}
+
+function multipliers() {
+  const column = (/** @type {string} */ name) => orbit.multipliers?.find((/** @type {any} */ one) => one.name === name)?.values ?? [];
+  const circle = Array.from({ length: 121 }, (_, i) => 2 * Math.PI * i / 120);
+  drawOwn(plots.multipliers, [
+    { x: circle.map(Math.cos), y: circle.map(Math.sin), mode: "lines", line: { color: isDark() ? "#9a9a9a" : "#777777", dash: "dash", width: 1 }, hoverinfo: "skip" },
+    { x: column("real"), y: column("imaginary"), mode: "markers", marker: { size: 9, color: "rgba(0,0,0,0)", line: { color: colour(1), width: 2 } }, hovertemplate: "%{x:.4f} %{y:+.4f} i<extra></extra>" },
+  ], { xaxis: { title: "real part", range: [-1.3, 1.3] }, yaxis: { title: "imaginary part", scaleanchor: "x", range: [-1.2, 1.2] }, annotations: column("real").length === 0 ? [{ text: "not known for this method", x: 0, y: 0, showarrow: false }] : [] });
+}
+
+/** The evidence as sentences. */
+function words() {
+  const get = (/** @type {string} */ name) => orbit.first.get(name) ?? null;
+  const list = [];
+  const by = get("found_by");
+  list.push(`Method: ${orbit.event.methods.join("; ") || "–"}${by ? `, found by ${by} in ${get("iterations")} iterations` : ""}.`);
+  const stable = get("stable");
+  list.push(stable === true ? "The orbit is stable: no small disturbance grows." : stable === false ? "The orbit is unstable: a real structure leaves it." : "Its stability is not known.");
+  list.push(`The energy balance closes to ${evidence(get("energy_gap"))} of the work put in.`);
+  list.push(`The motion returns to its start to ${evidence(get("return_defect") ?? get("residual"))}.`);
+  if (get("truncation") !== null) { list.push(`Estimated error of the series: ${evidence(get("truncation"))}.`); }
+  if (get("reduction_error") !== null) { list.push(`Error of the reduced model: ${evidence(get("reduction_error"))}.`); }
+  for (const joint of orbit.joints) {
+    const slip = get(`${joint}_slip_fraction`);
+    const open = get(`${joint}_open_fraction`);
+    const loss = get(`${joint}_dissipation_J`);
+    if (slip !== null) { list.push(`${joint}: slips ${digits(100 * slip, 3)} % of the period${open ? `, is open ${digits(100 * open, 3)} %` : ""}, and dissipates ${si(loss, "J", 3)} per cycle.`); }
+  }
+  list.push("Blue shading: a joint sticks; pink: it is open; none: it slips.");
+  return [...list, ...orbit.event.notes.filter((/** @type {string} */ note) => !list.includes(note))];
+}

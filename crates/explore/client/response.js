@@ -1,0 +1,231 @@
+// The first tab: the figure of the study. It follows the sliders, with few points first.
+
+import { run } from "./api.js";
+import { byId, make, message, perFrame } from "./dom.js";
+import { digits, duration } from "./format.js";
+import { draggable, draw, legend, pixel } from "./plot.js";
+import { changeList, on, state, tell } from "./store.js";
+
+/** Time of an answer that feels immediate while a slider moves, s. */
+const LIVE = 0.06;
+/** Time above which a study waits for its button, s. */
+const PATIENCE = 2;
+/** Pause of a slider after which the full curve is computed, ms. */
+const REST = 160;
+
+let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty;
+/** Time of the last full run, s, and its number of points. */
+let cost = { seconds: 0, points: 0 };
+/** The curve before the last change. @type {any} */
+let previous = null;
+/** @type {any} */
+let timer = 0;
+/** True until the user has asked for a long study. */
+let waiting = false;
+let inFlight = false;
+let again = false;
+
+/** @param {any} panel */
+export function start(panel) {
+  quantity = make("select", { id: "quantity", onchange: () => compute(false) });
+  for (const [value, text] of [["", "amplitude"], ["velocity", "velocity"], ["acceleration", "acceleration"], ["receptance", "receptance"], ["force", "joint force"], ["dissipation", "dissipation per cycle"]]) {
+    quantity.append(make("option", { value, text }));
+  }
+  panels = make("select", { id: "panels-of", onchange: () => compute(false) }, ...[["", "as in the file"], ["cases", "per case"], ["masses", "per place"]].map(([value, text]) => make("option", { value, text })));
+  logarithmic = make("input", { type: "checkbox", id: "log", onchange: () => compute(false) });
+  status = make("span", { class: "state", role: "status" });
+  legendPlace = make("div", { class: "legend" });
+  place = make("div", { class: "plot", id: "response-plot" });
+  button = make("button", { type: "button", class: "primary", text: "Compute", hidden: true, onclick: () => { waiting = false; compute(false, true); } });
+  empty = make("div", { class: "empty", hidden: true }, make("p", {}), button);
+  hint = make("p", { class: "hint", text: "Click the curve to see its orbit. Drag the vertical marker to another frequency." });
+  panel.append(
+    make("div", { class: "tools" },
+      make("label", { class: "only-response" }, "Show", quantity), make("label", { class: "only-response" }, "Panels", panels), make("label", { class: "only-response" }, logarithmic, "logarithmic"),
+      make("button", { type: "button", class: "only-response", id: "pin", text: "Pin this curve", onclick: () => tell("pin") }), status),
+    legendPlace, empty, place, hint);
+  place.addEventListener("redraw", () => show());
+  place.addEventListener("tap", (/** @type {CustomEvent} */ event) => {
+    const at = event.detail;
+    mark(toHertz(at.x, state.result.plot.axes[at.panel].x), panelCase(at.panel), true);
+    tell("show", "orbit");
+  });
+  draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
+  on("opened", () => { previous = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
+  on("moving", () => compute(true));
+  on("changed", () => compute(false));
+  on("theme", () => show());
+  on("pins", () => show());
+  on("marker", () => show());
+  on("tab", (/** @type {string} */ name) => { if (name === "response") { show(); } });
+}
+
+const hasOrbits = () => ["response", "branch"].includes(state.description.kind);
+
+function opened() {
+  for (const element of document.querySelectorAll(".only-response")) { /** @type {any} */ (element).hidden = state.description.kind !== "response"; }
+  hint.hidden = !hasOrbits();
+}
+
+/**
+ * Computes the figure. While a slider moves, long curves get fewer points.
+ * @param {boolean} moving @param {boolean} [asked] true if the user wants a long run
+ */
+async function compute(moving, asked = false) {
+  clearTimeout(timer);
+  if (moving && cost.seconds > PATIENCE) { stale(); return; }
+  if (!moving && !asked && cost.seconds > PATIENCE) { stale(); return; }
+  if (moving) {
+    timer = setTimeout(() => compute(false), REST);
+    // one run at a time while the slider moves: the next one takes the newest values
+    if (inFlight) { again = true; return; }
+  }
+  const { points } = state.description;
+  const cases = Math.max(1, state.description.cases.length);
+  const few = Math.max(16, Math.floor((points / cases) * LIVE / Math.max(cost.seconds, 1e-3)));
+  const reduced = moving && state.description.kind === "response" && cost.seconds > LIVE ? few : null;
+  const begun = performance.now();
+  inFlight = true;
+  const first = waiting;
+  const request = {
+    study: state.study, changes: changeList(), wait: first, quantity: quantity.value || null,
+    view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" && logarithmic.checked ? "log" : null, panels: panels.value || null },
+  };
+  let points_done = 0;
+  try {
+    const late = setTimeout(() => { status.textContent = "computing …"; place.classList.add("stale"); }, 250);
+    const event = await run("study", request, (event) => {
+      if (event.event === "begin") { points_done = event.points ?? 0; }
+      if (event.event === "progress" && performance.now() - begun > 500) {
+        status.textContent = points_done ? `${event.done} of ${points_done} points` : `${event.done} points`;
+      }
+    });
+    clearTimeout(late);
+    if (event === null) { return; }
+    take(event, reduced !== null, (performance.now() - begun) / 1000);
+  } catch (error) {
+    place.classList.remove("stale");
+    status.textContent = "";
+    tell("offline", error);
+  } finally {
+    inFlight = false;
+    if (again) { again = false; compute(true); }
+  }
+}
+
+/** @param {any} event @param {boolean} reduced @param {number} seconds */
+function take(event, reduced, seconds) {
+  place.classList.remove("stale");
+  if (event.event === "expect") {
+    waiting = true;
+    cost = { seconds: Infinity, points: 0 };
+    explain(`This study takes ${event.text}.`, "Compute");
+    status.textContent = "";
+    return;
+  }
+  if (event.event === "error") {
+    tell("failed", event);
+    status.textContent = "not computed";
+    if (!state.result) { explain(event.message, null); }
+    return;
+  }
+  waiting = false;
+  message();
+  empty.hidden = true;
+  place.hidden = false;
+  hint.hidden = !hasOrbits();
+  if (!reduced) { cost = { seconds, points: state.description.points }; }
+  if (!reduced && state.result && !state.result.reduced) { previous = state.result; }
+  state.result = { ...event, reduced };
+  status.textContent = reduced ? "fewer points while moving" : duration(seconds);
+  show();
+  tell("result", state.result);
+}
+
+/** Shows that the figure belongs to former values. */
+function stale() {
+  place.classList.add("stale");
+  explain(state.result ? "The figure belongs to the former values." : "", "Compute again", state.result !== null);
+  status.textContent = Number.isFinite(cost.seconds) ? `takes about ${duration(cost.seconds)}` : "";
+}
+
+/** @param {string} text @param {string | null} action @param {boolean} [keep] keeps the figure */
+function explain(text, action, keep = false) {
+  empty.hidden = false;
+  empty.firstElementChild.textContent = text;
+  button.hidden = action === null;
+  button.textContent = action ?? button.textContent;
+  place.hidden = !keep;
+  hint.hidden = !keep || !hasOrbits();
+}
+
+const show = perFrame(() => {
+  if (!state.result || place.closest("[hidden]")) { return; }
+  const { plot } = state.result;
+  legend(legendPlace, plot, place);
+  const behind = state.pins.map((/** @type {any} */ pin) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: "dash" }));
+  if (previous && previous !== state.result) { behind.push({ plot: previous.plot, opacity: 0.28 }); }
+  // the figure fills the window; on a narrow page it leaves room for the parameters
+  const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - 110;
+  const height = Math.max(340, window.innerWidth < 820 ? 0 : free);
+  draw(place, plot, { behind, shapes: markers(plot), height }).then(drawn);
+});
+
+/** The vertical lines at the marked frequency. @param {any} plot */
+function markers(plot) {
+  if (!state.marker || !hasOrbits()) { return []; }
+  return plot.axes.map((/** @type {any} */ axes, /** @type {number} */ index) => {
+    const name = index === 0 ? "" : index + 1;
+    const x = fromHertz(state.marker.frequency, axes.x);
+    return { type: "line", xref: `x${name}`, yref: `y${name} domain`, x0: x, x1: x, y0: 0, y1: 1, line: { color: getComputedStyle(document.documentElement).getPropertyValue("--changed").trim(), width: 2, dash: "dot" } };
+  });
+}
+
+const factor = (/** @type {any} */ axis) => ({ Hz: 1, kHz: 1e3, "rad/s": 1 / (2 * Math.PI), rpm: 1 / 60 }[axis.unit] ?? 1) * 10 ** axis.power;
+const toHertz = (/** @type {number} */ value, /** @type {any} */ axis) => value * factor(axis);
+const fromHertz = (/** @type {number} */ value, /** @type {any} */ axis) => value / factor(axis);
+
+/** @param {any} at */
+function near(at) {
+  if (!state.marker || !hasOrbits() || !state.result) { return false; }
+  const axes = state.result.plot.axes[at.panel];
+  return Math.abs(pixel(place, "x", at.panel, fromHertz(state.marker.frequency, axes.x)) - at.px) < 9;
+}
+
+/** @param {any} at @param {boolean} last */
+function moveMarker(at, last) {
+  mark(toHertz(at.x, state.result.plot.axes[at.panel].x), state.marker?.case ?? 0, last);
+}
+
+let listened = false;
+/** Marks the time, so that a test can measure it, and listens to clicks. */
+function drawn() {
+  performance.mark("curve-drawn");
+  if (listened) { return; }
+  listened = true;
+  place.on("plotly_click", (/** @type {any} */ event) => {
+    const point = event.points?.find((/** @type {any} */ point) => point.data.hoverinfo !== "skip");
+    if (!point || !hasOrbits()) { return; }
+    const index = Number((point.xaxis._name.match(/\d+/) ?? [1])[0]) - 1;
+    const label = point.data.legendgroup;
+    const found = state.result.cases.findIndex((/** @type {any} */ one) => one.label === label);
+    mark(toHertz(point.x, state.result.plot.axes[index].x), found >= 0 ? found : panelCase(index), true);
+    tell("show", "orbit");
+  });
+}
+
+/** The case that a panel shows, if each panel shows one. @param {number} panel */
+function panelCase(panel) {
+  const { title } = state.result.plot.axes[panel] ?? { title: "" };
+  const found = state.result.cases.findIndex((/** @type {any} */ one) => one.label !== "" && title.startsWith(one.label));
+  return Math.max(0, found);
+}
+
+/** Marks a frequency. @param {number} frequency Hz @param {number} index case @param {boolean} last false while the marker moves */
+export function mark(frequency, index, last) {
+  state.marker = { frequency: Number(digits(frequency, 9)), case: index };
+  tell("marker", last);
+}
+
+/** The element of the figure, for pictures. */
+export const figurePlace = () => place;

@@ -1,0 +1,87 @@
+// Where the parts of a model are drawn.
+//
+// A point mass has no position. Masses are placed from left to right by their distance from the
+// ground in the graph of springs and joints; a ring is a wheel.
+
+/**
+ * @typedef {{name: string, x: number, y: number, radius: number, along: [number, number]}} Mass
+ * @typedef {{from: string, to: string, kind: "spring" | "joint", name: string, bend: number}} Link
+ * @param {any} model
+ * @returns {{masses: Mass[], links: Link[], ground: Mass[], forces: {on: string, phase: number, harmonic: number}[], wheel: boolean}}
+ */
+export function sceneOf(model) {
+  const wheel = Boolean(model.ring);
+  const names = [...model.masses.map((/** @type {any} */ one) => one.name), ...(model.bodies ?? []).map((/** @type {any} */ one) => one.name), ...model.places.filter((/** @type {any} */ one) => !one.of).map((/** @type {any} */ one) => one.name)];
+  const owner = (/** @type {string} */ place) => names.find((name) => place === name || place.startsWith(`${name}.`)) ?? viewOf(model, place) ?? place;
+  const moved = [...new Set(model.motions.map((/** @type {any} */ one) => owner(one.on)))].filter((name) => !names.includes(name));
+  const all = [...names, ...moved];
+  const pairs = [...model.springs.map((/** @type {any} */ one) => ({ between: one.between.map(owner), kind: "spring", name: "" })), ...model.joints.map((/** @type {any} */ one) => ({ between: one.between.map(owner), kind: "joint", name: one.name }))];
+  const weight = (/** @type {string} */ name) => model.masses.find((/** @type {any} */ one) => one.name === name)?.mass ?? 0;
+  const most = Math.max(1e-12, ...model.masses.map((/** @type {any} */ one) => one.mass));
+  const radius = (/** @type {string} */ name) => Math.max(wheel ? 0.35 : 0.45, Math.cbrt(weight(name) / most)) * (wheel ? 0.8 : 1);
+  const masses = wheel ? onWheel(all, model.ring.sectors) : inRows(all, pairs);
+  const ground = /** @type {Mass[]} */ ([]);
+  const links = pairs.map(({ between, kind, name }) => {
+    const ends = between.map((/** @type {string} */ end, /** @type {number} */ which) => {
+      if (end !== "ground") { return end; }
+      const other = masses.get(between[1 - which]) ?? { x: 0, y: 0, along: [1, 0] };
+      const id = `ground ${between[1 - which]}`;
+      if (!ground.some((one) => one.name === id)) {
+        const place = wheel ? { x: other.x * 0.72, y: other.y * 0.72 } : { x: other.x, y: other.y + 1.15 };
+        ground.push({ name: id, radius: 0.3, along: [1, 0], ...place });
+      }
+      return id;
+    });
+    return { from: ends[0], to: ends[1], kind, name, bend: 0 };
+  });
+  /** @type {Map<string, number>} */
+  const count = new Map();
+  for (const link of links) {
+    const key = [link.from, link.to].sort().join("|");
+    const seen = count.get(key) ?? 0;
+    count.set(key, seen + 1);
+    link.bend = seen === 0 ? 0 : (seen % 2 ? 1 : -1) * Math.ceil(seen / 2);
+  }
+  const list = all.map((name) => ({ name, radius: radius(name), ...masses.get(name) }));
+  const forces = model.forces.map((/** @type {any} */ one) => ({ on: owner(one.on), phase: one.phase, harmonic: one.harmonic }));
+  return /** @type {any} */ ({ masses: list, links, ground, forces, wheel });
+}
+
+/** The mass of which a place is a view. @param {any} model @param {string} place */
+const viewOf = (model, place) => model.places.find((/** @type {any} */ one) => place === one.name || place.startsWith(`${one.name}.`))?.of;
+
+/** @param {string[]} names @param {number} sectors */
+function onWheel(names, sectors) {
+  const each = Math.max(1, Math.round(names.length / sectors));
+  return new Map(names.map((name, index) => {
+    const sector = Math.floor(index / each);
+    const ring = index % each;
+    const angle = 2 * Math.PI * sector / sectors - Math.PI / 2;
+    const distance = sectors * 0.42 * (1 - 0.28 * ring / Math.max(1, each));
+    return [name, { x: distance * Math.cos(angle), y: distance * Math.sin(angle), along: [-Math.sin(angle), Math.cos(angle)] }];
+  }));
+}
+
+/** Puts masses of equal distance from the first one into one column. @param {string[]} names @param {any[]} pairs */
+function inRows(names, pairs) {
+  const places = new Map();
+  let row = 0;
+  const open = new Set(names);
+  while (open.size > 0) {
+    // a chain begins at a mass with one neighbour
+    const degree = (/** @type {string} */ name) => new Set(pairs.filter(({ between }) => between.includes(name)).flatMap(({ between }) => between).filter((other) => other !== name && open.has(other))).size;
+    const first = [...open].sort((a, b) => degree(a) - degree(b) || names.indexOf(a) - names.indexOf(b))[0];
+    let column = [first];
+    let x = 0;
+    let tallest = 1;
+    while (column.length > 0) {
+      column.forEach((name, i) => { places.set(name, { x: 2.6 * x, y: row + 1.6 * (i - (column.length - 1) / 2), along: [1, 0] }); open.delete(name); });
+      tallest = Math.max(tallest, column.length);
+      const next = new Set(pairs.filter(({ between }) => between.some((/** @type {string} */ end) => column.includes(end))).flatMap(({ between }) => between).filter((end) => open.has(end)));
+      column = [...next];
+      x += 1;
+    }
+    row += 1.6 * tallest + 1.6;
+  }
+  return places;
+}

@@ -1,0 +1,251 @@
+//! Runs of studies. The newest run of a page wins: it stops the older one of the same slot.
+//!
+//! An answer is a sequence of lines, each a JSON object: `begin`, `progress`, and at the end
+//! `result`, `error`, `expect` (the study takes long and waits) or `superseded`. A client that
+//! disappears stops its run.
+
+use super::access::Refusal;
+use super::routes::State;
+use crate::study::answer::{Tables, answer};
+use crate::study::catalog::Source;
+use crate::study::change::{Change, changed};
+use crate::study::description;
+use crate::study::response_quantity::ResponseQuantity;
+use crate::study::view::{View, ViewSettings, show};
+use axum::body::Body;
+use axum::http::StatusCode;
+use futures_util::stream;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::collections::HashMap;
+use std::convert::Infallible;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use stickslip_study::read_study;
+use stickslip_study::run::{CheckedStudy, Context, ExpectedTime, check};
+use tokio::sync::mpsc;
+
+/// A request for a run.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RunRequest {
+    /// Identifier of the page.
+    client: String,
+    /// Part of the page. A new run of a slot stops the older one.
+    slot: String,
+    /// The study, an entry of the catalog.
+    study: String,
+    /// Its changes.
+    #[serde(default)]
+    changes: Vec<Change>,
+    /// What is computed.
+    view: View,
+    /// True for an answer with all tables.
+    #[serde(default)]
+    tables: bool,
+    /// The quantity of a response that is drawn; the amplitude if absent.
+    quantity: Option<ResponseQuantity>,
+    /// True if a run that takes longer than [`RunSettings::patience`] must wait.
+    #[serde(default)]
+    wait: bool,
+}
+
+/// Limits of runs.
+#[derive(Debug, Clone, Copy)]
+struct RunSettings {
+    /// Largest number of runs at a time. Default 24: ten pages with two slots each, and some
+    /// that are just stopping.
+    runs: usize,
+    /// Largest length of a name in a request. Default 64.
+    name: usize,
+    /// Expected time above which a run waits for a button, s. Default 2.
+    patience: f64,
+    /// Interval between two lines of progress. Default 100 ms.
+    progress: Duration,
+    /// Memory limit of a run, bytes. Default 1 GB: several runs fit into the memory of a laptop.
+    memory: u64,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        RunSettings { runs: 24, name: 64, patience: 2.0, progress: Duration::from_millis(100), memory: 1_000_000_000 }
+    }
+}
+
+/// The runs of all pages.
+#[derive(Debug, Default)]
+pub(crate) struct Runs {
+    /// The stop flag of the newest run of every slot.
+    newest: Mutex<HashMap<Slot, Arc<AtomicBool>>>,
+    running: AtomicUsize,
+    settings: RunSettings,
+}
+
+/// A part of a page.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+struct Slot {
+    client: String,
+    part: String,
+}
+
+impl Runs {
+    fn newest(&self) -> MutexGuard<'_, HashMap<Slot, Arc<AtomicBool>>> {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn stop_all(&self) {
+        self.newest().values().for_each(|stop| stop.store(true, Ordering::Relaxed));
+    }
+
+    /// Begins a run and stops the older one of the slot. `None` if too many are running.
+    fn begin(self: &Runs, slot: Slot, state: Arc<State>) -> Option<Run> {
+        let counted = self.running.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |count| {
+            (count < self.settings.runs).then_some(count + 1)
+        });
+        counted.ok()?;
+        let stop = Arc::new(AtomicBool::new(false));
+        if let Some(older) = self.newest().insert(slot.clone(), stop.clone()) {
+            older.store(true, Ordering::Relaxed);
+        }
+        Some(Run { slot, stop, state })
+    }
+}
+
+/// A run in progress. Dropping it frees its place.
+struct Run {
+    slot: Slot,
+    stop: Arc<AtomicBool>,
+    state: Arc<State>,
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        let runs = &self.state.runs;
+        runs.running.fetch_sub(1, Ordering::Relaxed);
+        let mut newest = runs.newest();
+        if newest.get(&self.slot).is_some_and(|stop| Arc::ptr_eq(stop, &self.stop)) {
+            newest.remove(&self.slot);
+        }
+    }
+}
+
+/// Stops a run when its answer is dropped, because the client is gone.
+struct StopGuard(Arc<AtomicBool>);
+
+impl Drop for StopGuard {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Starts a run and returns its answer.
+///
+/// # Errors
+/// A refusal: a name is too long, or too many runs are in progress.
+pub(crate) fn start(state: Arc<State>, request: RunRequest) -> Result<Body, Refusal> {
+    let settings = state.runs.settings;
+    if [&request.client, &request.slot].iter().any(|name| name.len() > settings.name) {
+        return Err(Refusal { status: StatusCode::BAD_REQUEST, reason: "a name in the request is too long" });
+    }
+    let slot = Slot { client: request.client.clone(), part: request.slot.clone() };
+    let busy = Refusal { status: StatusCode::SERVICE_UNAVAILABLE, reason: "too many runs are in progress" };
+    let run = state.runs.begin(slot, state.clone()).ok_or(busy)?;
+    let guard = StopGuard(run.stop.clone());
+    let (send, receive) = mpsc::unbounded_channel();
+    let progress = send.clone();
+    let points = Arc::new(AtomicUsize::new(0));
+    let (counted, stop) = (points.clone(), run.stop.clone());
+    tokio::task::spawn_blocking(move || {
+        let last = catch_unwind(AssertUnwindSafe(|| execute(&run, &request, &points, &send)));
+        let last = last.unwrap_or_else(|_| {
+            json!({ "event": "error", "message": "the computation failed; this is a bug of Stickslip, please report the study" })
+        });
+        let superseded = run.stop.load(Ordering::Relaxed);
+        // the receiver is gone if the client is
+        let _ = send.send(if superseded { json!({ "event": "superseded" }) } else { last });
+    });
+    tokio::spawn(async move {
+        let mut known = 0;
+        while !stop.load(Ordering::Relaxed) && !progress.is_closed() {
+            tokio::time::sleep(settings.progress).await;
+            let now = counted.load(Ordering::Relaxed);
+            if now == usize::MAX {
+                return;
+            }
+            if std::mem::replace(&mut known, now) != now
+                && progress.send(json!({ "event": "progress", "done": now })).is_err()
+            {
+                return;
+            }
+        }
+    });
+    let lines = stream::unfold(Some((receive, guard)), |open| async move {
+        let (mut receive, guard) = open?;
+        let value: Value = receive.recv().await?;
+        // the answer ends with its last event, even if a report of progress is still on its way
+        let goes_on = value["event"] == "begin" || value["event"] == "progress";
+        let rest = goes_on.then_some((receive, guard));
+        Some((Ok::<String, Infallible>(format!("{value}\n")), rest))
+    });
+    Ok(Body::from_stream(lines))
+}
+
+/// Computes the last line of an answer. `points` counts finished points, and is the largest
+/// number at the end.
+fn execute(run: &Run, request: &RunRequest, points: &Arc<AtomicUsize>, send: &mpsc::UnboundedSender<Value>) -> Value {
+    let last = compute(run, request, points, send).unwrap_or_else(|error| error);
+    points.store(usize::MAX, Ordering::Relaxed);
+    last
+}
+
+fn compute(
+    run: &Run,
+    request: &RunRequest,
+    points: &Arc<AtomicUsize>,
+    send: &mpsc::UnboundedSender<Value>,
+) -> Result<Value, Value> {
+    let wrong = |message: String| json!({ "event": "error", "message": message });
+    let settings = run.state.runs.settings;
+    let source = run.state.catalog.source(&request.study).map_err(wrong)?;
+    let mut document = changed(&source.text, &request.changes).map_err(|error| wrong(error.to_string()))?;
+    let mut view = request.view.clone();
+    if let (View::Study { output, .. }, Some(name)) = (&mut view, request.quantity.and_then(ResponseQuantity::output)) {
+        output.push(name.to_owned());
+    }
+    show(&mut document, &view, &ViewSettings::default()).map_err(|error| wrong(error.to_string()))?;
+    let Source { file, .. } = &source;
+    let invalid = |error| description::error(&error, &source);
+    let study = read_study(file, &document.to_string(), &[]).map_err(invalid)?.with_memory_limit(settings.memory);
+    let checked = check(&study).map_err(invalid)?;
+    if request.wait
+        && let Some(expected) = long(&checked, run, settings.patience)
+    {
+        return Ok(json!({ "event": "expect", "text": expected.to_string() }));
+    }
+    let all = (!study.is_adaptive()).then(|| study.points());
+    // the receiver is gone if the client is
+    let _ = send.send(json!({ "event": "begin", "points": all }));
+    let counter = points.clone();
+    let context = Context {
+        threads: run.state.threads,
+        stop: run.stop.clone(),
+        finished: Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed)),
+    };
+    let dataset = checked.run(&context).map_err(invalid)?;
+    if run.stop.load(Ordering::Relaxed) {
+        return Ok(Value::Null);
+    }
+    let tables = if request.tables { Tables::All } else { Tables::Small };
+    Ok(answer(&study, &dataset, tables, request.quantity))
+}
+
+/// Returns the expected time of a run if it is longer than `patience`.
+fn long(checked: &CheckedStudy, run: &Run, patience: f64) -> Option<ExpectedTime> {
+    let threads = run.state.threads.max(1) as f64;
+    checked.expected_time(&run.stop).filter(|time| match time {
+        ExpectedTime::Extrapolated { seconds, .. } => *seconds > patience * threads,
+        ExpectedTime::MoreThan { .. } => true,
+    })
+}

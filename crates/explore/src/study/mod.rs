@@ -1,0 +1,17 @@
+//! Studies as the page sees them.
+//!
+//! - `catalog`: the templates and the study files of a folder;
+//! - `quantities`: the quantities of a study file that can be changed;
+//! - `change`: changes of a study file that keep its comments;
+//! - `view`: what is computed: the study itself, an orbit, a performance curve or a map;
+//! - `description`: a study for the page: its quantities, its cases and its model;
+//! - `answer`: the results of a run for the page;
+//! - `response_quantity`: curves of velocities, accelerations, receptances and joint quantities.
+
+pub mod answer;
+pub mod catalog;
+pub mod change;
+pub(crate) mod description;
+pub mod quantities;
+pub mod response_quantity;
+pub mod view;

@@ -1,0 +1,161 @@
+//! Maps: the resonance peak over two parameters, its table, its figure and its errors.
+
+use stickslip_study::dataset::{Dataset, Emphasis, Scale, Style};
+use stickslip_study::run::{Context, run};
+use stickslip_study::{StudyError, read_study};
+
+fn oscillator(study: &str) -> String {
+    format!(
+        r#"
+schema = 1
+title = "Map"
+[parameters]
+F0 = "1 N"
+c = "0.1 kg/s"
+Ft = "0.5 N"
+kt = "0.5 N/m"
+[[mass]]
+name = "m"
+mass = "1 kg"
+[[spring]]
+between = ["m", "ground"]
+stiffness = "1 N/m"
+damping = "c"
+[[joint]]
+name = "contact"
+between = ["m", "ground"]
+law = {{ kind = "jenkins", stiffness = "kt", limit = "Ft" }}
+[[force]]
+on = "m"
+amplitude = "F0"
+[study]
+{study}
+"#
+    )
+}
+
+fn read(text: &str) -> Result<Dataset, StudyError> {
+    run(&read_study("map.toml", text, &[])?, &Context::without_progress(2))
+}
+
+fn dataset(study: &str) -> Dataset {
+    read(&oscillator(study)).unwrap_or_else(|error| panic!("{study}: {error}"))
+}
+
+fn column<'a>(data: &'a Dataset, table: &str, name: &str) -> &'a [f64] {
+    let table = data.tables.iter().find(|found| found.name == table).unwrap();
+    table.numbers(name).unwrap_or_else(|| panic!("{name}: {:?}", table.columns))
+}
+
+const RANGE: &str = "frequency = { from = \"0.1 Hz\", to = \"0.25 Hz\", points = 31 }";
+
+/// A linear oscillator has the peak `F0 / (c √(k/m - (c/2m)²))` (stuck joint: k + kt).
+#[test]
+fn peaks_of_a_stuck_oscillator_are_the_closed_form() {
+    let data = dataset(&format!(
+        "kind = \"map\"\n{RANGE}\nover = {{ F0 = {{ from = \"1 mN\", to = \"3 mN\", points = 3 }}, \
+         c = {{ from = \"0.05 kg/s\", to = \"0.4 kg/s\", points = 4, scale = \"log\" }} }}"
+    ));
+    let [force, damping, peak] = ["F0_N", "c_kg_per_s", "amplitude_m"].map(|name| column(&data, "map", name));
+    assert_eq!(force, [1e-3, 1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3, 2e-3, 3e-3, 3e-3, 3e-3, 3e-3]);
+    assert_eq!(damping[..4], [0.05, 0.1, 0.2, 0.4]);
+    for ((force, damping), peak) in force.iter().zip(damping).zip(peak) {
+        let expected = force / (damping * (1.5 - 0.25 * damping * damping).sqrt());
+        assert!((peak / expected - 1.0).abs() < 1e-9, "{force} {damping}: {peak} {expected}");
+    }
+    assert_eq!(data.record.points.get("converged"), Some(&12));
+}
+
+/// A cell has the bits of the same case of a performance study, and every combination of `vary`
+/// has its own map.
+#[test]
+fn cells_are_the_peaks_of_performance_curves() {
+    let map = dataset(&format!(
+        "kind = \"map\"\n{RANGE}\nvary = {{ F0 = [\"1 N\", \"2 N\"] }}\nover = {{ \
+         kt = {{ from = \"0.3 N/m\", to = \"0.9 N/m\", points = 3 }}, Ft = {{ from = \"0.2 N\", to = \"1 N\", points = 5 }} }}"
+    ));
+    let curves = dataset(&format!(
+        "kind = \"performance\"\n{RANGE}\nvary = {{ F0 = [\"1 N\", \"2 N\"], \
+         kt = [\"0.3 N/m\", \"0.6 N/m\", \"0.9 N/m\"], Ft = {{ from = \"0.2 N\", to = \"1 N\", points = 5 }} }}"
+    ));
+    for name in ["F0_N", "kt_N_per_m", "Ft_N", "frequency_Hz", "amplitude_m"] {
+        let [cells, points] = [column(&map, "map", name), column(&curves, "performance", name)];
+        assert_eq!(cells.len(), 30);
+        assert_eq!(cells, points, "{name}");
+    }
+    let figure = map.figure;
+    assert_eq!(figure.panels.len(), 2);
+    for (panel, force) in figure.panels.iter().zip(["1 N", "2 N"]) {
+        assert!(panel.title.starts_with(&format!("F0 = {force}, contours every ")), "{}", panel.title);
+        assert_eq!((panel.x.quantity.as_str(), panel.x.range), ("kt", Some([0.3, 0.9])));
+        assert_eq!((panel.y.quantity.as_str(), panel.y.range), ("Ft", Some([0.2, 1.0])));
+        let of = |style: Style| panel.series.iter().filter(move |series| series.style == style);
+        assert_eq!(of(Style::Stripe).map(|row| row.shades.len()).collect::<Vec<_>>(), [3; 5]);
+        assert!(of(Style::Solid).count() > 2 && of(Style::Solid).all(|line| line.emphasis == Emphasis::Contour));
+        let lowest = of(Style::Stripe).flat_map(|row| row.shades.iter().copied()).fold(f64::INFINITY, f64::min);
+        let marks: Vec<_> = of(Style::Marks).collect();
+        let [mark] = &marks[..] else { panic!("{} marks", marks.len()) };
+        let row = of(Style::Stripe).find(|row| (row.base[0]..=row.y[0]).contains(&mark.y[0])).unwrap();
+        assert!(row.shades[row.x.iter().position(|x| *x == mark.x[0]).unwrap()] == lowest);
+    }
+}
+
+/// Tiles fill the panel without gaps; on a logarithmic axis their borders are geometric means.
+#[test]
+fn tiles_fill_the_panel() {
+    let data = dataset(&format!(
+        "kind = \"map\"\n{RANGE}\nover = {{ F0 = {{ from = \"1 N\", to = \"2 N\", points = 2 }}, \
+         kt = {{ from = \"1 N/m\", to = \"100 N/m\", points = 3, scale = \"log\" }} }}"
+    ));
+    let panel = &data.figure.panels[0];
+    assert_eq!(panel.y.scale, Scale::Log);
+    let rows: Vec<_> = panel.series.iter().filter(|series| series.style == Style::Stripe).collect();
+    let edges: Vec<f64> = rows.iter().map(|row| row.base[0]).chain([rows[2].y[0]]).collect();
+    let expected = [1.0, 10f64.sqrt(), 1000f64.sqrt(), 100.0];
+    assert!(edges.iter().zip(expected).all(|(edge, expected)| (edge / expected - 1.0).abs() < 1e-12), "{edges:?}");
+}
+
+/// `--set` leaves one value of a parameter. The table has its cells; a note explains the missing
+/// figure.
+#[test]
+fn a_map_of_one_parameter_has_no_figure() {
+    let text = oscillator(&format!("kind = \"map\"\n{RANGE}\n{OVER}"));
+    let study = read_study("map.toml", &text, &[("Ft".into(), "1 N".into())]).unwrap();
+    let data = run(&study, &Context::without_progress(1)).unwrap();
+    assert_eq!(column(&data, "map", "kt_N_per_m").len(), 3);
+    assert!(data.figure.panels.is_empty());
+    assert!(data.notes.iter().any(|note| note.contains("only one value")), "{:?}", data.notes);
+}
+
+const OVER: &str = "over = { Ft = { from = \"1 N\", to = \"2 N\", points = 3 }, kt = { from = \"1 N/m\", to = \"2 N/m\", points = 3 } }";
+
+#[test]
+fn wrong_ranges_are_reported_at_their_place() {
+    let over = |text: &str| format!("kind = \"map\"\n{RANGE}\n{text}");
+    for (study, key, message) in [
+        (over(""), "over", "missing"),
+        (over("over = \"Ft\""), "over", "found the text"),
+        (over("over = { Ft = { from = \"1 N\", to = \"2 N\", points = 3 } }"), "over", "found 1 of them"),
+        (over(&OVER.replace("kt", "ky")), "ky", "there is no parameter `ky` to map"),
+        (
+            over(&OVER.replace("{ from = \"1 N/m\", to = \"2 N/m\", points = 3 }", "[\"1 N/m\"]")),
+            "kt",
+            "expected a range",
+        ),
+        (over(&format!("{OVER}\nvary = {{ kt = \"1 N/m\" }}")), "kt", "also in `vary`"),
+        (over(&OVER.replace("\"2 N/m\"", "\"2 N\"")), "kt", "expected stiffness"),
+        (over(&OVER.replace("\"2 N\"", "\"0.5 N\"")), "to", "the range is empty"),
+        (over(&OVER.replace("\"1 N\", to", "\"0 N\", scale = \"log\", to")), "from", "begins above zero"),
+        (over(&OVER.replace("points = 3 }, kt", "points = 3, scale = \"cubic\" }, kt")), "scale", "`linear` or `log`"),
+        (over(OVER).replace("points = 31", "points = 2"), "frequency", "a range of frequencies"),
+        (format!("kind = \"performance\"\n{RANGE}\n{OVER}"), "over", "has no key `over`"),
+    ] {
+        let error = read(&oscillator(&study)).unwrap_err();
+        assert_eq!(error.key(), Some(key), "{study}: {error}");
+        assert!(error.to_string().contains(message), "{study}: {error}");
+        assert!(error.line().is_some(), "{study}: {error}");
+    }
+    let drawn = oscillator(&over(OVER)) + "[sample]\ncount = 3\nof = { F0 = { uniform = [\"1 N\", \"2 N\"] } }\n";
+    let error = read(&drawn).unwrap_err();
+    assert!(error.to_string().contains("no random draws"), "{error}");
+}
