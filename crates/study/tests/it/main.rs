@@ -13,6 +13,7 @@
 //! - `initial_states`: transients that begin with held places;
 //! - `key_examples`: the example of every key;
 //! - `laws_and_kinds`: every law in every study kind;
+//! - `maps`: the peak over two parameters;
 //! - `nodes`: nodes with several directions;
 //! - `random`: generator of random studies;
 //! - `random_studies`: random studies of every kind;
@@ -37,6 +38,7 @@ mod incomplete_models;
 mod initial_states;
 mod key_examples;
 mod laws_and_kinds;
+mod maps;
 mod nodes;
 mod random;
 mod random_studies;
