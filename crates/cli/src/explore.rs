@@ -12,13 +12,13 @@ use stickslip_study::templates;
 pub struct ExploreOptions {
     /// Port; 0 takes a free one.
     pub port: u16,
-    /// Whether the browser is opened.
+    /// Opening of the browser.
     pub open: OpenBrowser,
     /// Number of threads; all cores if absent.
     pub threads: Option<u16>,
 }
 
-/// Whether the browser is opened.
+/// Opening of the browser.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OpenBrowser {
     /// The browser shows the page.

@@ -27,7 +27,7 @@ use tokio::sync::oneshot;
 /// Settings of a server.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// What the page shows first.
+    /// First view of the page.
     pub start: Start,
     /// Folder whose study files are offered.
     pub folder: PathBuf,
@@ -47,7 +47,7 @@ impl Settings {
     }
 }
 
-/// What the page shows first.
+/// First view of the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Start {
     /// The templates and the study files of the folder.

@@ -1,4 +1,4 @@
-//! What every address answers.
+//! Answers by address.
 
 use super::access::{Access, Refusal};
 use super::assets;

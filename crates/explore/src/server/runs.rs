@@ -40,7 +40,7 @@ pub(crate) struct RunRequest {
     /// Its changes.
     #[serde(default)]
     changes: Vec<Change>,
-    /// What is computed.
+    /// Subject of the computation.
     view: View,
     /// True for an answer with all tables.
     #[serde(default)]

@@ -44,7 +44,7 @@ pub struct Quantity {
     pub path: Vec<Step>,
     /// Its name, the last key.
     pub name: String,
-    /// What it belongs to, such as `joint shroud`.
+    /// Owner of the quantity, such as `joint shroud`.
     pub group: String,
     /// One line that describes it.
     pub doc: String,

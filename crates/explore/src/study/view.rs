@@ -1,4 +1,4 @@
-//! What is computed for the page: the study itself, one of its orbits, or the peak over one or
+//! Computations for the page: the study itself, one of its orbits, or the peak over one or
 //! two of its parameters.
 //!
 //! A view replaces `[study]` of the changed file. It is again a study file, which the page can
@@ -8,7 +8,7 @@ use serde::Deserialize;
 use stickslip_study::kinds;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-/// What is computed.
+/// Subject of the computation.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum View {

@@ -3,7 +3,7 @@
 //! Without Chromium (Debian's package `chromium`) the tests say so and pass.
 //! `STICKSLIP_SCREENSHOTS=FOLDER` writes a picture of every view.
 
-use crate::chromium::Browser;
+use crate::chromium::{self, Browser};
 use std::path::Path;
 use stickslip_explore::{Server, Settings, Start};
 use stickslip_study::run::{Context, run};

@@ -7,7 +7,7 @@ pub struct Column {
     pub name: String,
     /// Unit as the file states it; empty if it states none.
     pub unit: String,
-    /// What the column is, in the words of the file; may be empty.
+    /// Description of the column in the words of the file; may be empty.
     pub label: String,
     /// The values as in the file. A missing value is NaN.
     pub values: Vec<f64>,

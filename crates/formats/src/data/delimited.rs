@@ -18,7 +18,7 @@ pub(super) const FORMAT: DataFormat = DataFormat {
     read,
 };
 
-/// How fields are divided, and numbers written.
+/// Separators of fields and of decimals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Dialect {
     /// `None`: blanks.

@@ -43,7 +43,7 @@ pub struct DataFile {
     pub columns: Vec<Column>,
     /// Content that was not read, with the reason.
     pub skipped: Vec<String>,
-    /// What a reader of the data should know: titles, units, repaired faults.
+    /// Notes for a reader of the data: titles, units, repaired faults.
     pub notes: Vec<String>,
 }
 

@@ -84,7 +84,8 @@ pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Sol
     branch_following::solver(method, system)
 }
 
-/// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as seed. Points without an orbit from there are solved in reverse from the next orbit. `see`
+/// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as seed.
+/// Points without an orbit from there are solved in reverse from the next orbit. `see`
 /// receives the outcomes in order.
 pub fn solve_sequence(
     solver: &mut dyn Solver,

@@ -47,7 +47,7 @@ impl Budget {
         self.used += work;
     }
 
-    /// Returns a new budget of at most `limit` and at most what is left.
+    /// Returns a new budget of at most `limit` and at most the remaining work.
     pub fn part(&self, limit: f64) -> Budget {
         Budget::points(limit.min(self.remaining()))
     }

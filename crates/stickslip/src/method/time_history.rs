@@ -35,7 +35,7 @@ pub enum Excitation {
         to: f64,
         /// Duration of the change, s.
         duration: f64,
-        /// How the frequency changes.
+        /// Law of the frequency change.
         scale: SweepScale,
     },
 }

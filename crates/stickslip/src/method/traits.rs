@@ -55,7 +55,7 @@ pub struct Request<'a> {
     /// A neighbouring orbit, from which the search begins. Without one, the method makes its own
     /// initial guess.
     pub seed: Option<&'a Seed>,
-    /// Whether an error estimate that costs extra is needed.
+    /// States if an error estimate that costs extra is needed.
     pub estimate: ErrorEstimate,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Whether an error estimate that costs extra is needed.
+/// Need for an error estimate that costs extra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorEstimate {
     /// Every orbit gets an error estimate, if the method has one.

@@ -20,7 +20,7 @@ pub struct Kind {
     /// Likely mistakes in a study of this kind, as sentences. The argument is a sample of
     /// cases, spread over the study.
     pub warnings: fn(&[SurveyedCase]) -> Vec<String>,
-    /// How the time of its studies is measured in advance.
+    /// Measurement of the time of its studies in advance.
     pub probe: Probe,
     /// Computes one unit: the rows of its tables.
     pub compute: fn(&UnitTask<'_>) -> Computed,
@@ -28,7 +28,7 @@ pub struct Kind {
     pub draw: fn(&FigureInput<'_>) -> Figure,
 }
 
-/// What is computed and measured to expect the time of a run.
+/// Computations that are measured to expect the time of a run.
 #[derive(Debug, Clone, Copy)]
 pub enum Probe {
     /// Two consecutive frequencies of a case.
@@ -40,7 +40,7 @@ pub enum Probe {
     },
     /// The beginning of a unit. The kind reports the computed part to [`UnitTask::share`].
     Unit {
-        /// What the unit is.
+        /// Kind of unit.
         name: &'static str,
     },
 }

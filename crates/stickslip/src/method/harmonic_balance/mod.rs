@@ -27,8 +27,7 @@
 //! - `aft/`: harmonics of joint forces from harmonics of joint motions, with exact derivatives;
 //! - `dynamics/`: receptances of the linear part;
 //! - `linear_solve/`: the linear system of a Newton step;
-//! - `newton`, `line_search`: Newton's method with line search, and the order in which the other searches
-//!   follow;
+//! - `newton`, `line_search`: Newton's method with line search;
 //! - `globalization/`: these searches.
 //!
 //! Results:

@@ -166,7 +166,8 @@ impl Discretization {
         self.search(context, motion, settings)
     }
 
-    /// Returns the residual at which a search on coarse samples ends, see [`CoarseSettings`](super::settings::CoarseSettings).
+    /// Returns the residual at which a search on coarse samples ends, see
+    /// [`CoarseSettings`](super::settings::CoarseSettings).
     fn coarse_tolerance(&self) -> f64 {
         let spacing = 1024.0 / self.all_samples() as f64;
         NewtonSettings::default().coarse.tolerance * spacing.powi(2).max(1.0)
@@ -268,8 +269,8 @@ impl Discretization {
         LineSearch::default().run(reference, &mut trial).unwrap_or_else(|| trial(1.0))
     }
 
-    /// Solves for the Newton step from `self.before` into `self.workspace.step`. Returns false if there
-    /// is none.
+    /// Solves for the Newton step from the previous solution into the workspace. Returns false if
+    /// there is none.
     ///
     /// If only contacts support a body, a step that opens all of them, or slips in all, loses
     /// the restoring stiffness. A step that moves the mean far is then compared with

@@ -95,8 +95,8 @@ pub(super) struct WorkSettings {
     /// Multiplications of one evaluation per sample and axis: both Fourier transforms and the law.
     /// Default 40, measured: 15 µs for 2048 samples.
     pub evaluation: f64,
-    /// The same for friction that falls with velocity, whose force is solved for at six instants of
-    /// each sample. Default 2000, measured: 0.4 µs.
+    /// Multiplications of such an evaluation for friction that falls with velocity, whose force is
+    /// solved for at six instants of each sample. Default 2000, measured: 0.4 µs.
     pub falling_evaluation: f64,
     /// Time steps of laws with memory in one search, unless `evaluations` ask for more. Default
     /// 3e6: a converging search of one joint takes a few hundred thousand, and with a stiff law the

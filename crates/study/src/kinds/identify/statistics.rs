@@ -59,7 +59,7 @@ impl Loss {
     }
 }
 
-/// What a parameter's estimate is worth.
+/// Reliability of a parameter's estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Estimate {
     Determined,

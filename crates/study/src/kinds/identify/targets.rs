@@ -21,7 +21,7 @@ use stickslip::orbit::Seed;
 /// Warm starts of the rows of a target: the seeds of their orbits.
 pub(super) type RowStates = Vec<Option<Seed>>;
 
-/// What the model has in place of the measured numbers.
+/// Numbers of the model in place of the measured ones.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Fitted {
     /// One number for each of [`Target::measured`].
@@ -129,7 +129,7 @@ pub(super) struct TargetError {
     pub help: String,
 }
 
-/// What all kinds of targets have in common, with the data in SI.
+/// Common input of all kinds of targets, with the data in SI.
 #[derive(Debug)]
 pub(super) struct TargetInput<'a> {
     pub data: &'a DataTable,

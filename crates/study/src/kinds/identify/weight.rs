@@ -10,7 +10,7 @@ pub(super) enum Weight {
     Relative(f64),
     /// A fraction of the largest value in the group.
     OfLargest(f64),
-    /// The same for all values, in SI.
+    /// One value for all rows, in SI.
     Absolute(f64),
 }
 

@@ -1,4 +1,4 @@
-//! How a point is solved: Newton's method, then the searches of one table.
+//! The solution of a point: Newton's method, then the searches of one table.
 //!
 //! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
 //! [`FALLBACKS`] follow in their order, each from the same initial guess. If all of them fail,
