@@ -104,8 +104,12 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                         file.display()
                     ),
                     (ErrorKind::Names, Some(_)) => complain!("error: {other}"),
-                    _ if inspect_data(file, &mut text).is_ok() => continue,
-                    _ => complain!("error: {error}"),
+                    _ => match inspect_data(file, &mut text) {
+                        Ok(()) => continue,
+                        // a table with a damaged line
+                        Err(damaged) if damaged.kind != ErrorKind::Format => complain!("error: {damaged}"),
+                        Err(_) => complain!("error: {error}"),
+                    },
                 }
                 wrong = true;
             }
@@ -139,7 +143,8 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
     let variables = formats::list(file, format)?;
     // arrays of a file of MATLAB, NumPy or HDF5 without any matrix of a structure are data
     let square = |variable: &formats::Variable| variable.rows == variable.columns && variable.rows > 1;
-    if format.is_none() && !variables.iter().any(square) && inspect_data(file, text).is_ok() {
+    let may_be_data = format.is_none() && !variables.is_empty() && !variables.iter().any(square);
+    if may_be_data && inspect_data(file, text).is_ok() {
         return Ok((Vec::new(), true));
     }
     let several = variables.len() > 1;

@@ -436,7 +436,7 @@ mod tests {
             of("hysteresis"),
             of("performance"),
             format!(
-                "{}\nover = {{ Ft = {{ from = \"1 N\", to = \"2 N\", points = 2 }}, F0 = {{ from = \"9 N\", to = \"10 N\", \
+                "{}\nover = {{ kt = {{ from = \"9 kN/m\", to = \"10 kN/m\", points = 2 }}, F0 = {{ from = \"9 N\", to = \"10 N\", \
                  points = 2 }} }}",
                 of("map")
             ),

@@ -398,7 +398,7 @@ impl Discretization {
         let SearchContext { ports, homotopy, .. } = context;
         self.work.eliminations += 1;
         if let Some(banded) = &mut self.banded {
-            let along = StepParameters { penalty: &self.linear.penalty, homotopy: homotopy };
+            let along = StepParameters { penalty: &self.linear.penalty, homotopy };
             if !banded.linearise(ports, &along, &self.workspace.tangents) {
                 return false;
             }

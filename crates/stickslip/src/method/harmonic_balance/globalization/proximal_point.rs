@@ -56,11 +56,7 @@ impl Discretization {
             let next = pull * factor;
             let before = motion.iterations;
             let found = self.newton(
-                SearchContext {
-                    ports: ports,
-                    omega: omega,
-                    homotopy: Homotopy { proximal_weight: next, ..GIVEN_EQUATIONS },
-                },
+                SearchContext { ports, omega, homotopy: Homotopy { proximal_weight: next, ..GIVEN_EQUATIONS } },
                 motion,
                 SearchSettings { iterations: ITERATIONS, ..SearchSettings::default() },
             );

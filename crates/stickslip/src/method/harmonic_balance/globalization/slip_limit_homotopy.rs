@@ -47,11 +47,7 @@ impl Discretization {
             };
             let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { SearchSettings::default().iterations };
             raised = self.newton(
-                SearchContext {
-                    ports: ports,
-                    omega: omega,
-                    homotopy: Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS },
-                },
+                SearchContext { ports, omega, homotopy: Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS } },
                 &mut good,
                 SearchSettings { iterations: most, ..SearchSettings::default() },
             );
@@ -65,11 +61,7 @@ impl Discretization {
             motion.copy_from(&good);
             let next = (limits * factor).max(1.0);
             let done = self.newton(
-                SearchContext {
-                    ports: ports,
-                    omega: omega,
-                    homotopy: Homotopy { limit_factor: next, ..GIVEN_EQUATIONS },
-                },
+                SearchContext { ports, omega, homotopy: Homotopy { limit_factor: next, ..GIVEN_EQUATIONS } },
                 motion,
                 SearchSettings::default(),
             );
