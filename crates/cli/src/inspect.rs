@@ -78,7 +78,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
             Err(error) if error.kind == ErrorKind::Format && format.is_none() => rows.push((file, error)),
             // Files of data are no matrices, but a damaged file of matrices is not data either.
             Err(error) => {
-                if format.is_some() || inspect_data(file, &mut text).is_err() {
+                if format.is_some() || !inspect_data(file, &mut text).is_ok_and(|shown| shown) {
                     complain!("error: {error}");
                     wrong = true;
                 }
@@ -105,10 +105,10 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                     ),
                     (ErrorKind::Names, Some(_)) => complain!("error: {other}"),
                     _ => match inspect_data(file, &mut text) {
-                        Ok(()) => continue,
+                        Ok(true) => continue,
                         // a table with a damaged line
                         Err(damaged) if damaged.kind != ErrorKind::Format => complain!("error: {damaged}"),
-                        Err(_) => complain!("error: {error}"),
+                        _ => complain!("error: {error}"),
                     },
                 }
                 wrong = true;
@@ -144,7 +144,7 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
     // arrays of a file of MATLAB, NumPy or HDF5 without any matrix of a structure are data
     let square = |variable: &formats::Variable| variable.rows == variable.columns && variable.rows > 1;
     let may_be_data = format.is_none() && !variables.is_empty() && !variables.iter().any(square);
-    if may_be_data && inspect_data(file, text).is_ok() {
+    if may_be_data && inspect_data(file, text).is_ok_and(|shown| shown) {
         return Ok((Vec::new(), true));
     }
     let several = variables.len() > 1;

@@ -15,12 +15,16 @@ const DRAWN: usize = 3;
 const WIDTH: usize = 64;
 const HEIGHT: usize = 6;
 
-/// Describes the columns of a file in `text`.
+/// Describes the columns of a file in `text`. Returns false, and writes nothing, if the file is
+/// empty.
 ///
 /// # Errors
 /// The file has no format of data, or is damaged.
-pub fn inspect_data(file: &Path, text: &mut String) -> Result<(), Error> {
+pub fn inspect_data(file: &Path, text: &mut String) -> Result<bool, Error> {
     let found = data::read(file)?;
+    if found.columns.is_empty() && found.skipped.is_empty() {
+        return Ok(false);
+    }
     let _ = writeln!(text, "{}\n  {}, {} columns", file.display(), found.format, found.columns.len());
     let width = found.columns.iter().take(LISTED).map(|column| column.name.chars().count()).max().unwrap_or(0);
     for column in found.columns.iter().take(LISTED) {
@@ -40,7 +44,7 @@ pub fn inspect_data(file: &Path, text: &mut String) -> Result<(), Error> {
         }
     }
     text.push('\n');
-    Ok(())
+    Ok(true)
 }
 
 fn more(text: &mut String, count: usize, what: &str) {

@@ -17,7 +17,7 @@ fn data(name: &str) -> PathBuf {
 #[test]
 fn columns_units_sampling_and_a_plot_are_shown() {
     for (name, parts) in [
-        ("germany.csv", vec!["delimited-text, 3 columns", "Kraft [kN]", "steps of 1.0", "line 5 is left out"]),
+        ("germany.csv", vec!["delimited-text, 3 columns", "Kraft [kN]", "steps of 1.0", "line 6 is left out"]),
         ("function_text_5_even.uff", vec!["1.imaginary [(m/s^2)/(N)]", "frequency response function 3 -y / 1 +x"]),
         ("packed.mat", vec!["run(2).F_imaginary", "cells{2} = word"]),
         ("plain.npz", vec!["c_real"]),

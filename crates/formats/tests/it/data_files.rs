@@ -57,7 +57,7 @@ fn what_is_not_read_is_listed() {
     let file = read(folder().join("geometry.uff")).expect("a file");
     assert!(file.notes.iter().any(|note| note.starts_with("units: 1 SI; 1 m is 1")), "{:?}", file.notes);
     let file = read(folder().join("germany.csv")).expect("a file");
-    assert_eq!(file.notes, ["line 5 is left out: it has 2 of 3 fields", "Prüfstand 3"]);
+    assert_eq!(file.notes, ["line 6 is left out: it has 2 of 3 fields", "Prüfstand 3"]);
 }
 
 fn files() -> Vec<Vec<u8>> {
