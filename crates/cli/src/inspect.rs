@@ -2,7 +2,7 @@
 //! structure.
 
 use crate::exit_status::{Exit, print};
-use crate::inspect_data::inspect_data;
+use crate::inspect_data::{inspect_data, is_no_text};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write};
@@ -76,9 +76,13 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
             }
             // Row names are in separate files.
             Err(error) if error.kind == ErrorKind::Format && format.is_none() => rows.push((file, error)),
-            // Files of data are no matrices, but a damaged file of matrices is not data either.
+            // Arrays that are no matrices are data. A damaged file of matrices is not.
             Err(error) => {
-                if format.is_some() || !inspect_data(file, &mut text).is_ok_and(|shown| shown) {
+                let may_be_data = matches!(error.kind, ErrorKind::Unsupported | ErrorKind::NotFinite);
+                if format.is_some()
+                    || !may_be_data
+                    || !inspect_data(file, &mut text, is_no_text).is_ok_and(|shown| shown)
+                {
                     complain!("error: {error}");
                     wrong = true;
                 }
@@ -104,7 +108,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                         file.display()
                     ),
                     (ErrorKind::Names, Some(_)) => complain!("error: {other}"),
-                    _ => match inspect_data(file, &mut text) {
+                    _ => match inspect_data(file, &mut text, |_| true) {
                         Ok(true) => continue,
                         // a table with a damaged line
                         Err(damaged) if damaged.kind != ErrorKind::Format => complain!("error: {damaged}"),
@@ -144,7 +148,7 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
     // arrays of a file of MATLAB, NumPy or HDF5 without any matrix of a structure are data
     let square = |variable: &formats::Variable| variable.rows == variable.columns && variable.rows > 1;
     let may_be_data = format.is_none() && !variables.is_empty() && !variables.iter().any(square);
-    if may_be_data && inspect_data(file, text).is_ok_and(|shown| shown) {
+    if may_be_data && inspect_data(file, text, is_no_text).is_ok_and(|shown| shown) {
         return Ok((Vec::new(), true));
     }
     let several = variables.len() > 1;

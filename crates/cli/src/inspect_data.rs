@@ -15,14 +15,20 @@ const DRAWN: usize = 3;
 const WIDTH: usize = 64;
 const HEIGHT: usize = 6;
 
+/// Tells whether a file that may contain matrices contains data: in text, matrices are recognised
+/// first.
+pub fn is_no_text(found: &DataFile) -> bool {
+    found.format != "delimited-text"
+}
+
 /// Describes the columns of a file in `text`. Returns false, and writes nothing, if the file is
-/// empty.
+/// empty or not accepted.
 ///
 /// # Errors
 /// The file has no format of data, or is damaged.
-pub fn inspect_data(file: &Path, text: &mut String) -> Result<bool, Error> {
+pub fn inspect_data(file: &Path, text: &mut String, accepts: fn(&DataFile) -> bool) -> Result<bool, Error> {
     let found = data::read(file)?;
-    if found.columns.is_empty() && found.skipped.is_empty() {
+    if (found.columns.is_empty() && found.skipped.is_empty()) || !accepts(&found) {
         return Ok(false);
     }
     let _ = writeln!(text, "{}\n  {}, {} columns", file.display(), found.format, found.columns.len());

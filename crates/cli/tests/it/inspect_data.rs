@@ -26,7 +26,10 @@ fn columns_units_sampling_and_a_plot_are_shown() {
         let (code, out, err) = inspect(&data(name));
         assert_eq!(code, 0, "{name}: {err}");
         parts.iter().for_each(|part| assert!(out.contains(part), "{name}: no `{part}` in {out}"));
-        assert!(out.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{name}: no plot in {out}");
+        // monotonic columns and words are not drawn
+        let drawn = !["packed.mat", "plain.npz"].contains(&name);
+        let plot = out.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
+        assert!(plot || !drawn, "{name}: no plot in {out}");
     }
 }
 
