@@ -21,9 +21,10 @@ fn couple() -> Start {
     Start::Template("blade-couple".into())
 }
 
-/// On a busy machine the page asks before it computes; the condition then presses the button.
+/// On a busy machine the page asks before it computes; the condition then presses the button once.
 const CURVE: &str = "document.querySelector('#response-plot')?.data?.length > 7 \
-    || void [...document.querySelectorAll('button')].find(b => b.textContent === 'Compute' && b.offsetParent)?.click()";
+    || void ((button) => button && !window.pressed && (window.pressed = true, button.click())) \
+    ([...document.querySelectorAll('button')].find((b) => b.textContent === 'Compute' && b.offsetParent))";
 /// The highest amplitude of the curves that are drawn in front.
 const HIGHEST: &str = "Math.max(...document.querySelector('#response-plot').data.filter((t) => t.mode === 'lines' && t.hoverinfo !== 'skip' && t.legendgroup).flatMap((t) => t.y))";
 
