@@ -201,7 +201,8 @@ fn the_best_slip_force_is_that_of_the_closed_form() {
     }
 }
 
-/// The same closed form in every row of the map: the lowest cell is one of the two beside `π/2 F0`.
+/// The optimum slip limit is `π/2 F0` in every row of the map. The lowest cell is therefore one
+/// of the two cells next to that value.
 #[test]
 fn the_map_is_lowest_at_the_closed_form_for_every_stiffness() {
     let found = dataset("damper_map", &text("damper_map"));

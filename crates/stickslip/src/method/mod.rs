@@ -13,7 +13,7 @@
 //! - `transient`: integration until the transient has decayed
 //! - `auto`: picks one of them
 //!
-//! What they share:
+//! Parts that several methods use:
 //! - `flow/`: time integrations
 //! - `orbit_search/`: initial guess, return map, evidence
 //! - `static_equilibrium`: the equilibrium under the constant loads

@@ -18,7 +18,7 @@ use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
 use crate::method::{Budget, ErrorEstimate, MethodError, OrbitError, Request, Solver};
 use crate::model::System;
-use crate::orbit::{JointSeries, ObservedMotion, Orbit, Seed};
+use crate::orbit::{ObservedMotion, Orbit, Seed};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
@@ -375,32 +375,22 @@ impl HarmonicBalanceSolver {
         }
     }
 
-    /// Returns the warm start from a seed: the series of the joints, or the harmonics of a time
-    /// integration that begins at the state.
-    fn warm_start(&mut self, seed: &Seed, omega: f64) -> Option<(usize, HarmonicSolution)> {
-        match self.series_of(seed) {
-            Some(series) => Some((series.highest_harmonic, HarmonicSolution::from_series(series))),
-            None => self.guess_from_state(&seed.state, omega),
-        }
-    }
-
-    /// Returns the series of a seed if it fits this system.
-    fn series_of<'s>(&self, seed: &'s Seed) -> Option<&'s JointSeries> {
-        let fits = |series: &&Arc<JointSeries>| {
-            series.motions.len() == self.ports.count() * self.harmonic_set.up_to(series.highest_harmonic).len()
-        };
-        seed.series.as_ref().filter(fits).map(|series| &**series)
+    /// Returns the series of a seed as warm start, if it fits this system.
+    fn series_of(&self, seed: &Seed) -> Option<(usize, HarmonicSolution)> {
+        let series = seed.series.as_deref()?;
+        let length = self.ports.count() * self.harmonic_set.up_to(series.highest_harmonic).len();
+        (series.motions.len() == length).then(|| (series.highest_harmonic, HarmonicSolution::from_series(series)))
     }
 
     /// Finds the orbit of a request within the work limit that is set.
     fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
-        let seed = request.seed;
-        let warm = seed.and_then(|seed| self.warm_start(seed, omega));
-        let has_series = seed.is_some_and(|seed| self.series_of(seed).is_some());
-        if let (ErrorEstimate::Skipped, true, Some((top, motion))) = (request.estimate, has_series, &warm) {
+        let series = request.seed.and_then(|seed| self.series_of(seed));
+        if let (ErrorEstimate::Skipped, Some((top, motion))) = (request.estimate, &series) {
             // the number of harmonics of the neighbouring orbit is sufficient
             return self.solve_nearby(*top, omega, motion);
         }
+        // without a series, a time integration begins at the seed's state
+        let warm = series.or_else(|| self.guess_from_state(&request.seed?.state, omega));
         let mut found = match self.converge(self.first, omega, warm) {
             Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
                 self.solve_or_classify(omega).unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error))

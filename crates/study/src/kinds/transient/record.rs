@@ -54,8 +54,8 @@ impl Channel {
 /// The records of a case.
 #[derive(Debug)]
 pub(super) struct Records {
-    /// The system under the constant forces, and a unit excitation of its own harmonic for every
-    /// channel.
+    /// The system under the constant forces. Every channel is a unit excitation with a separate
+    /// harmonic.
     unit: System,
     channels: Vec<Channel>,
     /// Times of all rows, rising.

@@ -13,8 +13,7 @@ pub(crate) struct Homotopy {
     /// Factor `L` on the slip limits. Every law gives the force `L f(u / L)`, so that nonlinear
     /// effects begin only at large motions.
     pub limit_factor: f64,
-    /// Weight `s` of the proximal term `s (λ - λ₀)`, see
-    /// [`Discretization::anchor`](super::super::equations::Discretization::anchor).
+    /// Weight `s` of the proximal term `s (λ - λ₀)`; λ₀ is the anchor of the search.
     pub proximal_weight: f64,
 }
 

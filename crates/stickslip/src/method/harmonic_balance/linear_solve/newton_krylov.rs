@@ -38,7 +38,8 @@ struct KrylovSettings {
     /// samples. Measured: for 8 and 10 nodes of three directions with six harmonics, 288 and 360
     /// unknowns, a point takes 2.4 and 3.2 ms instead of 5.7 and 8.0.
     unknowns: usize,
-    /// The same number with rigid friction, whose lowest harmonics are eliminated in any case.
+    /// Number of unknowns from which GMRES is used with rigid friction. It is larger, because the
+    /// lowest harmonics of rigid friction are eliminated in any case.
     unknowns_with_forces: usize,
     /// Number of unknowns from which GMRES is used for few directions with rigid friction, whose
     /// series are long. Measured: a step of 10 joints with 128 harmonics, 2560 unknowns, takes 80
