@@ -5,6 +5,7 @@ use super::coordinates::{Coordinates, merge_duplicates};
 use super::error::{Element, ModelError};
 use super::name_resolution::{PlaceSource, PlaceTarget, Places};
 use super::place::places_of;
+use super::substructure::Entries;
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::reduction::Row;
@@ -76,9 +77,10 @@ impl Model {
     /// ```
     pub fn assemble(&self) -> Result<System, ModelError> {
         let places = Places::new(self)?;
-        let coordinates = Coordinates::new(self, &places)?;
+        let mut coordinates = Coordinates::new(self, &places)?;
+        let entries = std::mem::take(&mut coordinates.entries);
         let assembler = Assembler { model: self, places, coordinates };
-        let matrices = assembler.matrices()?;
+        let matrices = assembler.matrices(entries)?;
         let motions = assembler.motions()?;
         let builder = System::builder(assembler.structure(&matrices)?).reduced(assembler.coordinates.reduced.clone());
         let builder =
@@ -161,12 +163,13 @@ impl Assembler<'_> {
         Err(ModelError::new(element, "between", message))
     }
 
-    fn matrices(&self) -> Result<AssembledMatrices, ModelError> {
+    /// Adds masses, springs and dampers to the entries of the substructure and the bodies.
+    fn matrices(&self, entries: [Entries; 3]) -> Result<AssembledMatrices, ModelError> {
         let total = self.coordinates.free + self.coordinates.moved;
         for (i, mass) in self.model.masses.iter().enumerate() {
             finite_at_least_zero(mass.mass, Element::Mass(i), "mass", "kg")?;
         }
-        let [mut mass, mut damping, mut stiffness] = self.coordinates.entries.clone();
+        let [mut mass, mut damping, mut stiffness] = entries;
         for (place, row) in self.places.stated.iter().zip(&self.coordinates.places) {
             if let PlaceSource::Own(own) = place.of {
                 add_along(&mut mass, row, own);

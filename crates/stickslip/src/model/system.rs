@@ -2,7 +2,7 @@
 
 use super::ReductionAccuracy;
 use crate::law::{LawError, SharedLaw};
-use crate::structure::{ReducedComponent, RingSector, Structure, unit_root};
+use crate::structure::{ReducedComponent, Structure, unit_root};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
@@ -587,7 +587,7 @@ impl System {
     fn symmetry_violation(&self, cyclic: CyclicSymmetry) -> Option<&'static str> {
         let CyclicSymmetry { sectors, order } = cyclic;
         let n = self.dofs();
-        if order >= sectors || RingSector::from_ring(&self.structure, sectors).is_none() {
+        if order >= sectors || self.structure.ring_sector(sectors).is_none() {
             return Some("masses, dampers or springs");
         }
         let size = n / sectors;

@@ -197,11 +197,9 @@ fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S:
             possible += (signals.product(&load, &load) * signals.product(&velocity[row], &velocity[row])).sqrt();
         }
     }
-    for (row, column, [_, damping, _]) in system.structure().entries() {
-        if damping != 0.0 {
-            viscous += damping * signals.product(&velocity[row], &velocity[column]);
-        }
-    }
+    system.structure().damping_entries().for_each(|(row, column, damping)| {
+        viscous += damping * signals.product(&velocity[row], &velocity[column]);
+    });
     for shape in system.structure().damped_modes().into_iter().flat_map(ModalDamping::iter) {
         let mut along = signals.harmonics(&[]);
         shape.iter().zip(&velocity).for_each(|(share, velocity)| signals.add(&mut along, velocity, *share));

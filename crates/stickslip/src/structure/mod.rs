@@ -26,7 +26,8 @@ pub use sector_faces::{FacesError, NodeCoordinates, SectorFaces};
 pub(crate) use uncoupled_modes::UncoupledModes;
 
 use nalgebra::DMatrix;
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definiteness::{is_semidefinite, semidefinite_rank, sparse_definite};
 use stickslip_numerics::sparse::{Asymmetry, MatrixError, SparseMatrix, SymbolicAnalysis};
 
@@ -46,6 +47,8 @@ struct StructureData {
     largest: [f64; 3],
     dissipates: OnceLock<bool>,
     uncoupled: OnceLock<Option<Arc<UncoupledModes>>>,
+    /// The first sector, by the number of equal sectors; none if the sectors differ.
+    ring_sectors: Mutex<BTreeMap<usize, Option<Arc<RingSector>>>>,
 }
 
 #[derive(Debug)]
@@ -317,6 +320,7 @@ impl Structure {
             largest,
             dissipates: OnceLock::new(),
             uncoupled: OnceLock::new(),
+            ring_sectors: Mutex::default(),
         }))
     }
 
@@ -410,22 +414,57 @@ impl Structure {
                     .map(|at| (at.0, at.1, [full.mass[at], full.damping[at], full.stiffness[at]]))
                     .filter(|(_, _, values)| values.iter().any(|v| *v != 0.0)),
             ),
-            Storage::Sparse { mass, damping, stiffness, .. } => Box::new((0..n).flat_map(move |column| {
-                let mut rows: Vec<(usize, [f64; 3])> = Vec::new();
-                for (kind, matrix) in [mass, damping, stiffness].into_iter().enumerate() {
-                    for (row, value) in matrix.column(column) {
-                        match rows.binary_search_by_key(&row, |entry| entry.0) {
-                            Ok(at) => rows[at].1[kind] = value,
-                            Err(at) => {
-                                rows.insert(at, (row, [0.0; 3]));
-                                rows[at].1[kind] = value;
-                            }
-                        }
-                    }
-                }
-                rows.into_iter().map(move |(row, values)| (row, column, values))
+            Storage::Sparse { .. } => Box::new((0..n).flat_map(move |column| {
+                self.column(column).into_iter().map(move |(row, values)| (row, column, values))
             })),
         }
+    }
+
+    /// Iterates over the nonzero entries of the damping matrix in the order of
+    /// [`Structure::entries`]: row, column, kg/s.
+    pub(crate) fn damping_entries(&self) -> Box<dyn Iterator<Item = (usize, usize, f64)> + '_> {
+        match &self.0.form {
+            Storage::Full(full) => nonzero_entries(&full.damping),
+            Storage::Sparse { damping, .. } => Box::new(damping.entries()),
+        }
+    }
+
+    /// Iterates over the nonzero entries of the stiffness matrix in the order of
+    /// [`Structure::entries`]: row, column, N/m.
+    pub(crate) fn stiffness_entries(&self) -> Box<dyn Iterator<Item = (usize, usize, f64)> + '_> {
+        match &self.0.form {
+            Storage::Full(full) => nonzero_entries(&full.stiffness),
+            Storage::Sparse { stiffness, .. } => Box::new(stiffness.entries()),
+        }
+    }
+
+    /// Returns the nonzero entries of one column of (mass, damping, stiffness): row, values. The
+    /// rows ascend.
+    pub(in crate::structure) fn column(&self, column: usize) -> Vec<(usize, [f64; 3])> {
+        match &self.0.form {
+            Storage::Full(full) => (0..self.dofs())
+                .map(|row| {
+                    (row, [full.mass[(row, column)], full.damping[(row, column)], full.stiffness[(row, column)]])
+                })
+                .filter(|(_, values)| values.iter().any(|value| *value != 0.0))
+                .collect(),
+            Storage::Sparse { mass, damping, stiffness, .. } => {
+                let mut parts = [mass, damping, stiffness].map(|matrix| matrix.column(column).peekable());
+                let mut merged = Vec::with_capacity(parts.iter().map(|part| part.size_hint().0).max().unwrap_or(0));
+                while let Some(row) = parts.iter_mut().filter_map(|part| part.peek().map(|entry| entry.0)).min() {
+                    let take = |part: &mut std::iter::Peekable<_>| part.next_if(|entry: &(usize, f64)| entry.0 == row);
+                    merged.push((row, std::array::from_fn(|k| take(&mut parts[k]).map_or(0.0, |entry| entry.1))));
+                }
+                merged
+            }
+        }
+    }
+
+    /// Returns the first of `sectors` equal sectors; see [`RingSector::from_ring`]. The result is
+    /// kept, because several methods need it.
+    pub(crate) fn ring_sector(&self, sectors: usize) -> Option<Arc<RingSector>> {
+        let mut known = self.0.ring_sectors.lock().unwrap_or_else(PoisonError::into_inner);
+        known.entry(sectors).or_insert_with(|| RingSector::from_ring(self, sectors).map(Arc::new)).clone()
     }
 
     /// Returns whether the structure alone never supplies energy to a motion, and every motion
@@ -535,6 +574,13 @@ fn is_full(n: usize, entries: [usize; 3]) -> bool {
     let most = entries.into_iter().max().unwrap_or(0);
     // Fraction of nonzero entries above which matrices are stored full at any size.
     n < MIN_SPARSE_DOFS || most as f64 > 0.3 * (n as f64) * (n as f64)
+}
+
+/// Iterates over the nonzero entries of a full matrix, row by row.
+fn nonzero_entries(matrix: &DMatrix<f64>) -> Box<dyn Iterator<Item = (usize, usize, f64)> + '_> {
+    let n = matrix.ncols();
+    let all = (0..matrix.nrows()).flat_map(move |row| (0..n).map(move |column| (row, column)));
+    Box::new(all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0))
 }
 
 fn to_full(mass: &SparseMatrix, damping: &SparseMatrix, stiffness: &SparseMatrix) -> Matrices {

@@ -11,18 +11,22 @@
 
 use super::{Structure, StructureError};
 use num_complex::Complex64;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::{Mutex, PoisonError};
 use stickslip_numerics::sparse::{Singular, SparseMatrix};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
 /// The rows of the first sector in the matrices of a ring.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct RingSector {
     sectors: usize,
     places: Vec<String>,
     /// Row, column, offset of the column in sectors, values of mass, damping, stiffness.
     entries: Vec<(usize, usize, usize, [f64; 3])>,
+    /// Waves that were requested before, by nodal diameter.
+    waves: Mutex<BTreeMap<usize, Wave>>,
 }
 
 /// The matrices of a wave with one nodal diameter on the sectors of a ring.
@@ -95,32 +99,33 @@ impl RingSector {
             return None;
         }
         let n = all / sectors;
-        let key = |row: usize, column: usize| {
-            let [own, other] = [row / n, column / n];
-            (row % n, column % n, (other + sectors - own) % sectors)
-        };
-        let mut entries: Vec<(usize, usize, usize, [f64; 3])> = ring
-            .entries()
-            .filter(|(row, ..)| *row < n)
-            .map(|(row, column, values)| {
-                let (row, column, shift) = key(row, column);
-                (row, column, shift, values)
-            })
-            .collect();
-        entries.sort_unstable_by_key(|entry| (entry.0, entry.1, entry.2));
         let largest = ring.largest();
-        let mut met = 0;
-        for (row, column, values) in ring.entries() {
-            let key = key(row, column);
-            // Difference between the matrices of a sector and those of the first one that counts
-            // as rounding of sums in another order. It is relative to the largest entry.
-            let near = |first: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= 1e-12 * largest[k]);
-            match entries.binary_search_by_key(&key, |entry| (entry.0, entry.1, entry.2)) {
-                Ok(at) if near(&entries[at].3) => met += 1,
-                _ => return None,
+        // Difference between the matrices of a sector and those of the first one that counts as
+        // rounding of sums in another order. It is relative to the largest entry.
+        let near =
+            |first: &[f64; 3], values: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= 1e-12 * largest[k]);
+        let mut entries = Vec::new();
+        for own in 0..n {
+            let first = ring.column(own);
+            for sector in 0..sectors {
+                let column = if sector == 0 { first.clone() } else { ring.column(sector * n + own) };
+                // the rows from those of the column's own sector on, once around the ring
+                let start = column.partition_point(|(row, _)| *row < sector * n);
+                let turned = column[start..].iter().chain(&column[..start]);
+                let equal = column.len() == first.len()
+                    && first.iter().zip(turned).all(|((row, values), (other_row, others))| {
+                        (row + sector * n) % all == *other_row && near(values, others)
+                    });
+                if !equal {
+                    return None;
+                }
+                let rows = column.iter().take_while(|(row, _)| *row < n);
+                entries.extend(rows.map(|&(row, values)| (row, own, sector, values)));
             }
         }
-        (met == sectors * entries.len()).then(|| RingSector { sectors, places: ring.places()[..n].to_vec(), entries })
+        entries.sort_unstable_by_key(|entry| (entry.0, entry.1, entry.2));
+        let places = ring.places()[..n].to_vec();
+        Some(RingSector { sectors, places, entries, waves: Mutex::default() })
     }
 
     /// Returns the number of degrees of freedom of a sector.
@@ -134,7 +139,7 @@ impl RingSector {
     }
 
     /// Returns the matrices of the wave with this nodal diameter. The diameters `d` and `d + N`
-    /// are equivalent.
+    /// are equivalent. The result is kept.
     ///
     /// # Errors
     /// [`StructureError`]: the matrices do not form a valid structure.
@@ -164,7 +169,18 @@ impl RingSector {
     /// assert!((x[0] - 1.0 / stiffness).norm() < 1e-14);
     /// ```
     pub fn wave(&self, diameter: usize) -> Result<Wave, StructureError> {
-        let (n, diameter) = (self.dofs(), diameter % self.sectors);
+        let diameter = diameter % self.sectors;
+        let mut known = self.waves.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(wave) = known.get(&diameter) {
+            return Ok(wave.clone());
+        }
+        let wave = self.new_wave(diameter)?;
+        known.insert(diameter, wave.clone());
+        Ok(wave)
+    }
+
+    fn new_wave(&self, diameter: usize) -> Result<Wave, StructureError> {
+        let n = self.dofs();
         let real = is_real(diameter, self.sectors);
         let copies = if real { 1 } else { 2 };
         let matrix = |kind: usize| {

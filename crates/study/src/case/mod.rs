@@ -3,6 +3,7 @@
 //! - `study`: the study and its cases;
 //! - `values`: the values of a table for one case;
 //! - `model_builder`: builds the model from the lists, with or without a disk;
+//! - `assembled`: the system of the model that was assembled last;
 //! - `disk`: `[disk]`, the ring of a sector, tuned or mistuned;
 //! - `substructure`: `[structure]` and `[[place]]` as parts of a model;
 //! - `stress_stiffening`: stress stiffening of a rotating structure;
@@ -11,6 +12,7 @@
 //! - `linear_reference`: the linear reference models, all joints free or stuck;
 //! - `initial_state`: the initial state of a transient.
 
+pub(crate) mod assembled;
 pub(crate) mod disk;
 pub(crate) mod initial_state;
 pub(crate) mod linear_reference;

@@ -1,5 +1,6 @@
 //! A study that was read: its cases, each with its model and the values of its kind.
 
+use crate::case::assembled::LastAssembled;
 use crate::case::disk::{self, Reevaluate};
 use crate::case::model_builder::{build_model, refuse_without_disk};
 use crate::case::sample::{DrawnParameter, SampleSettings};
@@ -55,6 +56,8 @@ pub struct Study {
     pub(crate) data: Arc<Vec<DataTable>>,
     /// Memory limit of a run, bytes, if the user set one.
     pub(crate) memory: Option<u64>,
+    /// The last assembled model.
+    pub(crate) assembled: LastAssembled,
 }
 
 /// A parameter: its value as stated, and its required dimension if that is known.
@@ -743,7 +746,7 @@ impl Study {
             return None;
         }
         if (first_look || !numbers_in_range(&model))
-            && let Err(error) = model.assemble()
+            && let Err(error) = self.assembled.system(&model)
         {
             problems.push(self.model_problem(&error, &model));
             return None;

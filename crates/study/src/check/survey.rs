@@ -18,8 +18,9 @@ impl SurveyedCase {
         let case = study.case(index)?;
         // contacts that a constant load closes count as closed
         let forces = |system: &System| Some(StaticEquilibrium::under_load(system)?.forces());
-        let survey = case.model.survey_under_load(&forces);
-        let survey = survey.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
+        let system = study.assembled.system(&case.model);
+        let system = system.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
+        let survey = case.model.survey_of(&system, &forces);
         Ok(SurveyedCase { case, survey })
     }
 }

@@ -166,7 +166,7 @@ impl<'a> FigureInput<'a> {
 
     /// Returns the system of the first case; the other cases differ in numbers only.
     pub(crate) fn system(&self) -> Option<System> {
-        self.study.case(0).ok()?.model.assemble().ok()
+        self.study.assembled.system(&self.study.case(0).ok()?.model).ok()
     }
 
     /// Returns the rows of `table` case by case.

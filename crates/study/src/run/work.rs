@@ -75,8 +75,10 @@ impl PreparedCase {
             study.error_at("method", 0, "kind", format!("there is no method `{}`", case.method.name), None)
         })?;
         let method = (row.build)(&case.method.options).map_err(|error| refusal_at_location(study, &case, &error))?;
-        let system =
-            case.model.assemble().map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
+        let system = study
+            .assembled
+            .system(&case.model)
+            .map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
         let refuse = |error: MethodError| {
             refusal_at_location(study, &case, &error.with_alternatives(method::alternatives(&system)))
         };

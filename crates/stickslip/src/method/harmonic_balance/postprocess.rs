@@ -87,11 +87,11 @@ pub(super) fn mean_forces_balance(
     }
     // at large displacements the balance is limited by the rounding of the spring forces
     let (mut held, mut rounding) = (vec![0.0; system.dofs()], vec![0.0; system.dofs()]);
-    for (row, column, [.., stiffness]) in system.structure().entries() {
+    system.structure().stiffness_entries().for_each(|(row, column, stiffness)| {
         let force = stiffness * x[0][column].re;
         held[row] += force;
         rounding[row] += ROUNDING * f64::EPSILON * force.abs();
-    }
+    });
     let missing = left.iter().zip(held).zip(rounding).map(|((left, held), rounding)| {
         let missing = (left.re - held).abs() - rounding;
         missing.max(0.0).powi(2)

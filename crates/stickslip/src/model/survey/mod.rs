@@ -108,8 +108,12 @@ impl Model {
         &self,
         forces: &dyn Fn(&System) -> Option<Vec<[f64; MAX_DIRECTIONS]>>,
     ) -> Result<Survey, ModelError> {
-        let system = self.assemble()?;
-        let forces = if system.dofs() > MAX_DOFS { None } else { forces(&system) };
+        Ok(self.survey_of(&self.assemble()?, forces))
+    }
+
+    /// Returns the survey of [`Model::survey_under_load`] for the assembled model.
+    pub fn survey_of(&self, system: &System, forces: &dyn Fn(&System) -> Option<Vec<[f64; MAX_DIRECTIONS]>>) -> Survey {
+        let forces = if system.dofs() > MAX_DOFS { None } else { forces(system) };
         // contact force and law of joints without preload that the constant loads press
         // together
         let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {
@@ -121,8 +125,8 @@ impl Model {
             StuckAxis::of_joint(index, joint, found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
         };
         let joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
-        let loose = self.loose(&system, &joints);
-        let mut at_rest = preload::equilibrium_forces(&system, &joints);
+        let loose = self.loose(system, &joints);
+        let mut at_rest = preload::equilibrium_forces(system, &joints);
         for (stuck, carried) in joints.iter().zip(&mut at_rest).filter(|(stuck, _)| stuck.pressed.is_some()) {
             if let Some((force, _)) = pressed(stuck.joint, &system.joints()[stuck.joint]) {
                 *carried = Some(force);
@@ -137,7 +141,7 @@ impl Model {
                 gyroscopic: false,
             };
             let (free, stuck) = (unknown(), unknown());
-            return Ok(Survey { free, stuck, closed: None, at_rest, system, joints, loose, unpressed });
+            return Survey { free, stuck, closed: None, at_rest, system: system.clone(), joints, loose, unpressed };
         }
         let faces: Vec<SpringDamper> = joints
             .iter()
@@ -157,7 +161,7 @@ impl Model {
             let free = LinearStructure::of_matrices(system.structure().full(), &dampers, &[]);
             let stuck = |held: &[&SpringDamper]| LinearStructure::of_matrices(system.structure().full(), held, &rigid);
             let (stuck, closed) = with_faces(&held, &faces, &stuck);
-            return Ok(Survey { free, stuck, closed, at_rest, system, joints, loose, unpressed });
+            return Survey { free, stuck, closed, at_rest, system: system.clone(), joints, loose, unpressed };
         }
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
@@ -179,7 +183,7 @@ impl Model {
             LinearStructure::new(&mass, &all, &rigid)
         };
         let (stuck, closed) = with_faces(&held, &faces, &stuck);
-        Ok(Survey { system, joints, free, stuck, closed, at_rest, loose, unpressed })
+        Survey { system: system.clone(), joints, free, stuck, closed, at_rest, loose, unpressed }
     }
 }
 

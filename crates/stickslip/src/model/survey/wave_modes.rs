@@ -11,7 +11,7 @@ use super::stuck_joint::{StuckAxis, StuckState};
 use super::{LinearModes, Model, ModelError, NaturalMode, System};
 use crate::model::{Body, Mass, Place};
 use crate::structure::reduction::Row;
-use crate::structure::{RingSector, Structure, unit_root};
+use crate::structure::{Structure, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
@@ -218,11 +218,21 @@ impl Model {
     /// assert!((waves[3].free_shapes[0][0].re - (1.0f64 / 6.0).sqrt()).abs() < 1e-12);
     /// ```
     pub fn wave_modes(&self, lowest: usize) -> Result<Option<Vec<WaveModes>>, ModelError> {
+        match self.ring {
+            Some(ring) if ring.equal => self.wave_modes_of(&self.assemble()?, lowest),
+            _ => Ok(None),
+        }
+    }
+
+    /// Returns the result of [`Model::wave_modes`] for the assembled model.
+    ///
+    /// # Errors
+    /// As for [`Model::wave_modes`].
+    pub fn wave_modes_of(&self, system: &System, lowest: usize) -> Result<Option<Vec<WaveModes>>, ModelError> {
         let Some(ring) = self.ring.filter(|ring| ring.equal) else { return Ok(None) };
-        let system = self.assemble()?;
         let (sectors, n) = (ring.sectors, system.dofs() / ring.sectors);
         if self.substructure.is_some() || self.moves_bodies() {
-            return Ok(of_matrices(&system, sectors, lowest, &self.sector_axes(&system)));
+            return Ok(of_matrices(system, sectors, lowest, &self.sector_axes(system)));
         }
         if n == 0 || 2 * n > MAX_DOFS {
             return Ok(None);
@@ -239,7 +249,7 @@ impl Model {
         let stuck: Vec<StuckAxis> =
             joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint(i, joint, &**joint.law())).collect();
         let own: Vec<f64> = (0..n).map(|i| system.structure().diagonal_mass(i)).collect();
-        let places = self.sector_axes(&system);
+        let places = self.sector_axes(system);
         let wave = |diameter: usize| {
             let double = !(2 * diameter).is_multiple_of(sectors);
             let turned = WaveRows { dofs: n, sectors, diameter, double };
@@ -293,7 +303,7 @@ impl Model {
 
 /// Returns the modes of the waves of equal sectors given by matrices.
 fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -> Option<Vec<WaveModes>> {
-    let sector = RingSector::from_ring(system.structure(), sectors)?;
+    let sector = system.structure().ring_sector(sectors)?;
     let joints = &system.joints()[..system.joints().len() / sectors];
     let stuck: Vec<StuckAxis> =
         joints.iter().enumerate().flat_map(|(i, joint)| StuckAxis::of_joint(i, joint, &**joint.law())).collect();

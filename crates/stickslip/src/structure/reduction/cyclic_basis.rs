@@ -404,16 +404,25 @@ impl WaveCollection<'_> {
     }
 }
 
+/// Number of columns that are multiplied at once: one cache line.
+const COLUMNS_AT_ONCE: usize = 8;
+
 /// Returns `Vᵀ A V` for entries with shifts.
 fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
     let r = basis.len() / n.max(1);
     let mut out = Vec::with_capacity(3 * r * r);
     for shift in [-1, 0, 1] {
-        let mut moved = vec![0.0; basis.len()];
-        for &(row, column, _, value) in entries.iter().filter(|entry| entry.2 == shift) {
-            for k in 0..r {
-                moved[k * n + row] += value * basis[k * n + column];
+        let mut moved = Vec::with_capacity(basis.len());
+        // several columns at once, side by side, because the entries do not fit into the cache
+        for columns in basis.chunks(COLUMNS_AT_ONCE * n.max(1)) {
+            let column = |k: usize| columns.get(k * n..(k + 1) * n);
+            let beside: Vec<[f64; COLUMNS_AT_ONCE]> =
+                (0..n).map(|row| std::array::from_fn(|k| column(k).map_or(0.0, |column| column[row]))).collect();
+            let mut sums = vec![[0.0; COLUMNS_AT_ONCE]; n];
+            for &(row, column, _, value) in entries.iter().filter(|entry| entry.2 == shift) {
+                sums[row].iter_mut().zip(&beside[column]).for_each(|(sum, x)| *sum += value * x);
             }
+            (0..columns.len() / n.max(1)).for_each(|k| moved.extend(sums.iter().map(|sums| sums[k])));
         }
         let product = multi_vector::inner_products(n, basis, &moved);
         let all = (0..r).flat_map(|row| (0..r).map(move |column| (row, column)));

@@ -23,6 +23,7 @@ mod values;
 
 pub use template::TemplateParameter;
 
+use crate::case::assembled::LastAssembled;
 use crate::case::study::{Study, stated_parameters};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::CompiledValue;
@@ -322,6 +323,7 @@ impl Reader {
             figure,
             data: Arc::new(data?),
             memory: None,
+            assembled: LastAssembled::default(),
         })
     }
 

@@ -129,8 +129,9 @@ fn natural_frequencies(model: &Model, most: usize) -> Result<Vec<NaturalFrequenc
         found.extend(all.map(|(mode, one)| NaturalFrequency { state, diameter, mode, omega: one.omega, reduction }));
     };
     if model.ring.is_some_and(|ring| ring.equal) {
-        let reduction = model.assemble().map_err(|error| error.to_string())?.reduction_evidence();
-        for wave in waves(model, most)? {
+        let system = model.assemble().map_err(|error| error.to_string())?;
+        let reduction = system.reduction_evidence();
+        for wave in waves(model, &system, most)? {
             add(0, Some(wave.diameter), &wave.free, reduction);
             add(1, Some(wave.diameter), &wave.stuck, reduction);
         }

@@ -14,7 +14,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{ValueType, default, optional};
 use stickslip::dimension::Dimension;
-use stickslip::model::{Model, WaveModes};
+use stickslip::model::{Model, System, WaveModes};
 
 /// Names of the table and its columns.
 const TABLE: &str = "nodal_diameters";
@@ -128,12 +128,12 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
 const TOO_LARGE: &str = "the sectors are too large to compute all their modes, or have no mass; for a sector given \
     by matrices, set `reduce` in [structure]";
 
-/// Returns the lowest modes by nodal diameter.
+/// Returns the lowest modes by nodal diameter of a model and its system.
 ///
 /// # Errors
 /// Returns a text if the sectors are too large or the modes are not found.
-pub(super) fn waves(model: &Model, most: usize) -> Result<Vec<WaveModes>, String> {
-    match model.wave_modes(most) {
+pub(super) fn waves(model: &Model, system: &System, most: usize) -> Result<Vec<WaveModes>, String> {
+    match model.wave_modes_of(system, most) {
         Ok(Some(waves)) => Ok(waves),
         Ok(None) => Err(TOO_LARGE.to_owned()),
         Err(error) => Err(error.to_string()),
@@ -145,7 +145,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     let mut rows = TableBuilder::default();
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
-    match waves(&prepared.case.model, most) {
+    match waves(&prepared.case.model, &prepared.system, most) {
         Ok(waves) => {
             part.count(|| location_of(prepared), CONVERGED, None);
             write(prepared, &waves, &mut rows);

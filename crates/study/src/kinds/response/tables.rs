@@ -97,7 +97,7 @@ pub fn curves(study: &Study, dataset: &Dataset) -> Result<Vec<ResponseCurve>, Re
     let Some(curve) = results.table(CURVE)? else { return Ok(Vec::new()) };
     let keys = study.varied().len();
     let frequency = curve.numbers(FREQUENCY)?;
-    let system = study.case(0).ok().and_then(|case| case.model.assemble().ok());
+    let system = study.case(0).ok().and_then(|case| study.assembled.system(&case.model).ok());
     let system = system.ok_or_else(|| curve.foreign_rows())?;
     let displacements = system.places().iter().zip(system.place_axes()).filter(|(_, along)| !along.is_rotation());
     let places: Vec<String> = displacements.map(|(place, _)| place.clone()).collect();

@@ -3,11 +3,10 @@
 use super::uncoupled_modes::UndampedResonance;
 use crate::method::harmonic_balance::equations::regularization::regularizing_stiffness;
 use crate::model::CyclicSymmetry;
-use crate::structure::{DynamicStiffness, RingSector, Structure, Wave, WaveStiffness, unit_root};
+use crate::structure::{DynamicStiffness, RingSector, Structure, WaveStiffness, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -21,19 +20,18 @@ pub(crate) struct FactoredStiffness<F = DynamicStiffness> {
     pub factor: Result<Arc<F>, UndampedResonance>,
 }
 
-/// Waves on a ring: one for each nodal diameter that a harmonic has used.
+/// Waves on a ring, with the factors of the present excitation frequency.
 #[derive(Debug, Clone)]
 pub(crate) struct TravellingWaves {
     pub cyclic: CyclicSymmetry,
-    pub sector: RingSector,
-    met: RefCell<BTreeMap<usize, Result<Arc<Wave>, UndampedResonance>>>,
+    pub sector: Arc<RingSector>,
     factors: RefCell<Vec<(usize, FactoredStiffness<WaveStiffness>)>>,
 }
 
 impl TravellingWaves {
     pub fn new(structure: &Structure, cyclic: CyclicSymmetry) -> Option<Self> {
-        let sector = RingSector::from_ring(structure, cyclic.sectors)?;
-        Some(TravellingWaves { cyclic, sector, met: RefCell::default(), factors: RefCell::default() })
+        let sector = structure.ring_sector(cyclic.sectors)?;
+        Some(TravellingWaves { cyclic, sector, factors: RefCell::default() })
     }
 
     /// Replaces complex forces on the first sector by its displacements in a wave, column by
@@ -56,11 +54,7 @@ impl TravellingWaves {
         if let Some((_, kept)) = factors.iter().find(|(d, kept)| *d == diameter && kept.rate == s) {
             return kept.factor.clone();
         }
-        let mut met = self.met.borrow_mut();
-        let wave = met
-            .entry(diameter)
-            .or_insert_with(|| self.sector.wave(diameter).map(Arc::new).map_err(|_| UndampedResonance))
-            .clone()?;
+        let wave = self.sector.wave(diameter).map_err(|_| UndampedResonance)?;
         let factor =
             wave.dynamic_stiffness(s, regularizing_stiffness(s, omega)).map(Arc::new).map_err(|_| UndampedResonance);
         factors.push((diameter, FactoredStiffness { rate: s, omega, factor: factor.clone() }));
