@@ -26,8 +26,6 @@ use stickslip_study::templates;
 /// Compiles and runs the Rust examples of the book.
 #[cfg(doctest)]
 mod book {
-    #[doc = include_str!("../../../docs/src/getting_started.md")]
-    struct GettingStarted;
     #[doc = include_str!("../../../docs/src/matrices.md")]
     struct Matrices;
 }
