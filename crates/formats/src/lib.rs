@@ -247,9 +247,9 @@ fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) ->
 /// Rejects sizes that a file of this length cannot fill, because users allocate
 /// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
-    // As many rows or columns as the file has bytes, and at least 2²⁰. A row with an entry takes
-    // a line of text, or about two bytes if it belongs to a compressed diagonal. Only small
-    // files have more empty rows.
+    // The limit is the number of bytes, and at least 2²⁰. A row with an entry takes a line of
+    // text, or about two bytes if it belongs to a compressed diagonal. Only small files have
+    // more empty rows.
     let most = length.max(1 << 20);
     if rows.max(columns) <= most {
         return Ok(());

@@ -65,7 +65,8 @@ impl ChangeError {
 ///     path: vec![Step::Key("parameters".into()), Step::Key("Ft".into())],
 ///     value: NewValue::Text("3.5 N".into()),
 /// };
-/// assert_eq!(changed(text, &[change]).unwrap().to_string(), "[parameters]\nFt = \"3.5 N\"   # slip limit\n");
+/// let changed = changed(text, &[change]).unwrap();
+/// assert_eq!(changed.to_string(), "[parameters]\nFt = \"3.5 N\"   # slip limit\n");
 /// ```
 pub fn changed(text: &str, changes: &[Change]) -> Result<DocumentMut, ChangeError> {
     let parsed = text.parse::<DocumentMut>();

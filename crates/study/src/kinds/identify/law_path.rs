@@ -15,7 +15,7 @@ pub(super) struct LoadPath {
 }
 
 impl LoadPath {
-    /// Returns the path followed by itself.
+    /// Returns the path twice, the second directly after the first.
     pub fn twice(&self) -> LoadPath {
         let again = |time: &Vec<f64>| {
             let (first, last) = (time.first().copied().unwrap_or(0.0), time.last().copied().unwrap_or(0.0));

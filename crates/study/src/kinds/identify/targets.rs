@@ -226,7 +226,7 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
     Ok(())
 }
 
-/// Builds the targets of a case. Without data, as in stored results, there are none.
+/// Builds the targets of a case. Stored results have no data and so no targets.
 pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, TargetError> {
     let stated = case.values.tables("targets").unwrap_or_default();
     if study.data.iter().any(|data| !data.is_read()) {
