@@ -111,7 +111,7 @@ fn apply(document: &mut DocumentMut, Change { path, value }: &Change) -> Result<
         (NewValue::Count(count), _) => Value::from(*count),
         (NewValue::List(list), _) => Value::Array(list.iter().map(String::as_str).collect::<Array>()),
         (NewValue::Number(_) | NewValue::Law(_), _) => {
-            return Err(ChangeError::new(format!("`{}` does not take this value", words())));
+            return Err(ChangeError::new(format!("`{}` cannot have this value", words())));
         }
     };
     set(at, last, new, &words())

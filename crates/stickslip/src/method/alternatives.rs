@@ -48,7 +48,7 @@ impl fmt::Display for Alternatives {
                 };
                 write!(
                     f,
-                    "no method takes this system: {}",
+                    "no method accepts this system: {}",
                     self.reasons.iter().map(one).collect::<Vec<_>>().join("; ")
                 )
             }

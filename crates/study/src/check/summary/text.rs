@@ -207,7 +207,7 @@ impl fmt::Display for ModelSummary {
         }
         match &self.orbits {
             Some(OrbitCount::One) => {
-                line("orbits", "one at each frequency, apart from offsets that stuck contacts keep")?
+                line("orbits", "one at each frequency, except for the offsets of stuck contacts")?
             }
             Some(OrbitCount::Several(why)) => {
                 let what = "the table states the stability of each orbit if it is known; kind `branch` follows \

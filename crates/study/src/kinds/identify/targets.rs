@@ -217,7 +217,7 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
             ModelNames::places(model).single_label("targets", "place", at)?;
             let moves = ["start", "start_velocity"].iter().any(|key| values.by_name(key).is_some());
             if kind == "ring-down" && !moves {
-                let help = "add start = { tip = \"1 mm\" }, a parameter that is fitted too if it was not measured";
+                let help = "add start = { tip = \"1 mm\" }; if the displacement was not measured, write a fitted parameter there";
                 return Err(KeyError::new("start", "a ring-down needs an initial displacement or velocity", help));
             }
         }
