@@ -1,4 +1,4 @@
-//! The methods that can take a system instead of one that cannot.
+//! The methods that accept a system which another method refuses.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Reasons why a method cannot take a system.
+//! Reasons why a method does not accept a system.
 
 use super::Alternatives;
 use crate::model::{System, SystemJoint};
