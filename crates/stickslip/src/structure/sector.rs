@@ -147,9 +147,9 @@ impl RingSector {
     /// use stickslip::structure::{RingSector, Structure};
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let (n, d) = (12, 5);
-    /// let entries = |own: f64, coupling: f64| {
+    /// let entries = |own: f64, edge: f64| {
     ///     let all = (0..n)
-    ///         .flat_map(|i| [(i, i, own), (i, (i + 1) % n, coupling), ((i + 1) % n, i, coupling)]);
+    ///         .flat_map(|i| [(i, i, own), (i, (i + 1) % n, edge), ((i + 1) % n, i, edge)]);
     ///     SparseMatrix::from_triplets(n, all).unwrap()
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();
