@@ -348,8 +348,8 @@ fn one(
             let resume = if interrupted { "; continue with --resume" } else { "" };
             let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
                 true => {
-                    "interrupted before any unit of work was finished (a stretch of points, or a whole followed \
-                     curve); the record is in"
+                    "interrupted before any unit of work was finished (a block of points, or a whole branch); \
+                     the record is in"
                 }
                 false => "interrupted; the finished points are in",
             };

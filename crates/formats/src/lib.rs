@@ -17,6 +17,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A matrix of a finite-element program, with the names of its rows:
+//!
+//! ```no_run
+//! use stickslip_formats::{MatrixReport, list, names, read};
+//!
+//! for variable in list("blade.mat", None)? {
+//!     println!("{variable}");                              // K (61098 x 61098), …
+//! }
+//! let stiffness = read("blade.mat", None, Some("K"))?;
+//! println!("{}", MatrixReport::new(&stiffness));           // size, entries, symmetry
+//! let rows = names::read("blade.dof", stiffness.rows())?;  // names such as 1353.y
+//! let stiffness = stiffness.with_names(rows)?;
+//! # Ok::<(), stickslip_formats::Error>(())
+//! ```
+//!
 //! [`TABLE`] lists the formats, and [`names::TABLE`] the formats of row names.
 //!
 //! The reader does not trust sizes stated in a header: memory is bounded by the length of the
@@ -232,9 +247,9 @@ fn select<'i, 'a>(format: &Format, items: &'i [Item<'a>], name: Option<&str>) ->
 /// Rejects sizes that a file of this length cannot fill, because users allocate
 /// at least one number per row.
 fn check_size(rows: usize, columns: usize, length: usize) -> Result<(), Error> {
-    // As many rows or columns as the file has bytes, and at least 2²⁰. A row with an entry takes
-    // a line of text, or about two bytes if it belongs to a compressed diagonal. Only small
-    // files have more empty rows.
+    // The limit is the number of bytes, and at least 2²⁰. A row with an entry takes a line of
+    // text, or about two bytes if it belongs to a compressed diagonal. Only small files have
+    // more empty rows.
     let most = length.max(1 << 20);
     if rows.max(columns) <= most {
         return Ok(());

@@ -23,15 +23,6 @@ use stickslip_numerics::golden_section::golden_section;
 use stickslip_numerics::random::SplitMix64;
 use stickslip_study::templates;
 
-/// Compiles and runs the Rust examples of the book.
-#[cfg(doctest)]
-mod book {
-    #[doc = include_str!("../../../docs/src/getting_started.md")]
-    struct GettingStarted;
-    #[doc = include_str!("../../../docs/src/matrices.md")]
-    struct Matrices;
-}
-
 /// A small generator of uniform random numbers, so that a seed identifies each model of a test.
 #[derive(Debug, Clone)]
 pub struct Random(SplitMix64);

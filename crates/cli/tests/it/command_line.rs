@@ -87,7 +87,7 @@ fn parameters_and_methods_change_from_outside() {
     let output = stickslip(folder.path(), &["run", "study.toml", "--method", "shooting"]);
     assert_eq!(code(&output), 2);
     let text = stderr(&output);
-    assert!(text.contains("shooting cannot take the law `jenkins`"), "{text}");
+    assert!(text.contains("shooting does not accept the law `jenkins`"), "{text}");
 }
 
 #[test]

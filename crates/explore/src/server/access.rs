@@ -73,7 +73,10 @@ impl Access {
         let text = |name: header::HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
         let own = [format!("127.0.0.1:{}", self.port), format!("localhost:{}", self.port)];
         if !text(header::HOST).is_some_and(|host| own.iter().any(|own| own == host)) {
-            return Err(Refusal { status: StatusCode::MISDIRECTED_REQUEST, reason: "this server is 127.0.0.1 only" });
+            return Err(Refusal {
+                status: StatusCode::MISDIRECTED_REQUEST,
+                reason: "this server answers 127.0.0.1 only",
+            });
         }
         let own_origin = |origin: &str| own.iter().any(|own| origin.strip_prefix("http://") == Some(own));
         let origin = text(header::ORIGIN);
@@ -82,7 +85,7 @@ impl Access {
             (None, get) => !get,
         };
         if foreign {
-            return Err(Refusal { status: StatusCode::FORBIDDEN, reason: "requests come from the page itself only" });
+            return Err(Refusal { status: StatusCode::FORBIDDEN, reason: "this server answers its own page only" });
         }
         Ok(())
     }

@@ -132,7 +132,7 @@ async fn route(state: &Arc<State>, request: Request<Body>) -> Result<Response<Bo
             Ok(typed("application/x-ndjson", runs::start(state.clone(), request)?))
         }
         (_, "/" | "/api/catalog" | "/api/describe" | "/api/run") => {
-            Err(Refusal { status: StatusCode::METHOD_NOT_ALLOWED, reason: "this address does not take this method" })
+            Err(Refusal { status: StatusCode::METHOD_NOT_ALLOWED, reason: "this address does not support the method" })
         }
         _ => Err(Refusal { status: StatusCode::NOT_FOUND, reason: "there is no such address" }),
     }
@@ -181,7 +181,7 @@ async fn content<T: DeserializeOwned>(state: &State, body: Body) -> Result<T, Re
     let bytes = tokio::time::timeout(time, to_bytes(body, limit)).await;
     let slow = Refusal { status: StatusCode::REQUEST_TIMEOUT, reason: "the request arrives too slowly" };
     let large = Refusal { status: StatusCode::PAYLOAD_TOO_LARGE, reason: "the request is too large or incomplete" };
-    let wrong = Refusal { status: StatusCode::BAD_REQUEST, reason: "the request is not what this address takes" };
+    let wrong = Refusal { status: StatusCode::BAD_REQUEST, reason: "the request is not valid for this address" };
     serde_json::from_slice(&bytes.map_err(|_| slow)?.map_err(|_| large)?).map_err(|_| wrong)
 }
 

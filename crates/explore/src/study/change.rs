@@ -65,7 +65,8 @@ impl ChangeError {
 ///     path: vec![Step::Key("parameters".into()), Step::Key("Ft".into())],
 ///     value: NewValue::Text("3.5 N".into()),
 /// };
-/// assert_eq!(changed(text, &[change]).unwrap().to_string(), "[parameters]\nFt = \"3.5 N\"   # slip limit\n");
+/// let changed = changed(text, &[change]).unwrap();
+/// assert_eq!(changed.to_string(), "[parameters]\nFt = \"3.5 N\"   # slip limit\n");
 /// ```
 pub fn changed(text: &str, changes: &[Change]) -> Result<DocumentMut, ChangeError> {
     let parsed = text.parse::<DocumentMut>();
@@ -110,7 +111,7 @@ fn apply(document: &mut DocumentMut, Change { path, value }: &Change) -> Result<
         (NewValue::Count(count), _) => Value::from(*count),
         (NewValue::List(list), _) => Value::Array(list.iter().map(String::as_str).collect::<Array>()),
         (NewValue::Number(_) | NewValue::Law(_), _) => {
-            return Err(ChangeError::new(format!("`{}` does not take this value", words())));
+            return Err(ChangeError::new(format!("`{}` cannot have this value", words())));
         }
     };
     set(at, last, new, &words())

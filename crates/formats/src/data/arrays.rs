@@ -31,7 +31,10 @@ impl Array {
         let upright = self.rows >= across;
         let (length, columns) = if upright { (self.rows, across) } else { (across, self.rows) };
         if columns > MAX_COLUMNS {
-            return Err(format!("`{}` has {} x {across} values, which is no table", self.name, self.rows));
+            return Err(format!(
+                "`{}` has {} x {across} values; a table has at most {MAX_COLUMNS} columns",
+                self.name, self.rows
+            ));
         }
         let pick = |values: &[f64], column: usize| -> Vec<f64> {
             let at = |i: usize| if upright { column * self.rows + i } else { i * self.rows + column };

@@ -114,7 +114,7 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
         } else {
             let (values, words) = numbered_words(rows[first..].iter().map(|row| decoded(&row.fields[at])));
             notes.push(format!(
-                "`{name}` has text, numbered in the order of its first appearance: {}",
+                "`{name}` contains texts, which are numbered in the order of their first appearance: {}",
                 words.join(", ")
             ));
             values

@@ -73,7 +73,7 @@ impl Walk {
             DType::F32 | DType::F64 | DType::I8 | DType::I16 | DType::I32 | DType::I64 => {}
             DType::U8 | DType::U16 | DType::U32 | DType::U64 => {}
             DType::Compound(_) => {
-                return skip("of complex or compound numbers: save real and imaginary part by themselves");
+                return skip("of complex or compound numbers: save real and imaginary part separately");
             }
             DType::ObjectReference => return skip("a cell or an array of structures: save without -v7.3"),
             _ => return skip("not an array of numbers"),

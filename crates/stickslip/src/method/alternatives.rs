@@ -1,4 +1,4 @@
-//! The methods that can take a system instead of one that cannot.
+//! The methods that accept a system which another method refuses.
 
 use std::fmt;
 
@@ -48,7 +48,7 @@ impl fmt::Display for Alternatives {
                 };
                 write!(
                     f,
-                    "no method takes this system: {}",
+                    "no method accepts this system: {}",
                     self.reasons.iter().map(one).collect::<Vec<_>>().join("; ")
                 )
             }

@@ -73,7 +73,8 @@ impl Default for AutoSettings {
 /// ```
 /// use stickslip::method::{Method, auto::Auto};
 /// let system = stickslip::model::example::blade_couple().assemble().unwrap();
-/// assert_eq!(Auto.choice(&system).to_string(), "event-driven (chosen by auto: every law is exact)");
+/// let choice = Auto.choice(&system).to_string();
+/// assert_eq!(choice, "event-driven (chosen by auto: every law is exact)");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Auto;

@@ -1,4 +1,4 @@
-//! Reasons why a method cannot take a system.
+//! Reasons why a method does not accept a system.
 
 use super::Alternatives;
 use crate::model::{System, SystemJoint};
@@ -19,7 +19,7 @@ pub struct MethodError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// A law lacks the view that the method needs.
-    #[error("{method} cannot take the law `{law}` of joint `{joint}`: {missing}")]
+    #[error("{method} does not accept the law `{law}` of joint `{joint}`: {missing}")]
     Law {
         /// Name of the method.
         method: &'static str,

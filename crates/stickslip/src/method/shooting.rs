@@ -148,7 +148,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
 /// let mut model = stickslip::model::example::blade_couple();
 /// model.joints[0].law = Arc::new(CoulombArctan { limit: 2.0, alpha: 25e3 });
 /// let system = model.assemble().unwrap();
-/// let orbit = Shooting::default().solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.25).unwrap();
+/// let omega = std::f64::consts::TAU * 121.25;
+/// let orbit = Shooting::default().solver(&system).unwrap().orbit(omega).unwrap();
 /// assert!(orbit.evidence.residual < 1e-9);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -29,7 +29,11 @@ use num_complex::Complex64;
 /// let model = Model {
 ///     masses: vec![Mass::new("m", 1.0)],
 ///     springs: vec![Spring { between: between(), stiffness: 1000.0, damping: 1.0 }],
-///     joints: vec![Joint { name: "j".into(), between: between(), law: Arc::new(Jenkins { stiffness: 1000.0, limit: 2.0 }) }],
+///     joints: vec![Joint {
+///         name: "j".into(),
+///         between: between(),
+///         law: Arc::new(Jenkins { stiffness: 1000.0, limit: 2.0 }),
+///     }],
 ///     forces: vec![Force { on: "m".into(), amplitude: 10.0, phase: 0.0, harmonic: 0 }],
 ///     ..Model::default()
 /// };

@@ -157,14 +157,35 @@ impl TimeHistory {
     /// use stickslip::model::{GROUND, Joint, Mass, Model, Spring};
     /// let model = Model {
     ///     masses: vec![Mass::new("m", 1.0)],
-    ///     springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: 0.0 }],
-    ///     joints: vec![Joint { name: "j".into(), between: ["m".into(), GROUND.into()], law: Arc::new(Coulomb { limit: 0.01 }) }],
+    ///     springs: vec![Spring {
+    ///         between: ["m".into(), GROUND.into()],
+    ///         stiffness: 1.0,
+    ///         damping: 0.0,
+    ///     }],
+    ///     joints: vec![Joint {
+    ///         name: "j".into(),
+    ///         between: ["m".into(), GROUND.into()],
+    ///         law: Arc::new(Coulomb { limit: 0.01 }),
+    ///     }],
     ///     ..Model::default()
     /// };
-    /// let motion = TimeHistory { displacement: vec![1.0], velocity: vec![0.0], states: vec![], excitation: Excitation::Free,
-    ///     duration: std::f64::consts::TAU, step: std::f64::consts::TAU, width: None };
+    /// let motion = TimeHistory {
+    ///     displacement: vec![1.0],
+    ///     velocity: vec![0.0],
+    ///     states: vec![],
+    ///     excitation: Excitation::Free,
+    ///     duration: std::f64::consts::TAU,
+    ///     step: std::f64::consts::TAU,
+    ///     width: None,
+    /// };
     /// let mut last = 0.0;
-    /// motion.run(&model.assemble().unwrap(), &mut |_, _, state| { last = state.displacement[0]; true }).unwrap();
+    /// let system = model.assemble().unwrap();
+    /// motion
+    ///     .run(&system, &mut |_, _, state| {
+    ///         last = state.displacement[0];
+    ///         true
+    ///     })
+    ///     .unwrap();
     /// assert!((last - 0.96).abs() < 1e-12);
     /// ```
     pub fn run(

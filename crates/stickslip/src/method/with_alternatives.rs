@@ -26,7 +26,8 @@ use crate::orbit::Orbit;
 /// let error = solver_with_alternatives(&EventDriven, &system).err().unwrap();
 /// let alternatives = error.alternatives().unwrap();
 /// assert_eq!(alternatives.methods, ["transient", "shooting", "harmonic-balance"]);
-/// assert!((find("shooting").unwrap().build)(&Default::default()).unwrap().solver(&system).is_ok());
+/// let shooting = (find("shooting").unwrap().build)(&Default::default()).unwrap();
+/// assert!(shooting.solver(&system).is_ok());
 /// ```
 pub fn solver_with_alternatives<'a>(
     method: &dyn Method,

@@ -1,6 +1,6 @@
 //! The linear part of a system: mass, damping and stiffness.
 //!
-//! No other module stores these matrices.
+//! No other module stores these matrices: copies of a structure share them.
 
 mod component;
 mod dynamic;

@@ -152,9 +152,9 @@ impl RingSector {
     /// use stickslip::structure::{RingSector, Structure};
     /// use stickslip_numerics::sparse::SparseMatrix;
     /// let (n, d) = (12, 5);
-    /// let entries = |own: f64, beside: f64| {
+    /// let entries = |own: f64, edge: f64| {
     ///     let all = (0..n)
-    ///         .flat_map(|i| [(i, i, own), (i, (i + 1) % n, beside), ((i + 1) % n, i, beside)]);
+    ///         .flat_map(|i| [(i, i, own), (i, (i + 1) % n, edge), ((i + 1) % n, i, edge)]);
     ///     SparseMatrix::from_triplets(n, all).unwrap()
     /// };
     /// let places = (0..n).map(|i| format!("m{i}")).collect();

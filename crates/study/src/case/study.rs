@@ -1,4 +1,7 @@
-//! A study that was read: its cases, each with its model and the values of its kind.
+//! A study that was read and checked: its parameters, its model and its cases.
+//!
+//! A case is one combination of the varied parameters. The study builds the model of a case and
+//! the numbers of its keys, in SI, when they are needed.
 
 use crate::case::assembled::LastAssembled;
 use crate::case::disk::{self, Reevaluate};

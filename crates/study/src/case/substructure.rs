@@ -1,4 +1,5 @@
-//! Converts `[structure]` and `[[place]]` to parts of a model.
+//! Converts `[structure]` and `[[place]]` to parts of a model: matrices with their reduction,
+//! and places as rows, means of nodes, weighted sums, or points of bodies.
 
 use crate::case::values::Values;
 use crate::compile::compiled::{CompiledTable, Environment};

@@ -1,7 +1,7 @@
 //! The results of a study: tables, figures and the record of the run, independent of file
 //! formats.
 //!
-//! The writers in `stickslip-report` see nothing else.
+//! The writers in `stickslip-report` use only these.
 
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

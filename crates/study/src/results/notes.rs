@@ -20,8 +20,8 @@ pub(crate) const WARNING: &str = "warning: ";
 const MAX_STUCK_CASES: usize = 4;
 
 /// Says which orbit of a continuum is reported.
-const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibrium under the constant loads, applied as one \
-    ramp. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
+const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibrium, after the constant loads grew together from \
+    zero. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
     orbit that its run reached.";
 
 /// A note.

@@ -27,7 +27,7 @@ pub(crate) struct PointRow {
     pub truncation: f64,
     pub return_defect: f64,
     pub iterations: u64,
-    /// The algorithm that found the orbit; empty where there is none.
+    /// The algorithm that found the orbit; empty without an orbit.
     pub found_by: &'static str,
     pub status: String,
     pub failure: Option<String>,

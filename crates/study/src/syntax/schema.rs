@@ -102,7 +102,7 @@ pub const FIGURE: &[Key] = &[
     optional(
         "panels",
         ValueType::Choice(panel_names),
-        "the items that have their own panel; takes precedence over `overlay`",
+        "one panel for each case, or for each mass; takes precedence over `overlay`",
         "\"cases\"",
     ),
     optional("only", ValueType::Names, "the masses or joints that are shown; absent: all", "[\"blade1\"]"),
@@ -142,8 +142,8 @@ pub const DATA: &[Key] = &[
     optional(
         "columns",
         ValueType::Texts,
-        "the columns of the file by their use, as far as they have other names: `force = \"F\"`; a unit in brackets \
-         counts for a column without one: `force = \"F [kN]\"`",
+        "the column for each use, if it has another name: `force = \"F\"`; a unit in brackets \
+         applies to a column without one: `force = \"F [kN]\"`",
         "{ frequency = \"frequency_Hz\", force = \"F [kN]\" }",
     ),
 ];

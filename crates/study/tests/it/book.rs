@@ -107,34 +107,35 @@ fn rubbing(law: law::SharedLaw) -> System {
     .unwrap()
 }
 
-/// Builds the table of laws that each method accepts, by asking the methods.
+/// Lists the laws that each method accepts, by asking the methods.
 fn methods_by_laws() -> String {
-    let mut table = "| law |".to_owned();
-    table.extend(method::TABLE.iter().map(|row| format!(" `{}` |", row.name)));
-    table += "\n| --- |";
-    table.extend(method::TABLE.iter().map(|_| " --- |"));
-    for law in law::TABLE {
-        table += &format!("\n| `{}` |", law.name);
-        let system = rubbing(law.sample());
-        for row in method::TABLE {
+    let mut list = String::new();
+    for row in method::TABLE {
+        let has_width = row.options.iter().any(|option| option.key == "width");
+        let (mut accepted, mut smoothed) = (Vec::new(), Vec::new());
+        for law in law::TABLE {
+            let system = rubbing(law.sample());
             let takes = |options: &method::Options| (row.build)(options).unwrap().solver(&system).is_ok();
-            let width = row.options.iter().any(|option| option.key == "width");
-            let word = if takes(&method::Options::new()) {
-                "yes"
-            } else if width && takes(&method::Options::from([("width".to_owned(), 1e-5)])) {
-                "(`width`)"
-            } else {
-                "no"
-            };
-            table += &format!(" {word} |");
+            if takes(&method::Options::new()) {
+                accepted.push(format!("`{}`", law.name));
+            } else if has_width && takes(&method::Options::from([("width".to_owned(), 1e-5)])) {
+                smoothed.push(format!("`{}`", law.name));
+            }
         }
+        let every = accepted.len() + smoothed.len() == law::TABLE.len();
+        let laws = if every { "every law".to_owned() } else { accepted.join(", ") };
+        list += &format!("- `{}`: {laws}", row.name);
+        if !smoothed.is_empty() {
+            list += &format!(", {} only with `width`", smoothed.join(", "));
+        }
+        list += "\n";
     }
-    table + "\n"
+    list
 }
 
 /// Builds the table of the laws with their descriptions.
 fn laws() -> String {
-    let mut table = "| law | what it is | directions | says to methods |\n| --- | --- | --- | --- |\n".to_owned();
+    let mut table = "| law | what it is | directions |\n| --- | --- | --- |\n".to_owned();
     for row in law::TABLE {
         let law = row.sample();
         let (name, summary) = (row.name, row.summary.replace('|', "\\|"));
@@ -145,18 +146,7 @@ fn laws() -> String {
             .map(|count| law.with_value(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
             .collect();
         let directions: Vec<_> = directions.iter().map(usize::to_string).collect();
-        let pieces = law.ideal_elements().unwrap_or_default();
-        let says = [
-            ("sliders", pieces.iter().any(|piece| matches!(piece, law::IdealElement::Slider(_)))),
-            ("stops", pieces.iter().any(|piece| matches!(piece, law::IdealElement::Stop { .. }))),
-            ("first loading", law.masing().is_some()),
-            ("slip curve", law.sliding().is_some()),
-            ("resolvent", law.prox().is_some()),
-            ("step", law.step().is_some()),
-            ("rates", law.rate().is_some()),
-        ];
-        let says: Vec<_> = says.iter().filter(|(_, says)| *says).map(|(word, _)| *word).collect();
-        table += &format!("| [`{name}`](#{name}) | {summary} | {} | {} |\n", directions.join(" or "), says.join(", "));
+        table += &format!("| [`{name}`](#{name}) | {summary} | {} |\n", directions.join(" or "));
     }
     table
 }
@@ -185,7 +175,7 @@ fn the_page_of_laws_has_every_law() {
 }
 
 #[test]
-fn the_table_of_methods_and_laws_is_up_to_date() {
+fn the_laws_of_each_method_are_up_to_date() {
     for page in ["docs/src/laws_and_methods.md", "README.md"] {
         let path = root().join(page);
         up_to_date(&path, &with_generated(&text_of(&path), METHODS_BY_LAWS, &methods_by_laws()));

@@ -56,7 +56,9 @@ fn model(row: &LawInfo, mass: &str) -> String {
 
 /// Returns whether a sentence refuses a model.
 fn refuses(text: &str) -> bool {
-    ["cannot take", "needs a mass", "positive definite", "no method takes"].iter().any(|words| text.contains(words))
+    ["does not accept", "needs a mass", "positive definite", "no method accepts"]
+        .iter()
+        .any(|words| text.contains(words))
 }
 
 /// Returns the sentences of a run that refuse a model.

@@ -18,7 +18,7 @@ use stickslip::orbit::{Accuracy, Orbit, OrbitData, Path, Sample, Symmetry};
 use stickslip_numerics::dual::Real;
 use stickslip_verification::newmark_reference::Reference;
 
-/// Two rubbing surfaces side by side that creep towards their limits after different ways: a rate law with two states.
+/// Two parallel surfaces that approach their limits over different distances: a rate law with two states.
 #[derive(Debug)]
 struct TwoSurfaces {
     stiffness: f64,

@@ -87,7 +87,7 @@ fn check_refusals(system: &System) -> (usize, usize) {
         }
         if ways.methods.is_empty() && ways.with_width.is_empty() {
             hopeless += 1;
-            assert!(text.contains("no method takes this system"), "{text}");
+            assert!(text.contains("no method accepts this system"), "{text}");
             for other in method::TABLE {
                 assert!(asked(other, false, system).is_err(), "{text}: {} does", other.name);
                 if other.options.iter().any(|option| option.key == WIDTH) {
@@ -139,6 +139,6 @@ fn friction_that_drops_at_once_is_told_to_fall_over_a_velocity() {
     let stribeck = stickslip::law::find("stribeck").unwrap().sample();
     let dropping = stribeck.with_value("velocity", 0.0).unwrap();
     let error = asked(named("auto"), false, &system(&[dropping, cubic.clone()], 1.0)).unwrap_err().to_string();
-    assert!(error.contains("no method takes this system") && error.contains("`velocity` above zero"), "{error}");
+    assert!(error.contains("no method accepts this system") && error.contains("`velocity` above zero"), "{error}");
     assert!(asked(named("shooting"), true, &system(&[stribeck, cubic], 1.0)).is_ok());
 }

@@ -1,4 +1,5 @@
-//! The orbit of a solution: displacements, energies, evidence, and the motion at any time.
+//! Makes an orbit from a solution of harmonic balance: displacements, energies, evidence, and
+//! the motion at any time.
 
 use super::aft::{PortMember, Ports};
 use super::dynamics::linear_dynamics::LinearDynamics;

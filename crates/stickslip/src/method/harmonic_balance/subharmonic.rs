@@ -19,10 +19,12 @@ use num_complex::Complex64;
 /// ```
 /// use stickslip::method::{Method, harmonic_balance::{HarmonicBalance, Subharmonic}};
 /// let system = stickslip::model::example::blade_couple_massless().assemble().unwrap();
-/// let method = Subharmonic { balance: HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() }, period: 3 };
+/// let balance = HarmonicBalance { harmonics: Some(7), ..HarmonicBalance::default() };
+/// let method = Subharmonic { balance, period: 3 };
 /// let orbit = method.solver(&system).unwrap().orbit(std::f64::consts::TAU * 121.0).unwrap();
 /// assert_eq!(orbit.periods, 3);
-/// assert!((orbit.place("blade1").unwrap().first_harmonic.norm() / orbit.places[0].amplitude() - 1.0).abs() < 0.01);
+/// let first = orbit.place("blade1").unwrap().first_harmonic.norm();
+/// assert!((first / orbit.places[0].amplitude() - 1.0).abs() < 0.01);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subharmonic {

@@ -206,9 +206,7 @@ impl fmt::Display for ModelSummary {
             line("", &format!("and {more} more joint{}", plural_suffix(more)))?;
         }
         match &self.orbits {
-            Some(OrbitCount::One) => {
-                line("orbits", "one at each frequency, apart from offsets that stuck contacts keep")?
-            }
+            Some(OrbitCount::One) => line("orbits", "one at each frequency, except for the offsets of stuck contacts")?,
             Some(OrbitCount::Several(why)) => {
                 let what = "the table states the stability of each orbit if it is known; kind `branch` follows \
                     connected orbits if it supports the laws";

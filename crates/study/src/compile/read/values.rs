@@ -1,5 +1,5 @@
-//! Converts nodes of the document to stated values: unknown and missing keys, types, names,
-//! quantities, ranges.
+//! Converts the tables of a study file to typed values: names, quantities, ranges, lists.
+//! Reports unknown and missing keys and values of a wrong type.
 
 use super::kinds::tables_with_key;
 use super::reader::Reader;

@@ -262,7 +262,7 @@ fn missing_range_text(branch: &Branch, from: f64, to: f64, name: &str, factor: f
     (!branch.reaches(to)).then(|| {
         format!(
             "the branch turns at {name} = {:.9} and leaves the range at its beginning, so the range up to {:.9} is \
-             missing; begin where there is a single orbit, or at the other end",
+             missing; begin at a value with a single orbit, or at the other end",
             reached * factor,
             to * factor
         )
@@ -290,7 +290,7 @@ fn follow(work: &UnitTask<'_>, along: Option<&VariedValue>, range: (f64, f64)) -
     };
     let steps = values.count("steps").unwrap_or(100) as f64;
     let at = |value: f64| {
-        // derivatives evaluate values beside a point, so only whole steps count
+        // derivatives also evaluate values near a point, so only whole steps count
         work.share.reach((steps * (value - range.0) / (range.1 - range.0)).floor() / steps);
         match along {
             None => (prepared.system.clone(), value),

@@ -15,7 +15,7 @@ pub(super) struct LoadPath {
 }
 
 impl LoadPath {
-    /// Returns the path followed by itself.
+    /// Returns the path twice, the second directly after the first.
     pub fn twice(&self) -> LoadPath {
         let again = |time: &Vec<f64>| {
             let (first, last) = (time.first().copied().unwrap_or(0.0), time.last().copied().unwrap_or(0.0));
@@ -67,7 +67,7 @@ pub(super) fn forces_along(law: &dyn Law, path: &LoadPath) -> Result<Vec<f64>, S
     }
     match law.rate() {
         Some(rate) => rates(law, rate, path),
-        None => Err(format!("a loop of the law `{}` cannot be computed from a path", law.info().name)),
+        None => Err(format!("the law `{}` has no view that gives the force along a measured path", law.info().name)),
     }
 }
 

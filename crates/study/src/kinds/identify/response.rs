@@ -44,7 +44,7 @@ impl ResponseTarget {
         let forces = input.optional_column("force", Dimension::FORCE)?;
         let count = input.case.model.forces.iter().filter(|force| force.harmonic == 1).count();
         if (forces.is_some() || per_force) && count != 1 {
-            let message = format!("a response needs one [[force]] of the excitation frequency, found {count}");
+            let message = format!("a measured force needs exactly one [[force]] with `harmonic = 1`, found {count}");
             let help = "the force of each row replaces the amplitude of that [[force]]; without a column `force`, \
                 several forces and motions are possible";
             return Err(ColumnError { message, help: help.to_owned() });

@@ -29,7 +29,7 @@ impl RingDown {
         let response = input.column("response", quantity.dimension())?;
         let sampling = Column { values: time.clone(), ..Column::default() }.sampling().ok_or_else(|| ColumnError {
             message: format!("the times of `{}` do not rise in equal steps", input.data.name),
-            help: "resample the decay; a gap or a second record is a `group` of its own".to_owned(),
+            help: "resample the decay; a record with a gap, or a second record, needs a separate `group`".to_owned(),
         })?;
         let deviations = input.deviations(&response, quantity.dimension())?;
         let measured =

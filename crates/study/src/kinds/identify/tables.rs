@@ -112,7 +112,7 @@ fn si_unit(dimension: Option<Dimension>) -> String {
     }
 }
 
-/// A number as the table shows it: of a complex number the magnitude, with the phase beside it.
+/// A number as the table shows it: a complex number as magnitude and phase.
 struct ShownValue {
     part: usize,
     measured: f64,

@@ -217,7 +217,7 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
             ModelNames::places(model).single_label("targets", "place", at)?;
             let moves = ["start", "start_velocity"].iter().any(|key| values.by_name(key).is_some());
             if kind == "ring-down" && !moves {
-                let help = "add start = { tip = \"1 mm\" }, a parameter that is fitted too if it was not measured";
+                let help = "add start = { tip = \"1 mm\" }; if the displacement was not measured, write a fitted parameter there";
                 return Err(KeyError::new("start", "a ring-down needs an initial displacement or velocity", help));
             }
         }
@@ -226,7 +226,7 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
     Ok(())
 }
 
-/// Builds the targets of a case. Without data, as in stored results, there are none.
+/// Builds the targets of a case. Stored results have no data and so no targets.
 pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, TargetError> {
     let stated = case.values.tables("targets").unwrap_or_default();
     if study.data.iter().any(|data| !data.is_read()) {

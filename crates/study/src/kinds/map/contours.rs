@@ -58,7 +58,8 @@ impl Grid {
             [a, b] => vec![[a, b]],
             [a, b, c, d] => {
                 let mean = corners.iter().map(|corner| corner.value).sum::<f64>() / 4.0;
-                // the corners on the side of the mean are connected, so the pieces cut off the others
+                // the corners on the side of the mean are connected, so the pieces cut off the
+                // other corners
                 if (mean >= level) == (corners[0].value >= level) { vec![[a, b], [c, d]] } else { vec![[d, a], [b, c]] }
             }
             _ => Vec::new(),

@@ -67,7 +67,7 @@ pub(in crate::kinds) fn displacements(system: &System) -> Vec<usize> {
     seen.filter(|(_, place)| !place.is_rotation()).map(|(place, _)| place).collect()
 }
 
-/// Returns the amplitudes of some places whose highest peak is sought, m.
+/// Returns the amplitudes of the places whose highest peak is refined, m.
 ///
 /// An amplitude that is only the rounding error of a place at rest is zero.
 pub(in crate::kinds) fn moving_amplitudes(system: &System, orbit: &Orbit, places: &[usize]) -> Vec<f64> {

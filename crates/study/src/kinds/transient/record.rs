@@ -102,7 +102,8 @@ impl Records {
                 let forced = case.model.forces.iter().any(|force| force.harmonic > 0 && force.amplitude != 0.0);
                 let moved = case.model.motions.iter().any(|motion| motion.harmonic > 0 && motion.amplitude != 0.0);
                 if forced || moved {
-                    let help = "write all forces as records, or only constant ones (harmonic = 0) beside them";
+                    let help =
+                        "write all forces as records; only constant forces (harmonic = 0) may act at the same time";
                     return Err(error("data", "a record and a harmonic force exclude each other".to_owned(), help));
                 }
                 let on = text(table, "on").unwrap_or_default().to_owned();

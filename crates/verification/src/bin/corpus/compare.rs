@@ -58,7 +58,7 @@ struct Differences {
     found_by: BTreeMap<String, [usize; 2]>,
 }
 
-/// Prints the differences by class. Returns true if there are none.
+/// Prints the differences by class. Returns true if nothing differs.
 pub fn compare(old: &Path, new: &Path) -> Result<bool, String> {
     let mut same = true;
     for class in names(old)?.union(&names(new)?) {

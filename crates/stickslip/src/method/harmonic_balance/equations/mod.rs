@@ -593,8 +593,8 @@ impl Discretization {
         forces
     }
 
-    /// Computes the Newton step by GMRES. `self.workspace.step` contains the residual in units on entry
-    /// and the step on return. Returns false if GMRES does not converge.
+    /// Computes the Newton step by GMRES. `self.workspace.step` contains the scaled residual on
+    /// entry and the step on return. Returns false if GMRES does not converge.
     pub(super) fn krylov_step(&mut self, context: SearchContext<'_>, near: StepStart) -> bool {
         let SearchContext { ports, omega, homotopy } = context;
         let Some(coupled) = &mut self.newton_krylov else { return false };

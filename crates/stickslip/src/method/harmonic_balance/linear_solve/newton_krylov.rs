@@ -1,6 +1,6 @@
-//! Newton steps by GMRES, for structures that couple many joints: the Jacobian
-//! `δ r_y - r_u R f_y` is applied as a product and not formed.
+//! Newton steps by GMRES, for structures that couple many joints.
 //!
+//! GMRES needs only products with the Jacobian `δ r_y - r_u R f_y`, which is not formed.
 //! Laws couple harmonics, the structure couples joints. A product applies the laws and then the
 //! structure. GMRES takes a few tens of products if its preconditioner is close to the Jacobian.
 //! The preconditioner has the equations with the mean stiffness of every joint over the period:
