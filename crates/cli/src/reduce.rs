@@ -56,23 +56,35 @@ pub fn reduce(file: &Path, set: &[(String, String)], out: &Path) -> Exit {
             );
         }
     }
+    let places = structure_places(&model);
+    let kept_views = places.len() < model.places.len();
     let reduced = match (exports, model.ring.map(|ring| ring.sectors).zip(substructure.disk.as_ref())) {
-        (Some(exports), _) => over_speeds(substructure, &model.places, &exports),
-        (None, Some((sectors, disk))) => sector(substructure, &model.places, sectors, disk),
-        (None, None) => without_rotation(substructure, &model.places),
+        (Some(exports), _) => over_speeds(substructure, &places, &exports),
+        (None, Some((sectors, disk))) => sector(substructure, &places, sectors, disk),
+        (None, None) => without_rotation(substructure, &places),
     };
     match reduced.and_then(|reduced| save(&reduced, out).map(|()| reduced)) {
         Ok(reduced) => print(&format!(
-            "{}: {} rows, {}\n  written to {}; in the study file, replace {} by {}\n",
+            "{}: {} rows, {}\n  written to {}; in the study file, replace {}{} by {}\n",
             file.display(),
             substructure.component.dofs(),
             reduced.description,
             out.display(),
             if reduced.sector.is_some() { "[structure], [[place]] and [disk]" } else { "[structure] and [[place]]" },
+            if kept_views { ", except for places of a mass or a body," } else { "" },
             out.join(TABLES).display(),
         )),
         Err(message) => failed(&message),
     }
+}
+
+/// Returns the places of the structure. Points of masses and bodies do not belong to it.
+fn structure_places(model: &Model) -> Vec<Place> {
+    let of_structure = |place: &&Place| match &place.view_of {
+        Some(of) => model.places.iter().any(|place| place.view_of.is_none() && place.name == *of),
+        None => true,
+    };
+    model.places.iter().filter(of_structure).cloned().collect()
 }
 
 /// The reduced structure to save.
@@ -160,7 +172,8 @@ fn sector(
     disk: &DiskPart,
 ) -> Result<ReducedStructure, String> {
     let stated = &places[..places.len() / sectors];
-    let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.clone()).collect();
+    let seen: Vec<Row> =
+        stated.iter().filter(|place| place.view_of.is_none()).flat_map(|place| place.rows.clone()).collect();
     let reduced = substructure.component.reduced_sector(&disk.boundary, sectors, &seen, &substructure.reduction);
     let reduced = reduced.map_err(|error| error.to_string())?;
     let mut seen = reduced.seen.into_iter();
@@ -168,7 +181,10 @@ fn sector(
     for place in &mut places {
         // The file uses the name without the sector number.
         place.name = place.name.strip_suffix("_0").unwrap_or(&place.name).to_owned();
-        place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen);
+        match &mut place.view_of {
+            Some(of) => *of = of.strip_suffix("_0").unwrap_or(of).to_owned(),
+            None => place.rows.iter_mut().zip(&mut seen).for_each(|(row, seen)| *row = seen),
+        }
     }
     let n = reduced.pairs.len();
     let earlier = ReductionAccuracy { error: reduced.error, up_to: reduced.up_to };

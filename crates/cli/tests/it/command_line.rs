@@ -590,6 +590,11 @@ fn a_reduction_that_is_saved_keeps_its_error() {
     let said = stickslip(folder.path(), &["check", "few/study.toml"]);
     let said = String::from_utf8_lossy(&said.stdout).into_owned();
     assert!(said.contains("by an earlier reduction, error") && said.contains("up to 400 Hz"), "{said}");
+    // Places of a mass stay in the study file.
+    let block = "[[mass]]\nname = \"block\"\nmass = \"1 g\"\ndirections = [\"x\", \"z\"]\n\
+                 [[place]]\nname = \"face\"\nof = \"block\"\nnormal = [0, 0, 1]\n";
+    write("block.toml", &format!("schema = 1\n{structure}{block}{response}"));
+    assert_eq!(saved("block.toml", "with-block"), few);
     // A structure that is already reduced has nothing to save.
     let said = stickslip(folder.path(), &["reduce", "few/study.toml", "--out", "fewer"]);
     assert_eq!(said.status.code(), Some(2), "{}", String::from_utf8_lossy(&said.stderr));

@@ -343,6 +343,11 @@ pub enum ObservedMotion {
         drift: f64,
         /// Number of periods of this drift.
         periods: usize,
+        /// Its mean speed, m/s.
+        speed: f64,
+        /// Stiffness of a spring that holds it and hardly changes its vibration, N/m: a hundredth
+        /// of the mass that moves, times the squared frequency.
+        spring: f64,
         /// The joint that is separated for the largest fraction of the last period.
         joint: String,
         /// This fraction; zero if no faces separate.
@@ -382,10 +387,12 @@ impl std::fmt::Display for ObservedMotion {
             ObservedMotion::Repeats { periods } => {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
-            ObservedMotion::Drifts { place, drift, periods, joint, open_fraction } => write!(
+            ObservedMotion::Drifts { place, drift, periods, speed, spring, joint, open_fraction } => write!(
                 f,
-                "drifts: `{place}` moves by {drift:.2e} m in {periods} periods{}; add a spring, increase the normal \
-                 loads, or add damping",
+                "drifts: `{place}` moves by {drift:.2e} m in {periods} periods, at {:.3} mm/s{}; hold it by a weak spring \
+                 along this direction ({spring:.1e} N/m hardly changes the vibration), increase the normal loads, or add \
+                 damping",
+                1e3 * speed,
                 apart(joint, *open_fraction)
             ),
             ObservedMotion::Irregular { periods, joint, open_fraction } => write!(

@@ -409,7 +409,7 @@ fn check_reduction(work: &UnitTask<'_>, index: usize, part: &mut UnitResult) {
     });
     let Some(slipping) = slipping else { return };
     let PreparedCase { case, system, method } = prepared;
-    if !study.kind().uses_method || !is_checked(index, points) {
+    if !study.kind().uses_method || !is_checked(index, points, case.model.ring.is_some()) {
         slipping.discard_points();
         return;
     }

@@ -159,12 +159,24 @@ fn classified(
         let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
         let steady =
             halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();
-        (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, place)
+        (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, Some((axis, place)))
     });
-    let farthest = farthest.fold((0.0, ""), |a, (way, place)| if way > a.0 { (way, place.as_str()) } else { a });
-    if farthest.0 > settings.drift_distance * swing {
-        let (way, place) = (farthest.0, farthest.1.to_owned());
-        return ObservedMotion::Drifts { place, drift: way, periods: last, joint, open_fraction: share };
+    let farthest = farthest.fold((0.0, None), |a, b| if b.0 > a.0 { b } else { a });
+    if let (drift, Some((axis, place))) = farthest
+        && drift > settings.drift_distance * swing
+    {
+        let squares: f64 = axis.rows().iter().map(|(_, weight)| weight * weight).sum();
+        let mass = axis.rows().iter().map(|(row, weight)| weight * weight * system.structure().diagonal_mass(*row));
+        let mass = mass.sum::<f64>() / (squares * squares);
+        return ObservedMotion::Drifts {
+            place: place.clone(),
+            drift,
+            periods: last,
+            speed: drift * omega / (last as f64 * TAU),
+            spring: 0.01 * mass * omega * omega,
+            joint,
+            open_fraction: share,
+        };
     }
     ObservedMotion::Irregular { periods, joint, open_fraction: share }
 }
@@ -203,12 +215,17 @@ mod tests {
         assert_eq!(classify_motion(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
             let (course, ..) = classify_motion(&block(load), OMEGA, Vec::new()).unwrap();
-            let ObservedMotion::Drifts { ref place, drift, periods, open_fraction, .. } = course else {
+            let ObservedMotion::Drifts { ref place, drift, periods, speed: measured, spring, open_fraction, .. } =
+                course
+            else {
                 panic!("{course}")
             };
             assert_eq!(place, along);
             let expected = speed * periods as f64 * TAU / OMEGA;
             assert!((drift / expected - 1.0).abs() < 1e-3, "{drift} {expected}");
+            assert!((measured / speed - 1.0).abs() < 1e-3, "{measured} {speed}");
+            // the block has 1 kg
+            assert_eq!(spring, 0.01 * OMEGA * OMEGA);
             assert_eq!(open_fraction, if along == "z" { 1.0 } else { 0.0 });
             assert!(course.to_string().contains(&format!("`{along}`")), "{course}");
         }
