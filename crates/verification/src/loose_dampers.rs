@@ -308,7 +308,7 @@ impl LooseDamper {
         let damping = DMatrix::from_diagonal(&DVector::from_fn(n, |i, _| damping(i)));
         let rate = (k[(0, 0)] / m[(0, 0)]).sqrt();
         // Length of these steps, in periods of a blade.
-        let mut motion = Motion::new(self, &damping, 1e-3 * TAU / rate)?;
+        let mut motion = DamperMotion::new(self, &damping, 1e-3 * TAU / rate)?;
         for step in 1..=2 * load_steps {
             motion.advance(&self.load * (step as f64 / load_steps as f64).min(1.0))?;
         }
@@ -352,7 +352,7 @@ impl LooseDamper {
         let window = 40;
         let Settings { steps, growth, periods, settled } = course;
         let n = self.load.len();
-        let mut motion = Motion::new(self, &self.matrices[1], TAU / (omega * steps as f64))?;
+        let mut motion = DamperMotion::new(self, &self.matrices[1], TAU / (omega * steps as f64))?;
         (motion.x, motion.friction) = self.static_equilibrium()?;
         let mut before: Option<Vec<(f64, f64)>> = None;
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); n];
@@ -397,7 +397,7 @@ impl LooseDamper {
 }
 
 /// A motion in steps of average acceleration.
-struct Motion<'a> {
+struct DamperMotion<'a> {
     damper: &'a LooseDamper,
     damping: &'a DMatrix<f64>,
     length: f64,
@@ -411,14 +411,14 @@ struct Motion<'a> {
     friction: [f64; 2],
 }
 
-impl<'a> Motion<'a> {
+impl<'a> DamperMotion<'a> {
     fn new(damper: &'a LooseDamper, damping: &'a DMatrix<f64>, length: f64) -> Option<Self> {
         let [m, _, k] = &damper.matrices;
         let inverse = (m + damping * (0.5 * length) + k * (0.25 * length * length)).try_inverse()?;
         let (gain, moved) = damper.gains(&(&inverse * (0.25 * length * length)));
         let still = DVector::zeros(damper.load.len());
         let (x, v, a) = (still.clone(), still.clone(), still);
-        Some(Motion { damper, damping, length, inverse, gain, moved, x, v, a, friction: [0.0; 2] })
+        Some(DamperMotion { damper, damping, length, inverse, gain, moved, x, v, a, friction: [0.0; 2] })
     }
 
     /// Makes one step; `load` acts at its end.

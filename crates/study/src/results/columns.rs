@@ -7,7 +7,7 @@ pub(crate) const AMPLITUDE: &str = "amplitude_m";
 /// True if a peak is only the end of the range.
 pub(crate) const AT_RANGE_END: &str = "at_range_end";
 /// True if only the reverse sweep has the peak.
-pub(crate) const REVERSE_SWEEP: &str = "way_back";
+pub(crate) const REVERSE_SWEEP: &str = "reverse_sweep";
 /// Return defect.
 pub(crate) const RESIDUAL: &str = "residual";
 /// Relative difference of the work put in and the energy lost.

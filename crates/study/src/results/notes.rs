@@ -362,8 +362,8 @@ impl Note {
                 let size: Vec<String> = higher.into_iter().chain(lower).collect();
                 Some(format!(
                     "warning: at {} {} the reverse sweep finds another orbit, {}: the history of the motion decides \
-                     between them. `way_back.csv` contains the orbits of the reverse sweep; peaks that only they \
-                     have are marked `way_back` in `peaks.csv`. Kind `branch` follows the whole curve, with its \
+                     between them. `reverse_sweep.csv` contains the orbits of the reverse sweep; peaks that only they \
+                     have are marked `reverse_sweep` in `peaks.csv`. Kind `branch` follows the whole curve, with its \
                      folds.",
                     points(*count),
                     if hertz(*from) == hertz(*to) {

@@ -256,9 +256,9 @@ fn measure_on_one_thread(
                 stop,
             };
             match measure(study, first.as_ref(), plan.probe, selection, &limits) {
-                Outcome::Measured(one) => all.push(one),
-                Outcome::Nothing => break,
-                Outcome::Failed => return None,
+                ProbeOutcome::Measured(one) => all.push(one),
+                ProbeOutcome::Nothing => break,
+                ProbeOutcome::Failed => return None,
             }
         }
         Some(all)
@@ -276,7 +276,7 @@ struct Limits<'a> {
 }
 
 /// The result of a probe.
-enum Outcome {
+enum ProbeOutcome {
     Measured(Measurement),
     /// The time limit came before the first point.
     Nothing,
@@ -290,7 +290,7 @@ fn measure(
     probe: Probe,
     selection: &Selection,
     limits: &Limits<'_>,
-) -> Outcome {
+) -> ProbeOutcome {
     let (finished, share) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Share::default()));
     let stamps = finished.clone();
     let stop_flag = {
@@ -334,31 +334,31 @@ fn measure(
     let ended = Instant::now();
     let complete = match computed {
         Ok(Some(_)) => true,
-        Ok(None) => return Outcome::Failed,
+        Ok(None) => return ProbeOutcome::Failed,
         Err(_) if stop_flag.is_set() => false,
         // a panic belongs to the run
-        Err(_) => return Outcome::Failed,
+        Err(_) => return ProbeOutcome::Failed,
     };
     let seconds = |from: Instant, to: Instant| to.saturating_duration_since(from).as_secs_f64();
     let preparing = seconds(begun, prepared);
     let stamps = finished.lock().unwrap_or_else(PoisonError::into_inner);
     match probe {
         Probe::Points { .. } => {
-            let Some(cold) = stamps.first() else { return Outcome::Nothing };
+            let Some(cold) = stamps.first() else { return ProbeOutcome::Nothing };
             let (first, rest) = (seconds(prepared, *cold), seconds(*cold, ended));
             // the work after the last point belongs to all points in equal parts
             let (first, other) = match stamps.len() {
                 1 => (first + if complete { rest } else { 0.0 }, first),
                 count => (first, rest / (count - 1) as f64),
             };
-            Outcome::Measured(Measurement { preparing, first, other, points: stamps.len(), complete })
+            ProbeOutcome::Measured(Measurement { preparing, first, other, points: stamps.len(), complete })
         }
         Probe::Unit { .. } => {
             let share = if complete { 1.0 } else { share.get() };
             let first = seconds(prepared, ended) / share;
             match share > 0.0 {
-                true => Outcome::Measured(Measurement { preparing, first, other: first, points: 1, complete }),
-                false => Outcome::Nothing,
+                true => ProbeOutcome::Measured(Measurement { preparing, first, other: first, points: 1, complete }),
+                false => ProbeOutcome::Nothing,
             }
         }
     }

@@ -647,7 +647,7 @@ fn the_reverse_sweep_finds_its_peak() {
         let found = study("response", points);
         let peaks = table(&found, "peaks");
         let (frequency, amplitude) = (peaks.numbers("frequency_Hz").unwrap(), peaks.numbers("amplitude_m").unwrap());
-        let back = peaks.flags("way_back").unwrap();
+        let back = peaks.flags("reverse_sweep").unwrap();
         let of_back: Vec<usize> = (0..back.len()).filter(|row| back[*row] == Some(true)).collect();
         assert_eq!(of_back.len(), 1, "{peaks:?}");
         let row = of_back[0];
@@ -655,9 +655,10 @@ fn the_reverse_sweep_finds_its_peak() {
         assert!((0..back.len()).all(|other| other == row || amplitude[other] < 0.7 * height), "{peaks:?}");
         // above the peak's frequency the upper branch is lower than the peak, and higher than
         // the curve of the upward sweep
-        let (curve, way_back) = (table(&found, "curve"), table(&found, "way_back"));
+        let (curve, reverse_sweep) = (table(&found, "curve"), table(&found, "reverse_sweep"));
         let (there, low) = (curve.numbers("frequency_Hz").unwrap(), curve.numbers("m_amplitude_m").unwrap());
-        let (over, high) = (way_back.numbers("frequency_Hz").unwrap(), way_back.numbers("m_amplitude_m").unwrap());
+        let (over, high) =
+            (reverse_sweep.numbers("frequency_Hz").unwrap(), reverse_sweep.numbers("m_amplitude_m").unwrap());
         assert!(over.len() > 10 && over.is_sorted() && over[0] > at, "{over:?}");
         assert!(high.is_sorted_by(|a, b| a > b) && high[0] < height, "{high:?}");
         for (omega, high) in over.iter().zip(high) {
@@ -681,7 +682,7 @@ vary = { k3 = ["-1e9 N/m^3", "-1 N/m^3"] }"#;
     assert!((peaks[0] / height - 1.0).abs() < 1e-7, "{performance:?}");
     // F / (c √(k/m - c²/4m²)) of the linear one
     assert!((peaks[1] / (0.3 / (2.0 * f64::sqrt(1e4 - 1.0))) - 1.0).abs() < 1e-5, "{performance:?}");
-    assert_eq!(performance.flags("way_back").unwrap(), [Some(true), Some(false)]);
+    assert_eq!(performance.flags("reverse_sweep").unwrap(), [Some(true), Some(false)]);
 }
 
 /// Two and three masses with a stop, whose upper branch ends just beyond its peak.

@@ -56,12 +56,6 @@ pub(super) fn places(
         .collect()
 }
 
-/// Share of the mean forces that may be unbalanced. The regularizing spring of an unsupported
-/// direction carries the difference.
-const UNBALANCED_FORCE: f64 = 1e-6;
-/// Rounding error of sums of spring forces, in units of the rounding of their largest terms.
-const ROUNDING: f64 = 1e3;
-
 /// Returns true if the mean forces balance without the springs that regularize unsupported
 /// directions.
 pub(super) fn mean_forces_balance(
@@ -91,13 +85,15 @@ pub(super) fn mean_forces_balance(
     system.structure().stiffness_entries().for_each(|(row, column, stiffness)| {
         let force = stiffness * x[0][column].re;
         held[row] += force;
-        rounding[row] += ROUNDING * f64::EPSILON * force.abs();
+        // a thousand times the rounding of the largest terms
+        rounding[row] += 1e3 * f64::EPSILON * force.abs();
     });
     let missing = left.iter().zip(held).zip(rounding).map(|((left, held), rounding)| {
         let missing = (left.re - held).abs() - rounding;
         missing.max(0.0).powi(2)
     });
-    missing.sum::<f64>().sqrt() <= UNBALANCED_FORCE * size
+    // the regularizing spring of an unsupported direction carries the difference
+    missing.sum::<f64>().sqrt() <= 1e-6 * size
 }
 
 #[derive(Debug, Clone)]

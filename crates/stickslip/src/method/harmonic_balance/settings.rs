@@ -135,3 +135,112 @@ impl Default for WorkSettings {
         }
     }
 }
+
+/// Settings of the proximal point method, with the weight `s` of its term.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ProximalSettings {
+    /// First value of `s`. Default 1.
+    pub first_weight: f64,
+    /// Largest value of `s`. Default 1e4: beyond it a proximal point hardly moves.
+    pub largest_weight: f64,
+    /// Bounds of the factor by which `s` shrinks after a point. Default 0.1 and 0.3. The factor is
+    /// squared after few Newton iterations, within these bounds; failures increase it.
+    pub reduction: [f64; 2],
+    /// Factor above which a failure keeps `s` in the next try. Default 0.5. A failure with an
+    /// unchanged `s` increases it.
+    pub retry_factor: f64,
+    /// Residual at which the last point counts as the solution if the next one is not found.
+    /// Default 1e-6, a thousandth of the usual truncation error: the total force of redundant
+    /// contacts is then known to this accuracy; only its distribution among them is not.
+    pub accepted_residual: f64,
+    /// Largest number of points and tries. Default 40; ten are usual.
+    pub points: usize,
+    /// Newton iterations per point. Default 30; 2 to 10 are usual.
+    pub iterations: usize,
+    /// Newton iterations up to which a point was found quickly. Default 8.
+    pub quick_iterations: usize,
+}
+
+impl Default for ProximalSettings {
+    fn default() -> Self {
+        ProximalSettings {
+            first_weight: 1.0,
+            largest_weight: 1e4,
+            reduction: [0.1, 0.3],
+            retry_factor: 0.5,
+            accepted_residual: 1e-6,
+            points: 40,
+            iterations: 30,
+            quick_iterations: 8,
+        }
+    }
+}
+
+/// Settings of the interior point method.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InteriorPointSettings {
+    /// Samples per wave of the highest harmonic on the path. Default 16; Newton's method continues
+    /// with all samples.
+    pub samples_per_wave: usize,
+    /// Complementarity product, in units of the squared limit, at which the path ends. Default
+    /// 1e-4: nearly all samples are then at a limit or clearly inside.
+    pub end_of_path: f64,
+    /// Largest number of steps. Default 60; 5 to 30 are usual.
+    pub steps: usize,
+    /// Steps without halved products after which the path is given up. Default 8: elastic friction
+    /// next to the rigid one may stop its progress, because its kinks are not smoothed.
+    pub stagnation_steps: usize,
+    /// Newton iterations from the end of the path. Default 30; 1 to 5 are usual.
+    pub iterations: usize,
+}
+
+impl Default for InteriorPointSettings {
+    fn default() -> Self {
+        InteriorPointSettings {
+            samples_per_wave: 16,
+            end_of_path: 1e-4,
+            steps: 60,
+            stagnation_steps: 8,
+            iterations: 30,
+        }
+    }
+}
+
+/// Settings of the homotopy in the slip limits.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SlipHomotopySettings {
+    /// Total Newton iterations while slip limits are raised. Default 200; one is enough at limits
+    /// at which all joints stick.
+    pub raising_iterations: usize,
+    /// Newton iterations at one raised limit if only contacts support the structure. Default 6: one
+    /// iteration from static equilibrium reaches the solution in which all joints stick, if the
+    /// limits are high enough.
+    pub stuck_iterations: usize,
+    /// Total Newton iterations while slip limits are lowered. Default 3000; a few hundred are usual.
+    pub iterations: usize,
+}
+
+impl Default for SlipHomotopySettings {
+    fn default() -> Self {
+        SlipHomotopySettings { raising_iterations: 200, stuck_iterations: 6, iterations: 3000 }
+    }
+}
+
+/// Settings of initial guesses from time integration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TimeStartSettings {
+    /// Largest number of frequencies at which the motion is integrated after a failure, in each
+    /// block of a sweep. Default 8; each integration takes seconds.
+    pub integrations: usize,
+    /// Largest number of degrees of freedom. Default 60: steps multiply full matrices.
+    pub dofs: usize,
+    /// Number of series lengths that are tried from a settled motion, each with twice the
+    /// harmonics. Default 3.
+    pub series_lengths: usize,
+}
+
+impl Default for TimeStartSettings {
+    fn default() -> Self {
+        TimeStartSettings { integrations: 8, dofs: 60, series_lengths: 3 }
+    }
+}

@@ -404,21 +404,18 @@ impl WaveCollection<'_> {
     }
 }
 
-/// Number of columns that are multiplied at once: one cache line.
-const COLUMNS_AT_ONCE: usize = 8;
-
 /// Returns `Vᵀ A V` for entries with shifts.
 fn projected(entries: &[RingEntry], n: usize, basis: &[f64]) -> Vec<RingEntry> {
     let r = basis.len() / n.max(1);
     let mut out = Vec::with_capacity(3 * r * r);
     for shift in [-1, 0, 1] {
         let mut moved = Vec::with_capacity(basis.len());
-        // several columns at once, side by side, because the entries do not fit into the cache
-        for columns in basis.chunks(COLUMNS_AT_ONCE * n.max(1)) {
+        // eight columns at once, one cache line side by side: the entries do not fit into the cache
+        for columns in basis.chunks(8 * n.max(1)) {
             let column = |k: usize| columns.get(k * n..(k + 1) * n);
-            let beside: Vec<[f64; COLUMNS_AT_ONCE]> =
+            let beside: Vec<[f64; 8]> =
                 (0..n).map(|row| std::array::from_fn(|k| column(k).map_or(0.0, |column| column[row]))).collect();
-            let mut sums = vec![[0.0; COLUMNS_AT_ONCE]; n];
+            let mut sums = vec![[0.0; 8]; n];
             for &(row, column, _, value) in entries.iter().filter(|entry| entry.2 == shift) {
                 sums[row].iter_mut().zip(&beside[column]).for_each(|(sum, x)| *sum += value * x);
             }

@@ -120,7 +120,7 @@ fn peaks_by_case(drawing: &FigureInput<'_>) -> Vec<CasePeak> {
                     case: case_rows.case,
                     mass: masses[row].clone(),
                     at: (x[i], y[i]),
-                    way_back: is_reverse,
+                    reverse_sweep: is_reverse,
                 });
             }
         }

@@ -25,7 +25,7 @@ pub(super) struct CasePeak {
     /// Frequency (Hz) and amplitude (m).
     pub(super) at: (f64, f64),
     /// True if only the reverse sweep has the peak.
-    pub(super) way_back: bool,
+    pub(super) reverse_sweep: bool,
 }
 
 /// The data of the figure.
@@ -73,7 +73,9 @@ impl FigureData<'_> {
         let x = numbers(self.curve, DRIVE, case_rows.rows.clone());
         let y = self.amplitudes(name, case_rows.rows.clone());
         self.scaled(
-            self.with_peaks(case_rows, x.into_iter().zip(y).collect(), &|peak| !peak.way_back && peak.mass == name),
+            self.with_peaks(case_rows, x.into_iter().zip(y).collect(), &|peak| {
+                !peak.reverse_sweep && peak.mass == name
+            }),
         )
     }
 
@@ -88,7 +90,8 @@ impl FigureData<'_> {
         let all: Vec<Vec<f64>> = names.iter().map(|name| numbers(table, &amplitude_of(name), rows.clone())).collect();
         let largest = |i: usize| all.iter().map(|y| y[i]).fold(f64::NAN, f64::max);
         let points = (0..x.len()).map(|i| (x[i], largest(i))).collect();
-        let mut points = self.with_peaks(case_rows, points, &|peak| peak.way_back && names == [peak.mass.as_str()]);
+        let mut points =
+            self.with_peaks(case_rows, points, &|peak| peak.reverse_sweep && names == [peak.mass.as_str()]);
         // the line has a gap at frequencies at which both sweeps have the same orbit
         let there = numbers(self.curve, DRIVE, case_rows.rows.clone());
         let alike: Vec<f64> = there.into_iter().filter(|omega| !x.contains(omega)).collect();
@@ -113,7 +116,7 @@ impl FigureData<'_> {
         let alike = first_largest(heights.iter().copied())
             .is_none_or(|worst| heights.iter().all(|height| *height >= (1.0 - RELATIVE_TIE) * heights[worst]));
         // a refined peak may be higher than all points of the curve
-        for peak in self.peaks_of(case_rows).filter(|peak| !peak.way_back) {
+        for peak in self.peaks_of(case_rows).filter(|peak| !peak.reverse_sweep) {
             if let Some(i) = self.shown.iter().position(|(name, _)| *name == peak.mass) {
                 heights[i] = heights[i].max(peak.at.1);
             }
@@ -126,7 +129,7 @@ impl FigureData<'_> {
             y0 + (omega - x0) / (x1 - x0) * (y1 - y0)
         };
         // a peak of one place below the curve of another place is not on the envelope
-        let counts = |peak: &CasePeak| !peak.way_back && points.len() > 1 && peak.at.1 > below(peak.at.0);
+        let counts = |peak: &CasePeak| !peak.reverse_sweep && points.len() > 1 && peak.at.1 > below(peak.at.0);
         let (x, y) = self.scaled(self.with_peaks(case_rows, points.clone(), &counts));
         (
             x,

@@ -18,7 +18,7 @@ pub(super) const AMPLIFICATION: &str = "amplification";
 /// One row per peak of a disk at which no other place moves more, with the shape there.
 pub(super) const SHAPES: &str = "peak_shapes";
 /// One row per orbit that only the reverse sweep finds.
-pub(super) const REVERSE_SWEEP: &str = "way_back";
+pub(super) const REVERSE_SWEEP: &str = "reverse_sweep";
 /// Frequency of the peak of the tuned disk.
 pub(super) const TUNED_FREQUENCY: &str = "tuned_frequency_Hz";
 /// Amplitude of that peak.

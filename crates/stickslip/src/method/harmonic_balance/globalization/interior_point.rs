@@ -23,22 +23,9 @@ use crate::method::harmonic_balance::equations::{
 };
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 use crate::method::harmonic_balance::newton::SolveError;
+use crate::method::harmonic_balance::settings::InteriorPointSettings;
 use num_complex::Complex64;
 use stickslip_numerics::interrupt;
-
-/// Samples per wave of the highest harmonic on the path. Newton's method continues with all
-/// samples.
-const SAMPLES_PER_WAVE: usize = 16;
-/// Complementarity product, in units of the squared limit, at which the path ends. Nearly all
-/// samples are then at a limit or clearly inside.
-const END_OF_PATH: f64 = 1e-4;
-/// Largest number of steps; 5 to 30 are usual.
-const MOST: usize = 60;
-/// Steps without halved products after which the path is given up. Elastic friction next to the
-/// rigid one may stop its progress, because its kinks are not smoothed.
-const STAGNATION_STEPS: usize = 8;
-/// Newton iterations from the end of the path; 1 to 5 are usual.
-const ITERATIONS: usize = 30;
 
 /// Point on the path.
 struct CentralPath {
@@ -77,22 +64,23 @@ impl Discretization {
         self.newton(
             SearchContext::given(ports, omega),
             motion,
-            SearchSettings { iterations: ITERATIONS, ..SearchSettings::default() },
+            SearchSettings { iterations: InteriorPointSettings::default().iterations, ..SearchSettings::default() },
         )
     }
 
     /// Follows the path. Returns true if its end was reached.
     fn follow_central_path(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> bool {
         let Some(mut along) = self.start_central_path(ports, omega, motion) else { return false };
+        let settings = InteriorPointSettings::default();
         let (mut mark, mut waited) = (f64::INFINITY, 0);
-        for _ in 0..MOST {
+        for _ in 0..settings.steps {
             interrupt::check();
             let left = along.each().map(InteriorPort::remaining_gap).fold(0.0, f64::max);
-            if left <= END_OF_PATH {
+            if left <= settings.end_of_path {
                 return true;
             }
             (mark, waited) = if left < 0.5 * mark { (left, 0) } else { (mark, waited + 1) };
-            if !left.is_finite() || waited > STAGNATION_STEPS || self.is_budget_used(ports) {
+            if !left.is_finite() || waited > settings.stagnation_steps || self.is_budget_used(ports) {
                 return false;
             }
             self.work.evaluations += 1;
@@ -131,7 +119,7 @@ impl Discretization {
     fn start_central_path(&mut self, ports: &Ports, omega: f64, motion: &mut HarmonicSolution) -> Option<CentralPath> {
         let nh = self.harmonics().len();
         let top = self.harmonics().last().copied().unwrap_or(0);
-        let samples = (SAMPLES_PER_WAVE * (top + 1)).next_power_of_two();
+        let samples = (InteriorPointSettings::default().samples_per_wave * (top + 1)).next_power_of_two();
         let mut along = CentralPath {
             barriers: Vec::with_capacity(ports.len()),
             aft: FrequencyTime::new(self.harmonics().to_vec(), samples),

@@ -8,16 +8,7 @@ use super::homotopy::{GIVEN_EQUATIONS, Homotopy, SearchContext};
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::newton::SolveError;
-
-/// Total Newton iterations while slip limits are raised. One is enough at limits at which all
-/// joints stick.
-const MOST_RAISING: usize = 200;
-/// Newton iterations at one raised limit if only contacts support the structure. One iteration
-/// from static equilibrium reaches the solution in which all joints stick, if the limits are
-/// high enough.
-const STUCK_ITERATIONS: usize = 6;
-/// Total Newton iterations while slip limits are lowered; a few hundred are usual.
-const MOST_ITERATIONS: usize = 3000;
+use crate::method::harmonic_balance::settings::SlipHomotopySettings;
 
 impl Discretization {
     /// Lowers the slip limits from values at which all joints stick to the given ones.
@@ -30,6 +21,7 @@ impl Discretization {
         motion: &mut HarmonicSolution,
     ) -> Result<(), SolveError> {
         let mut good = HarmonicSolution { iterations: motion.iterations, ..self.frictionless_motion() };
+        let settings = SlipHomotopySettings::default();
         let mut limits: f64 = 1.0;
         // with all joints stuck, the equations are linear
         let mut raised = Err(SolveError::not_converged(good.iterations, f64::INFINITY));
@@ -45,13 +37,19 @@ impl Discretization {
                 true => HarmonicSolution { iterations, ..self.static_solution(limits) },
                 false => HarmonicSolution { iterations, ..self.frictionless_motion() },
             };
-            let most = if self.is_held_by_contacts() { STUCK_ITERATIONS } else { SearchSettings::default().iterations };
+            let most = match self.is_held_by_contacts() {
+                true => settings.stuck_iterations,
+                false => SearchSettings::default().iterations,
+            };
             raised = self.newton(
                 SearchContext { ports, omega, homotopy: Homotopy { limit_factor: limits, ..GIVEN_EQUATIONS } },
                 &mut good,
                 SearchSettings { iterations: most, ..SearchSettings::default() },
             );
-            if raised.is_ok() || self.is_budget_used(ports) || good.iterations - motion.iterations > MOST_RAISING {
+            if raised.is_ok()
+                || self.is_budget_used(ports)
+                || good.iterations - motion.iterations > settings.raising_iterations
+            {
                 break;
             }
         }
@@ -73,7 +71,7 @@ impl Discretization {
                 }
                 Err(error) => {
                     factor = factor.sqrt();
-                    if factor > 0.995 || self.is_budget_used(ports) || good.iterations > MOST_ITERATIONS {
+                    if factor > 0.995 || self.is_budget_used(ports) || good.iterations > settings.iterations {
                         return Err(error);
                     }
                 }

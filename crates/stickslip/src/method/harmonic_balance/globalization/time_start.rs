@@ -5,6 +5,7 @@ use super::found_by::FoundBy;
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::NAME;
 use crate::method::harmonic_balance::equations::HarmonicSolution;
+use crate::method::harmonic_balance::settings::TimeStartSettings;
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::return_map::APPROACH;
@@ -12,18 +13,6 @@ use crate::method::orbit_search::settling::classify_motion;
 use crate::orbit::{JointSample, ObservedMotion, Orbit, Path};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-
-/// Largest number of frequencies at which the motion is integrated after a failure, in each
-/// block of a sweep. Each integration takes seconds.
-const MOST_INTEGRATIONS: usize = 8;
-/// Largest number of degrees of freedom for time integration. Its steps multiply full matrices.
-const MOST_DOFS_IN_TIME: usize = 60;
-/// Number of series lengths that are tried from a settled motion, each with twice the
-/// harmonics.
-const SERIES_LENGTHS: usize = 3;
-/// Number of returns from the state of another solver's orbit before the motion is read.
-/// Newton's method removes the remaining transient.
-const RETURNS: usize = 1;
 
 impl HarmonicBalanceSolver {
     /// Returns an initial guess for an orbit of several excitation periods.
@@ -49,12 +38,17 @@ impl HarmonicBalanceSolver {
     /// the state selects one of several orbits.
     pub(crate) fn guess_from_state(&mut self, start: &[f64], omega: f64) -> Option<(usize, HarmonicSolution)> {
         let dofs = self.system.dofs();
-        if self.orbit_check.proves() || self.periods > 1 || dofs > MOST_DOFS_IN_TIME || start.len() < 2 * dofs {
+        if self.orbit_check.proves()
+            || self.periods > 1
+            || dofs > TimeStartSettings::default().dofs
+            || start.len() < 2 * dofs
+        {
             return None;
         }
         let top = self.method.harmonics.unwrap_or(self.first);
         self.discretization(top, omega).ok()?;
-        let path = self.orbit_check.settle_and_record(&self.system, omega, start[..2 * dofs].to_vec(), RETURNS)?;
+        // one return, after which Newton's method removes the remaining transient
+        let path = self.orbit_check.settle_and_record(&self.system, omega, start[..2 * dofs].to_vec(), 1)?;
         Some((top, self.fourier_series(&*path, top, omega)?))
     }
 
@@ -65,7 +59,8 @@ impl HarmonicBalanceSolver {
     pub(crate) fn solve_after_integration(&mut self, omega: f64) -> Option<Orbit> {
         // twice the first harmonics, because a shorter series may have a spurious solution
         let top = self.method.harmonics.unwrap_or(self.harmonic_set.doubled(self.first));
-        if self.periods > 1 || self.system.dofs() > MOST_DOFS_IN_TIME || self.time_integrations >= MOST_INTEGRATIONS {
+        let settings = TimeStartSettings::default();
+        if self.periods > 1 || self.system.dofs() > settings.dofs || self.time_integrations >= settings.integrations {
             return None;
         }
         self.time_integrations += 1;
@@ -125,14 +120,14 @@ impl HarmonicBalanceSolver {
         if let Some((_, course, state)) = self.failed_frequencies.iter().find(|(at, ..)| *at == omega) {
             return no_orbit(course.clone(), state.clone());
         }
-        if self.failed_frequencies.len() >= MOST_INTEGRATIONS {
+        if self.failed_frequencies.len() >= TimeStartSettings::default().integrations {
             return None;
         }
         let (course, path, state) = classify_motion(&self.system, omega, self.static_state_or_zero())?;
         if matches!(course, ObservedMotion::Settles | ObservedMotion::Settling { .. }) {
             // contacts that open and close may have no solution with few harmonics
             let mut top = top;
-            for _ in 0..SERIES_LENGTHS {
+            for _ in 0..TimeStartSettings::default().series_lengths {
                 let found =
                     self.discretization(top, omega).is_ok().then(|| self.fourier_series(&*path, top, omega)).flatten();
                 if let Some(motion) = found
