@@ -24,13 +24,13 @@ const MEMBERS: usize = 10_000;
 fn read(bytes: &[u8]) -> Result<DataFile, Error> {
     let file = catching_panics(Location::File, || File::from_bytes(bytes.to_vec()))?;
     let limit = DecompressionLimit::for_file(bytes.len());
-    let mut walk = Walk { limit, budget: limit.numbers(), members: 0, file: DataFile::default() };
+    let mut walk = GroupWalk { limit, budget: limit.numbers(), members: 0, file: DataFile::default() };
     walk.group(&file.root(), "", DEPTH)?;
     Ok(walk.file)
 }
 
 /// A walk through the groups of a file.
-struct Walk {
+struct GroupWalk {
     limit: DecompressionLimit,
     /// Numbers that may still be read.
     budget: u64,
@@ -38,7 +38,7 @@ struct Walk {
     file: DataFile,
 }
 
-impl Walk {
+impl GroupWalk {
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), Error> {
         let here = || Location::Variable(path.to_owned());
         let full = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };

@@ -31,7 +31,7 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
         return Err(ByteCursor::new(bytes, ByteOrder::Little).malformed("the header of MATLAB 5", "none"));
     };
     let limit = DecompressionLimit::for_file(bytes.len());
-    let mut walk = Walk { order, file: DataFile::default(), budget: limit.numbers() };
+    let mut walk = StructWalk { order, file: DataFile::default(), budget: limit.numbers() };
     let mut cursor = ByteCursor::new(bytes, order);
     cursor.skip(mat5::HEADER);
     while cursor.remaining() >= 8 {
@@ -52,14 +52,14 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
 }
 
 /// A walk through the variables of a file.
-struct Walk {
+struct StructWalk {
     order: ByteOrder,
     file: DataFile,
     /// Numbers that may still be read. Compressed variables can state many.
     budget: u64,
 }
 
-impl Walk {
+impl StructWalk {
     /// Reads a variable from the bytes of its element. `path` replaces its own name.
     fn variable(&mut self, data: &[u8], path: Option<String>, depth: usize) -> Result<(), Error> {
         let mut parts = ByteCursor::new(data, self.order);
