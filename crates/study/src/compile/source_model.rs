@@ -115,6 +115,8 @@ pub(crate) struct ModelLists {
     pub motion: Vec<CompiledTable>,
     /// `[disk]`; then the lists state one sector.
     pub disk: Option<DiskSource>,
+    /// True for a model of rotation, whose masses are moments of inertia.
+    pub is_torsional: bool,
 }
 
 impl ModelLists {
@@ -148,11 +150,7 @@ impl ModelLists {
 
     /// Gives quantities at rotations of bodies the dimensions of moments and angles.
     pub fn use_rotation_dimensions(&mut self) {
-        let named = self.body.iter().filter_map(|table| match table.entry("name").map(|entry| &entry.value) {
-            Some(CompiledValue::Fixed(ResolvedValue::Text(name))) => Some(name.clone()),
-            _ => None,
-        });
-        let bodies: BTreeSet<String> = named.collect();
+        let bodies: BTreeSet<String> = self.body.iter().filter_map(|table| table.name().map(str::to_owned)).collect();
         let turns = |place: &str| {
             let split = place.strip_prefix(NEXT).unwrap_or(place).split_once('.');
             split.is_some_and(|(body, along)| ROTATIONS.contains(&along) && bodies.contains(body))

@@ -395,7 +395,12 @@ const REPEAT: Key = optional(
 
 const MASS: &[Key] = &[
     required("name", ValueType::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
-    required("mass", ValueType::Quantity(Dimension::MASS, Bounds::AtLeastZero), "mass", "\"182 g\""),
+    required(
+        "mass",
+        ValueType::Quantity(Dimension::MASS, Bounds::AtLeastZero),
+        "mass; moments of inertia in kg m^2 make a model of rotation, with N m/rad, N m s/rad, N m and rad",
+        "\"182 g\"",
+    ),
     optional(
         "directions",
         ValueType::Names,
@@ -589,7 +594,8 @@ const FORCE: &[Key] = &[
     optional(
         "amplitude",
         ValueType::Quantity(Dimension::FORCE, Bounds::Finite),
-        "amplitude; on a rotation of a body the amplitude of a moment in N m; required without `data`",
+        "amplitude; on a rotation of a body the amplitude of a moment in N m; may depend on the excitation frequency, as \
+         in \"m_e * frequency^2/(1 rad)^2\"; required without `data`",
         "\"10 N\"",
     ),
     RECORD,

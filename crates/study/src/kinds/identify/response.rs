@@ -149,12 +149,10 @@ impl Target for ResponseTarget {
                 (chunk[0].force, model.forces.iter_mut().find(|force| force.harmonic == 1))
             {
                 excitation.amplitude = force;
+                model.frequency_forces.clear();
             }
-            let (amplitude, phase) = model
-                .forces
-                .iter()
-                .find(|force| force.harmonic == 1)
-                .map_or((1.0, 0.0), |force| (force.amplitude, force.phase));
+            let excited = model.forces.iter().position(|force| force.harmonic == 1);
+            let phase = excited.map_or(0.0, |force| model.forces[force].phase);
             let system: System = model.assemble().map_err(|error| error.to_string())?;
             let mut solver = method.solver(&system).map_err(|error| error.to_string())?;
             for row in chunk {
@@ -173,7 +171,7 @@ impl Target for ResponseTarget {
                     * Complex64::from_polar(1.0, -phase)
                     * self.quantity.displacement_factor(row.omega);
                 if self.per_force {
-                    value /= amplitude;
+                    value /= excited.map_or(1.0, |force| model.force_amplitude(force, row.omega));
                 }
                 if self.complex {
                     fitted.values.extend([value.re, value.im]);

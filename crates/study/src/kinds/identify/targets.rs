@@ -8,6 +8,7 @@ use super::weight::Weight;
 use crate::case::names::ModelNames;
 use crate::case::study::{Case, Study};
 use crate::case::values::Values;
+use crate::compile::torsion::of_rotation;
 use crate::data::{ColumnError, DataTable};
 use crate::kinds::info::KeyError;
 use crate::syntax::suggest::{alternatives, excerpt};
@@ -147,6 +148,7 @@ pub(super) struct TargetInput<'a> {
 impl TargetInput<'_> {
     /// Returns the numbers of a column in the rows of the target.
     pub fn column(&self, role: &str, dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
+        let dimension = if self.case.is_torsional { of_rotation(dimension) } else { dimension };
         let all = self.data.values(role, dimension)?;
         let missing = self.rows.iter().find(|row| !all.get(**row).is_some_and(|value| value.is_finite()));
         if let Some(row) = missing {
@@ -164,6 +166,7 @@ impl TargetInput<'_> {
     /// Returns the standard deviations of values with these magnitudes, group by group.
     pub fn deviations(&self, magnitudes: &[f64], dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
         let text = self.values.text("weight").unwrap_or("1 % of largest");
+        let dimension = if self.case.is_torsional { of_rotation(dimension) } else { dimension };
         let weight = Weight::read(text, dimension).map_err(|message| ColumnError {
             message,
             help: "write `relative 2 %`, `1 % of largest`, or a quantity with its unit".to_owned(),

@@ -12,6 +12,7 @@
 use crate::case::study::{Case, Study};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::torsion::of_rotation;
 use crate::data::ColumnError;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -99,7 +100,8 @@ impl Records {
                     return Ok(None);
                 }
                 // the records use the harmonics themselves
-                let forced = case.model.forces.iter().any(|force| force.harmonic > 0 && force.amplitude != 0.0);
+                let forced = case.model.forces.iter().any(|force| force.harmonic > 0 && force.amplitude != 0.0)
+                    || !case.model.frequency_forces.is_empty();
                 let moved = case.model.motions.iter().any(|motion| motion.harmonic > 0 && motion.amplitude != 0.0);
                 if forced || moved {
                     let help = "write all forces as records, or only constant ones (harmonic = 0) beside them";
@@ -109,13 +111,14 @@ impl Records {
                 let harmonic = channels.len() as u32 + 1;
                 let on_ground = list == "motion" && on == GROUND;
                 ground_moves |= on_ground;
-                let (dimension, role) = match (list, on_ground, model.is_rotation(&on)) {
+                let (displacement, role) = match (list, on_ground, model.is_rotation(&on)) {
                     ("force", _, false) => (Dimension::FORCE, "force"),
                     ("force", _, true) => (Dimension::ENERGY, "force"),
                     (_, true, _) => (ACCELERATION, "acceleration"),
                     (_, _, false) => (Dimension::LENGTH, "displacement"),
                     (_, _, true) => (Dimension::ANGLE, "displacement"),
                 };
+                let dimension = if case.is_torsional { of_rotation(displacement) } else { displacement };
                 let times = data.values("time", Dimension::TIME).map_err(|cause| fail("data", cause))?;
                 let values = data.values(text(table, "column").unwrap_or(role), dimension);
                 let values = values.map_err(|cause| fail("column", cause))?;
