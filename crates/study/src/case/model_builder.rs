@@ -134,7 +134,7 @@ pub(crate) fn build_model(
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         forces.push(sector_distribution(table, &values, &mut wrong));
         // a record replaces the amplitude when the motion is computed
-        if table.entry("data").is_some() {
+        if table.has_time_history() {
             model.forces.push(Force { on: text(&values, "on"), amplitude: 0.0, phase: 0.0, harmonic: 0 });
             continue;
         }
@@ -148,7 +148,7 @@ pub(crate) fn build_model(
     for (i, table) in lists.motion.iter().enumerate() {
         let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
-        let from_record = table.entry("data").is_some();
+        let from_record = table.has_time_history();
         if from_record && text(&values, "on") == GROUND {
             continue;
         }

@@ -142,6 +142,11 @@ impl CompiledTable {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
+    /// Returns whether a force or a motion has a time history: a record or a signal.
+    pub fn has_time_history(&self) -> bool {
+        self.entry("data").is_some() || self.entry("signal").is_some()
+    }
+
     /// Appends the indices of the repetition to a message.
     pub fn with_repetition(&self, message: &str) -> String {
         if self.repetition.is_empty() { message.to_owned() } else { format!("{message} ({})", self.repetition) }

@@ -133,11 +133,11 @@ impl ModelLists {
         }
     }
 
-    /// Returns the entries of forces and motions that take their values from a record: list and
+    /// Returns the entries of forces and motions that have a time history: list and
     /// number.
     pub fn records(&self) -> Vec<(&'static str, usize)> {
         let of = |list: &'static str, tables: &[CompiledTable]| {
-            let has = |(index, table): (usize, &CompiledTable)| table.entry("data").map(|_| (list, index));
+            let has = |(index, table): (usize, &CompiledTable)| table.has_time_history().then_some((list, index));
             tables.iter().enumerate().filter_map(has).collect::<Vec<_>>()
         };
         [of("force", &self.force), of("motion", &self.motion)].concat()

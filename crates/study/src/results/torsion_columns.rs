@@ -8,7 +8,8 @@ use std::borrow::Cow;
 
 /// Ends of column names of displacements and forces, and of rotations and moments. Ends with
 /// several units come first.
-const ENDS: [(&str, &str); 8] = [
+const ENDS: [(&str, &str); 9] = [
+    ("_m2_per_Hz", "_rad2_per_Hz"),
     ("_per_sqrt_kg", "_per_sqrt_kg_m2"),
     ("_N_per_m", "_N_m_per_rad"),
     ("_m_per_s2", "_rad_per_s2"),

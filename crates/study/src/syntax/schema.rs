@@ -10,6 +10,7 @@ use crate::compile::templates;
 use crate::kinds;
 use crate::kinds::kind::Kind;
 use crate::syntax::key::DAMPING_RATIO;
+use crate::syntax::signal_keys::{FORCE_SIGNAL, GROUND_SIGNAL};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method};
@@ -599,6 +600,12 @@ const FORCE: &[Key] = &[
         "\"10 N\"",
     ),
     RECORD,
+    optional(
+        "signal",
+        ValueType::Table(FORCE_SIGNAL),
+        "in a transient, instead of `amplitude`: a shock, a chirp or a random process",
+        "{ kind = \"half-sine\", amplitude = \"50 N\", duration = \"11 ms\" }",
+    ),
     RECORD_COLUMN,
     PHASE,
     HARMONIC,
@@ -632,6 +639,12 @@ const MOTION: &[Key] = &[
         "\"2 mm\"",
     ),
     RECORD,
+    optional(
+        "signal",
+        ValueType::Table(GROUND_SIGNAL),
+        "in a transient, for the acceleration of `ground`: a shock, a chirp or a random process",
+        "{ kind = \"half-sine\", amplitude = \"100 m/s^2\", duration = \"11 ms\" }",
+    ),
     optional(
         "column",
         ValueType::Text,

@@ -192,7 +192,9 @@ fn a_constant_velocity_is_refused() {
         &belt.replace("velocity", "speed"),
         (43, 1),
         "speed",
-        &["the keys of motion 1 are `on`, `amplitude`, `data`, `column`, `along`, `phase`, `harmonic`, `engine_order`"],
+        &[
+            "the keys of motion 1 are `on`, `amplitude`, `data`, `signal`, `column`, `along`, `phase`, `harmonic`, `engine_order`",
+        ],
     );
 }
 

@@ -35,6 +35,7 @@ mod file_formats;
 mod frequency_forces;
 mod good_studies;
 mod identify;
+mod identify_derivatives;
 mod incomplete_models;
 mod initial_states;
 mod key_examples;

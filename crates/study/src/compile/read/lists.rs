@@ -102,15 +102,17 @@ impl Reader {
     /// Reports forces or motions with neither an amplitude nor a record, or with both.
     fn require_amplitudes(&mut self, list: &str, tables: &[CompiledTable], example: &str) {
         for (i, table) in tables.iter().enumerate() {
-            let problem = match (table.entry("amplitude"), table.entry("data")) {
-                (None, None) => {
+            let stated: Vec<_> =
+                ["amplitude", "data", "signal"].into_iter().filter_map(|key| table.entry(key)).collect();
+            let problem = match stated[..] {
+                [] => {
                     let message = format!("`amplitude` is missing in {list} {}", i + 1);
                     Problem::new(&table.location, "amplitude", message)
                         .help(format!("add amplitude = {example}, or data = \"record\" in a transient"))
                 }
-                (Some(_), Some(data)) => {
-                    Problem::new(&data.location, "data", "`amplitude` and `data` exclude each other")
-                        .help("remove one of them")
+                [first, second, ..] => {
+                    let message = format!("`{}` and `{}` exclude each other", first.key, second.key);
+                    Problem::new(&second.location, second.key, message).help("remove one of them")
                 }
                 _ => continue,
             };

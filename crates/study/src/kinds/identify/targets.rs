@@ -4,6 +4,7 @@ use super::backbone::Backbone;
 use super::loops::LoopTarget;
 use super::response::ResponseTarget;
 use super::ring_down::RingDown;
+use super::settled::Settled;
 use super::weight::Weight;
 use crate::case::names::ModelNames;
 use crate::case::study::{Case, Study};
@@ -78,6 +79,11 @@ pub(super) fn kinds() -> Vec<(&'static str, &'static str)> {
              `response_imaginary`, and the measured `force` of each row",
         ),
         ("loop", "loops of a joint: the columns `displacement` and `force`, for laws with velocity also `time`"),
+        (
+            "settled",
+            "settled vibration: the columns `frequency`, `force`, and `amplitude` (half of peak to peak) or `mean` of a \
+             place, or `dissipation` of a joint per cycle",
+        ),
         ("ring-down", "free decay: the columns `time` and `response`"),
         ("backbone", "frequency over amplitude: the columns `amplitude`, `frequency` and `damping`"),
     ]
@@ -216,6 +222,7 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
                 return Err(KeyError::unknown_name("targets", "joint", at, &joints));
             }
         }
+        Some("settled") if model.joints.iter().any(|joint| joint.name == at) => {}
         Some(kind) => {
             ModelNames::places(model).single_label("targets", "place", at)?;
             let moves = ["start", "start_velocity"].iter().any(|key| values.by_name(key).is_some());
@@ -281,6 +288,7 @@ fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Targ
         "loop" => Box::new(LoopTarget::new(&input)?),
         "ring-down" => Box::new(RingDown::new(&input)?),
         "backbone" => Box::new(Backbone::new(&input)?),
+        "settled" => Box::new(Settled::new(&input)?),
         _ => Box::new(ResponseTarget::new(&input)?),
     })
 }
