@@ -61,4 +61,4 @@ pub const FORCE_SIGNAL: &[Key] = &keys(Dimension::FORCE, "\"50 N\"", "\"2 N^2/Hz
 
 /// Keys of the signal of the ground's acceleration.
 pub const GROUND_SIGNAL: &[Key] =
-    &keys(Dimension { kg: 0, m: 1, s: -2, rad: 0 }, "\"100 m/s^2\"", "\"0.5 (m/s^2)^2/Hz\"");
+    &keys(Dimension { kg: 0, m: 1, s: -2, rad: 0 }, "\"100 m/s^2\"", "\"0.5 m^2/s^4/Hz\"");
