@@ -4,8 +4,14 @@
 
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use std::cell::RefCell;
 use std::fmt;
 use std::sync::Arc;
+
+thread_local! {
+    /// Plans that the thread has made, by length. A plan is a reference to them.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
 
 /// A plan for signals of one length, with its scratch memory. Transforms allocate nothing.
 ///
@@ -39,8 +45,9 @@ impl fmt::Debug for FourierPlan {
 impl FourierPlan {
     /// Makes a plan for `samples` points per period (even, at least 2).
     pub fn new(samples: usize) -> Self {
-        let mut planner = RealFftPlanner::<f64>::new();
-        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        // a solver for every row of measured data would compute the factors again and again
+        let (forward, inverse) =
+            PLANNER.with_borrow_mut(|planner| (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples)));
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
         FourierPlan {
             samples,

@@ -4,7 +4,8 @@ use super::matrices::Entries;
 use serde::{Deserialize, Serialize};
 use stickslip::law::SharedLaw;
 use stickslip::model::{
-    Body, Force, Joint, Mass, Model, Motion, Place, Ring, SectorDistribution, Spring, Substructure, SubstructureDamping,
+    Body, Force, FrequencyForce, Joint, Mass, Model, Motion, Place, Ring, SectorDistribution, Spring, Substructure,
+    SubstructureDamping,
 };
 use stickslip::structure::{Component, Reduction};
 use stickslip_numerics::sparse::SparseMatrix;
@@ -26,6 +27,8 @@ struct StoredModel {
     joints: Vec<(String, [String; 2])>,
     /// Place, amplitude, phase, harmonic.
     forces: Vec<(String, f64, f64, u32)>,
+    /// Index of the force, amplitude per frequency and per squared frequency.
+    frequency_forces: Vec<(usize, f64, f64)>,
     motions: Vec<(String, f64, f64, u32)>,
     around: [Vec<Option<StoredAround>>; 2],
     /// Number of sectors, flag for equal sectors, order.
@@ -77,6 +80,7 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
             .collect(),
         joints: model.joints.iter().map(|joint| (joint.name.clone(), joint.between.clone())).collect(),
         forces: model.forces.iter().map(|one| (one.on.clone(), one.amplitude, one.phase, one.harmonic)).collect(),
+        frequency_forces: model.frequency_forces.iter().map(|one| (one.force, one.linear, one.quadratic)).collect(),
         motions: model.motions.iter().map(|one| (one.on.clone(), one.amplitude, one.phase, one.harmonic)).collect(),
         around,
         ring: model.ring.map(|ring| (ring.sectors, ring.equal, ring.order)),
@@ -117,6 +121,11 @@ pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), Str
             .forces
             .into_iter()
             .map(|(on, amplitude, phase, harmonic)| Force { on, amplitude, phase, harmonic })
+            .collect(),
+        frequency_forces: stored
+            .frequency_forces
+            .into_iter()
+            .map(|(force, linear, quadratic)| FrequencyForce { force, linear, quadratic })
             .collect(),
         motions: stored
             .motions

@@ -173,9 +173,10 @@ fn duration(seconds: f64) -> String {
 }
 
 /// Suffixes of column names and their units.
-const UNITS: [(&str, &str); 16] = [
+const UNITS: [(&str, &str); 17] = [
     ("_N_m_per_rad", "N m/rad"),
     ("_N_per_m", "N/m"),
+    ("_N_m", "N m"),
     ("_kg_per_s", "kg/s"),
     ("_rad_per_s", "rad/s"),
     ("_m_per_s", "m/s"),

@@ -17,8 +17,11 @@ struct PeakRow {
 /// Returns `None` if the table is not a table of peaks.
 pub(crate) fn worst_first(table: &Table) -> Option<Table> {
     let at = table.columns.iter().position(|column| column.name == "mass")?;
-    let (names, frequency, amplitude) =
-        (table.texts("mass")?, table.numbers("frequency_Hz")?, table.numbers("amplitude_m")?);
+    let (names, frequency, amplitude) = (
+        table.texts("mass")?,
+        table.numbers("frequency_Hz")?,
+        table.numbers("amplitude_m").or_else(|| table.numbers("amplitude_rad"))?,
+    );
     let varied: Vec<&[f64]> = table.columns[..at].iter().filter_map(Column::as_numbers).collect();
     let same_case = |a: usize, b: usize| varied.iter().all(|column| column[a].to_bits() == column[b].to_bits());
     let mut shown: Vec<PeakRow> = Vec::new();

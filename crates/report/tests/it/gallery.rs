@@ -16,7 +16,7 @@ const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test it gallery";
 
 /// The studies in the order of the page.
-const STUDIES: [&str; 31] = [
+const STUDIES: [&str; 32] = [
     "underplatform_damper",
     "best_slip_force",
     "damper_map",
@@ -34,6 +34,7 @@ const STUDIES: [&str; 31] = [
     "mistuned_mode",
     "amplification",
     "bolted_joint",
+    "friction_rig",
     "ring_down",
     "nonlinear_modes",
     "loops_against_blade",
@@ -63,7 +64,8 @@ fn text(name: &str) -> String {
 }
 
 fn study(name: &str, text: &str) -> Study {
-    read_study(&format!("{name}.toml"), text, &[]).unwrap_or_else(|error| panic!("{name}: {error}"))
+    let file = root().join(format!("studies/gallery/{name}.toml"));
+    read_study(&file.display().to_string(), text, &[]).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 /// Returns the study with [`FEW`] frequencies in its range.

@@ -74,6 +74,12 @@ impl<'a> Request<'a> {
     pub fn without_estimate(self) -> Self {
         Request { estimate: ErrorEstimate::Skipped, ..self }
     }
+
+    /// Skips the error estimate, and the check of the orbit by a time integration where another
+    /// method found it: for fits, which compare thousands of orbits with measured values.
+    pub fn unchecked(self) -> Self {
+        Request { estimate: ErrorEstimate::Unchecked, ..self }
+    }
 }
 
 /// Need for an error estimate that costs extra.
@@ -83,6 +89,8 @@ pub enum ErrorEstimate {
     Required,
     /// The orbit may have no error estimate.
     Skipped,
+    /// The orbit may have no error estimate, no stability, and no return defect.
+    Unchecked,
 }
 
 /// Finds orbits of one system.

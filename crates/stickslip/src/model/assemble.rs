@@ -280,14 +280,40 @@ impl Assembler<'_> {
                 return Err(ModelError::new(element, "on", message));
             }
             let (axis, moved) = self.axis(&self.coordinates.places[place]);
+            let growth = self.growth(i)?;
             for &(row, weight) in axis.rows() {
-                builder = builder.force(row, force.harmonic, value * weight);
+                let parts = [value, growth[0], growth[1]];
+                builder = builder.load(row, force.harmonic, parts.map(|part| part * weight));
+            }
+            if !moved.is_empty() && growth.iter().any(|part| *part != Complex64::ZERO) {
+                let message =
+                    "a force that grows with the frequency cannot act on a place that follows an imposed motion";
+                return Err(ModelError::new(element, "on", message));
             }
             for (k, weight) in moved {
                 *on_moved[k].entry(force.harmonic).or_default() += value * weight;
             }
         }
         Ok((builder, on_moved))
+    }
+
+    /// Returns the parts of force `i` that grow with the frequency, as factors of `s = jhΩ` and of
+    /// `s²`.
+    fn growth(&self, i: usize) -> Result<[Complex64; 2], ModelError> {
+        let (force, element) = (&self.model.forces[i], Element::Force(i));
+        let mut sum = [Complex64::ZERO; 2];
+        for part in self.model.frequency_forces.iter().filter(|part| part.force == i) {
+            if force.harmonic == 0 && (part.linear != 0.0 || part.quadratic != 0.0) {
+                let message = "a constant force cannot depend on the frequency; use a harmonic above zero";
+                return Err(ModelError::new(element, "amplitude", message));
+            }
+            let harmonic = f64::from(force.harmonic.max(1));
+            let linear = harmonic_amplitude(part.linear, force.phase, element)?;
+            let quadratic = harmonic_amplitude(part.quadratic, force.phase, element)?;
+            sum[0] += linear / Complex64::new(0.0, harmonic);
+            sum[1] -= quadratic / (harmonic * harmonic);
+        }
+        Ok(sum)
     }
 
     /// Adds the loads of moved places on free coordinates through shared springs, dampers and

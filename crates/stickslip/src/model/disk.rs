@@ -4,7 +4,7 @@
 //! ring. `next.blade` is the blade of the next sector; the next sector of the last one is the
 //! first.
 
-use super::{CyclicSymmetry, Element, GROUND, Model, ModelError};
+use super::{CyclicSymmetry, Element, FrequencyForce, GROUND, Model, ModelError};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -153,6 +153,15 @@ impl Disk {
                 force.on = name(&force.on);
                 (force.amplitude, force.phase) = (force.amplitude * share, force.phase + lead);
             }
+            for part in &one.frequency_forces {
+                let around = distributions(&self.forces).nth(part.force).unwrap_or(SectorDistribution::EngineOrder(0));
+                let share = around.in_sector(s, self.sectors).0;
+                model.frequency_forces.push(FrequencyForce {
+                    force: s * one.forces.len() + part.force,
+                    linear: part.linear * share,
+                    quadratic: part.quadratic * share,
+                });
+            }
             for (motion, around) in one.motions.iter_mut().zip(distributions(&self.motions)) {
                 let (share, lead) = around.in_sector(s, self.sectors);
                 motion.on = name(&motion.on);
@@ -177,8 +186,10 @@ impl Disk {
     /// Returns the order of the wave that the complete excitation of equal sectors forms.
     /// `harmonic · order` is the engine order of each part, up to whole turns.
     fn order(&self, sector: &Model) -> Option<usize> {
-        let forces =
-            sector.forces.iter().zip(distributions(&self.forces)).map(|(f, around)| (f.amplitude, f.harmonic, around));
+        let forces = sector.forces.iter().zip(distributions(&self.forces)).enumerate().map(|(i, (force, around))| {
+            let grows = sector.frequency_forces.iter().any(|part| part.force == i);
+            (if grows { 1.0 } else { force.amplitude }, force.harmonic, around)
+        });
         let motions = sector
             .motions
             .iter()

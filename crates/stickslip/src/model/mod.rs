@@ -61,6 +61,9 @@ pub struct Model {
     pub joints: Vec<Joint>,
     /// Forces, harmonic in time.
     pub forces: Vec<Force>,
+    /// Parts of forces that grow with the excitation frequency.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frequency_forces: Vec<FrequencyForce>,
     /// Imposed motions, harmonic in time.
     pub motions: Vec<Motion>,
     /// Layout of the elements if the model is the ring of a [`Disk`].
@@ -244,6 +247,45 @@ pub struct Force {
     pub phase: f64,
     /// Multiple of the excitation frequency.
     pub harmonic: u32,
+}
+
+/// A part of a force that grows with the excitation frequency Ω, such as the unbalance `m e Ω²`. It
+/// adds `linear Ω + quadratic Ω²` to the amplitude of the force.
+///
+/// # Example
+/// A rotor far above its resonance turns about its centre of mass: the amplitude is `m e / m`.
+/// ```
+/// use stickslip::method::{Method, event_driven::EventDriven};
+/// use stickslip::model::{Force, FrequencyForce, GROUND, Mass, Model, Spring};
+/// let (mass, unbalance) = (5.0, 1e-4);
+/// let model = Model {
+///     masses: vec![Mass::new("rotor", mass)],
+///     springs: vec![Spring { between: ["rotor".into(), GROUND.into()], stiffness: 1.0, damping: 1e-3 }],
+///     forces: vec![Force { on: "rotor".into(), amplitude: 0.0, phase: 0.0, harmonic: 1 }],
+///     frequency_forces: vec![FrequencyForce { force: 0, linear: 0.0, quadratic: unbalance }],
+///     ..Model::default()
+/// };
+/// let system = model.assemble().unwrap();
+/// let orbit = EventDriven.solver(&system).unwrap().orbit(1e3).unwrap();
+/// assert!((orbit.places[0].amplitude() * mass / unbalance - 1.0).abs() < 1e-5);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FrequencyForce {
+    /// Index of the force, which has a harmonic above zero.
+    pub force: usize,
+    /// Amplitude per frequency, N s/rad.
+    pub linear: f64,
+    /// Amplitude per squared frequency, N s²/rad².
+    pub quadratic: f64,
+}
+
+impl Model {
+    /// Returns the amplitude of a force at an excitation frequency (rad/s), N.
+    pub fn force_amplitude(&self, force: usize, omega: f64) -> f64 {
+        let parts = self.frequency_forces.iter().filter(|part| part.force == force);
+        let constant = self.forces.get(force).map_or(0.0, |force| force.amplitude);
+        constant + parts.map(|part| omega * (part.linear + omega * part.quadratic)).sum::<f64>()
+    }
 }
 
 /// An imposed motion `amplitude · cos(harmonic · Ω t + phase)` of a place.

@@ -4,14 +4,15 @@
 use crate::case::substructure;
 use crate::case::values::{ResolvedValue, Values};
 use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
+use crate::compile::frequency_amplitude::FrequencyPolynomial;
 use crate::compile::source_model::{ModelLists, SourceModel};
 use crate::syntax::error::Problem;
 use crate::syntax::key::DAMPING_RATIO;
 use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::model::{
-    Body, Element, Force, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, SectorDistribution, Spring,
-    with_rotations,
+    Body, Element, Force, FrequencyForce, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, SectorDistribution,
+    Spring, with_rotations,
 };
 
 /// Returns the places of the structure given by matrices.
@@ -133,16 +134,21 @@ pub(crate) fn build_model(
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
         forces.push(sector_distribution(table, &values, &mut wrong));
         // a record replaces the amplitude when the motion is computed
-        if table.entry("data").is_some() {
+        if table.has_time_history() {
             model.forces.push(Force { on: text(&values, "on"), amplitude: 0.0, phase: 0.0, harmonic: 0 });
             continue;
         }
+        let over_frequency = values.over_frequency("amplitude");
+        if let Some(FrequencyPolynomial { linear, quadratic, .. }) = over_frequency {
+            model.frequency_forces.push(FrequencyForce { force: model.forces.len(), linear, quadratic });
+        }
+        let amplitude = over_frequency.map_or(amplitude, |polynomial| polynomial.constant);
         model.forces.push(Force { on: text(&values, "on"), amplitude, phase, harmonic: harmonic(&values) });
     }
     for (i, table) in lists.motion.iter().enumerate() {
         let values = resolve(Element::Motion(i), table);
         let (amplitude, phase) = (number(&values, "amplitude"), number(&values, "phase"));
-        let from_record = table.entry("data").is_some();
+        let from_record = table.has_time_history();
         if from_record && text(&values, "on") == GROUND {
             continue;
         }
@@ -231,7 +237,7 @@ fn with_node_tangents(
     nodes: &BTreeMap<String, usize>,
 ) -> SharedLaw {
     let stated = match joint.entry("law").map(|entry| &entry.value) {
-        Some(CompiledValue::Law(_, table)) => table.entry(TANGENTS).is_some(),
+        Some(CompiledValue::Law(_, table, _)) => table.entry(TANGENTS).is_some(),
         _ => true,
     };
     let directions = between.iter().filter_map(|name| nodes.get(name)).copied().max();

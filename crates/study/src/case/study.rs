@@ -20,6 +20,7 @@ use crate::compile::compiled::{
 };
 use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
+use crate::compile::torsion::of_rotation;
 use crate::data::DataTable;
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
@@ -216,6 +217,8 @@ pub struct Case {
     pub method: MethodChoice,
     /// Number of forces and motions that take their values from records.
     pub records: usize,
+    /// True for a model of rotation: moments of inertia, angles and moments.
+    pub is_torsional: bool,
 }
 
 impl Case {
@@ -372,6 +375,11 @@ impl Study {
         let rest = component.clone()?;
         let there = stiffened.as_ref()?.component_at(&rest, 1.0).ok()?.matrices().2.clone();
         Some(StiffnessExports { at_rest: rest, at_speed: there, export_speed: at, speed: speed.text.clone() })
+    }
+
+    /// Returns whether the model is one of rotation, whose masses are moments of inertia.
+    pub fn is_torsional(&self) -> bool {
+        self.structure.lists.is_torsional
     }
 
     /// Returns the values of `[figure]`.
@@ -769,7 +777,7 @@ impl Study {
             problems.push(self.key_problem(complaint));
             return None;
         }
-        if first_look && let Err(complaint) = figure::check(&self.figure_values(), self.kind, &model) {
+        if first_look && let Err(complaint) = figure::check(&self.figure_values(), &self.axis_dimensions(), &model) {
             let location = self.figure.location_of(complaint.key, complaint.name.as_deref());
             problems.push(Problem::new(location, complaint.key, complaint.message).maybe_help(complaint.help));
             return None;
@@ -795,7 +803,14 @@ impl Study {
             MethodChoice { name: method.text("kind").unwrap_or("auto").to_owned(), options: options.collect() };
         let frequencies = values.frequencies("frequency").cloned();
         let records = self.structure.lists.records().len();
-        Case { index, varied, parameters, model, values, frequencies, method, records }
+        let is_torsional = self.is_torsional();
+        Case { index, varied, parameters, model, values, frequencies, method, records, is_torsional }
+    }
+
+    /// Returns name and dimensions of the axes of the kind's figure.
+    fn axis_dimensions(&self) -> figure::AxisDimensions {
+        let turned = |axis: Option<Dimension>| if self.is_torsional() { axis.map(of_rotation) } else { axis };
+        figure::AxisDimensions { kind: self.kind.name, axes: self.kind.axes.map(turned) }
     }
 
     fn model_problem(&self, error: &ModelError, model: &Model) -> Problem {

@@ -1,5 +1,6 @@
 //! Values of a table of the study file, resolved for one case: checked, in SI.
 
+use crate::compile::frequency_amplitude::FrequencyPolynomial;
 use crate::syntax::expression::quantity_text;
 use crate::syntax::units;
 use serde_json::{Map, Value as Json, json};
@@ -245,6 +246,7 @@ pub(crate) enum ResolvedValue {
     Tables(Vec<Values>),
     Texts(BTreeMap<String, String>),
     Fit(Vec<FitRange>),
+    OverFrequency(FrequencyPolynomial),
 }
 
 /// A fitted parameter with the range of its values, in SI.
@@ -315,6 +317,14 @@ accessors! {
 }
 
 impl Values {
+    /// An amplitude over the excitation frequency.
+    pub(crate) fn over_frequency(&self, key: &str) -> Option<FrequencyPolynomial> {
+        match self.get(key)? {
+            ResolvedValue::OverFrequency(polynomial) => Some(*polynomial),
+            _ => None,
+        }
+    }
+
     pub(crate) fn get(&self, key: &str) -> Option<&ResolvedValue> {
         self.entries.iter().find(|(name, _)| *name == key).map(|(_, given)| given)
     }
@@ -351,6 +361,9 @@ impl ResolvedValue {
             }
             ResolvedValue::Sums(sums) => json!(sums),
             ResolvedValue::Law(law) => json!(law),
+            ResolvedValue::OverFrequency(FrequencyPolynomial { constant, linear, quadratic }) => {
+                json!({ "constant": constant, "per_rad_per_s": linear, "per_rad2_per_s2": quadratic })
+            }
             ResolvedValue::Table(table) => table.to_json(),
             ResolvedValue::Tables(tables) => json!(tables.iter().map(Values::to_json).collect::<Vec<_>>()),
             ResolvedValue::Texts(texts) => json!(texts),

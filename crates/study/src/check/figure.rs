@@ -2,12 +2,19 @@
 
 use crate::case::names::ModelNames;
 use crate::case::values::Values;
-use crate::kinds::info::{KeyError, KindInfo};
+use crate::kinds::info::KeyError;
 use crate::syntax::{suggest, units};
+use stickslip::dimension::Dimension;
 use stickslip::model::Model;
 
+/// Dimensions of the axes of a kind's figure, as far as each axis has one.
+pub(crate) struct AxisDimensions {
+    pub kind: &'static str,
+    pub axes: [Option<Dimension>; 2],
+}
+
 /// Checks the values of `[figure]`.
-pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(), KeyError> {
+pub(crate) fn check(figure: &Values, expected: &AxisDimensions, model: &Model) -> Result<(), KeyError> {
     let known = ModelNames::places(model).with_joints(model);
     for name in figure.names("only").unwrap_or_default() {
         if model.is_rotation(name) {
@@ -17,10 +24,10 @@ pub(crate) fn check(figure: &Values, kind: &KindInfo, model: &Model) -> Result<(
         }
         known.labels("only", "mass or joint", name)?;
     }
-    for (key, axis) in [("x_unit", kind.axes[0]), ("y_unit", kind.axes[1])] {
+    for (key, axis) in [("x_unit", expected.axes[0]), ("y_unit", expected.axes[1])] {
         let Some(text) = figure.text(key) else { continue };
         let Some(expected) = axis else {
-            let message = format!("a figure of kind `{}` has no single unit on this axis", kind.name);
+            let message = format!("a figure of kind `{}` has no single unit on this axis", expected.kind);
             return Err(KeyError::new(key, message, "remove this key"));
         };
         let example = expected.name_and_unit().map_or("", |(_, unit)| unit);

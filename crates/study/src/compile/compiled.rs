@@ -1,6 +1,8 @@
 //! Compiled statements of a study file: expressions are parsed and locations are known, but
 //! nothing is evaluated.
 
+use super::frequency_amplitude::FrequencyAmplitude;
+use super::torsion::of_rotation;
 use crate::case::values::{FitRange, Frequencies, ResolvedValue, Values};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::{Expression, ExpressionValue, dimension_text, quantity_text};
@@ -51,18 +53,44 @@ pub(crate) enum RangeOrder {
 pub(crate) enum CompiledValue {
     Fixed(ResolvedValue),
     Names(Vec<(String, Location)>),
-    Quantity { quantity: CompiledQuantity, dimension: Dimension, within: Bounds, example: &'static str },
+    Quantity {
+        quantity: CompiledQuantity,
+        dimension: Dimension,
+        within: Bounds,
+        example: &'static str,
+    },
     List(Vec<CompiledQuantity>, Bounds),
-    Range { from: CompiledQuantity, to: CompiledQuantity, points: usize, within: Bounds, order: RangeOrder },
-    Adaptive { from: CompiledQuantity, to: CompiledQuantity, tolerance: CompiledQuantity },
+    Range {
+        from: CompiledQuantity,
+        to: CompiledQuantity,
+        points: usize,
+        within: Bounds,
+        order: RangeOrder,
+    },
+    Adaptive {
+        from: CompiledQuantity,
+        to: CompiledQuantity,
+        tolerance: CompiledQuantity,
+    },
     ByName(Vec<(String, Location, CompiledQuantity)>, Dimension),
     Vector(Vec<CompiledQuantity>, Dimension, &'static str),
     Quantities(Vec<CompiledQuantity>, Dimension, Bounds, &'static str),
     Sums(Vec<Weights>),
-    Law(&'static LawInfo, CompiledTable),
+    Law(&'static LawInfo, CompiledTable, LawCoordinate),
+    /// An amplitude that depends on the excitation frequency.
+    OverFrequency(FrequencyAmplitude),
     Table(CompiledTable),
     Tables(Vec<CompiledTable>),
     Fit(Vec<CompiledFitRange>),
+}
+
+/// The coordinate along which a law acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LawCoordinate {
+    /// A displacement, with forces.
+    Displacement,
+    /// An angle, with moments.
+    Angle,
 }
 
 /// The range of a fitted parameter.
@@ -102,8 +130,21 @@ impl CompiledFitRange {
 }
 
 impl CompiledTable {
+    /// Returns the name of the entry of a list.
+    pub fn name(&self) -> Option<&str> {
+        match &self.entry("name")?.value {
+            CompiledValue::Fixed(ResolvedValue::Text(name)) => Some(name),
+            _ => None,
+        }
+    }
+
     pub fn entry(&self, key: &str) -> Option<&CompiledEntry> {
         self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    /// Returns whether a force or a motion has a time history: a record or a signal.
+    pub fn has_time_history(&self) -> bool {
+        self.entry("data").is_some() || self.entry("signal").is_some()
     }
 
     /// Appends the indices of the repetition to a message.
@@ -139,7 +180,10 @@ impl CompiledTable {
                 CompiledValue::ByName(list, dimension) => {
                     list.iter().for_each(|(_, _, q)| each(entry.key, q, Some(*dimension)));
                 }
-                CompiledValue::Law(_, table) | CompiledValue::Table(table) => table.each_quantity(each),
+                CompiledValue::Law(_, table, _) | CompiledValue::Table(table) => table.each_quantity(each),
+                CompiledValue::OverFrequency(amplitude) => {
+                    each(entry.key, &amplitude.quantity, Some(amplitude.dimension));
+                }
                 CompiledValue::Tables(tables) => tables.iter().for_each(|table| table.each_quantity(each)),
                 CompiledValue::Fit(ranges) => ranges.iter().for_each(|range| {
                     each(entry.key, &range.from, None);
@@ -193,6 +237,13 @@ impl CompiledQuantity {
     pub fn value(&self, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
         self.expression
             .evaluate(&environment.values)
+            .map_err(|fault| Problem::from_text_error(&self.location, self.text_start, key, fault))
+    }
+
+    /// Returns the value at an excitation frequency (rad/s), of any dimension.
+    pub fn value_at(&self, omega: f64, key: &str, environment: &Environment<'_>) -> Result<ExpressionValue, Problem> {
+        self.expression
+            .evaluate_at(Some(omega), &environment.values)
             .map_err(|fault| Problem::from_text_error(&self.location, self.text_start, key, fault))
     }
 
@@ -378,7 +429,13 @@ impl CompiledValue {
                 };
                 ResolvedValue::Sums(sums.iter().map(one).collect::<Result<_, Problem>>()?)
             }
-            CompiledValue::Law(row, table) => ResolvedValue::Law(law(row, table, key, environment, problems)?),
+            CompiledValue::Law(row, table, coordinate) => {
+                let statement = LawStatement { row, table, coordinate: *coordinate };
+                ResolvedValue::Law(statement.build(key, environment, problems)?)
+            }
+            CompiledValue::OverFrequency(amplitude) => {
+                ResolvedValue::OverFrequency(amplitude.polynomial(key, environment)?)
+            }
             CompiledValue::Table(table) => ResolvedValue::Table(table.values(environment, problems)),
             CompiledValue::Tables(tables) => {
                 ResolvedValue::Tables(tables.iter().map(|table| table.values(environment, problems)).collect())
@@ -390,47 +447,61 @@ impl CompiledValue {
     }
 }
 
-/// Builds a law from the values of its table. A parameter whose dimension depends on another
-/// parameter (as an exponent) is read after that one.
-fn law(
+/// A law as it is stated.
+struct LawStatement<'a> {
     row: &'static LawInfo,
-    table: &CompiledTable,
-    key: &'static str,
-    environment: &Environment<'_>,
-    problems: &mut Vec<Problem>,
-) -> Result<SharedLaw, Problem> {
-    let before = problems.len();
-    let mut numbers: BTreeMap<&str, f64> = BTreeMap::new();
-    let (raised, plain): (Vec<&Parameter>, Vec<&Parameter>) = row.parameters.iter().partition(|p| p.power.is_some());
-    for parameter in plain.into_iter().chain(raised) {
-        let Some(entry) = table.entry(parameter.key) else { continue };
-        let CompiledValue::Quantity { quantity, within, example, .. } = &entry.value else { continue };
-        let value = |key: &str| {
-            let default = || row.parameters.iter().find(|p| p.key == key)?.default;
-            numbers.get(key).copied().or_else(default)
-        };
-        // with an exponent that is not a whole number: a plain number in SI
-        let dimension = parameter.dimension_for(value).unwrap_or(Dimension::NONE);
-        let expected = Expected { dimension, within: *within };
-        match quantity.number(parameter.key, expected, example, environment) {
-            Ok(value) if !parameter.range.contains(value) => {
-                let Parameter { key, range, .. } = *parameter;
-                let error = LawError::Value { law: row.name, key, dimension, range, value };
-                problems.push(quantity.problem(key, error.to_string()));
-                // the parameters with this exponent cannot be checked
-                break;
+    table: &'a CompiledTable,
+    coordinate: LawCoordinate,
+}
+
+impl LawStatement<'_> {
+    /// Builds the law from the values of its table. A parameter whose dimension depends on another
+    /// parameter (as an exponent) is read after that one.
+    fn build(
+        &self,
+        key: &'static str,
+        environment: &Environment<'_>,
+        problems: &mut Vec<Problem>,
+    ) -> Result<SharedLaw, Problem> {
+        let LawStatement { row, table, coordinate } = *self;
+        let before = problems.len();
+        let mut numbers: BTreeMap<&str, f64> = BTreeMap::new();
+        let (raised, plain): (Vec<&Parameter>, Vec<&Parameter>) =
+            row.parameters.iter().partition(|p| p.power.is_some());
+        for parameter in plain.into_iter().chain(raised) {
+            let Some(entry) = table.entry(parameter.key) else { continue };
+            let CompiledValue::Quantity { quantity, within, example, .. } = &entry.value else { continue };
+            let value = |key: &str| {
+                let default = || row.parameters.iter().find(|p| p.key == key)?.default;
+                numbers.get(key).copied().or_else(default)
+            };
+            // with an exponent that is not a whole number: a plain number in SI
+            let dimension = parameter.dimension_for(value).unwrap_or(Dimension::NONE);
+            let dimension = match coordinate {
+                LawCoordinate::Displacement => dimension,
+                LawCoordinate::Angle => of_rotation(dimension),
+            };
+            let expected = Expected { dimension, within: *within };
+            match quantity.number(parameter.key, expected, example, environment) {
+                Ok(value) if !parameter.range.contains(value) => {
+                    let Parameter { key, range, .. } = *parameter;
+                    let error = LawError::Value { law: row.name, key, dimension, range, value };
+                    problems.push(quantity.problem(key, error.to_string()));
+                    // the parameters with this exponent cannot be checked
+                    break;
+                }
+                Ok(value) => {
+                    numbers.insert(parameter.key, value);
+                }
+                Err(problem) => problems.push(problem),
             }
-            Ok(value) => {
-                numbers.insert(parameter.key, value);
-            }
-            Err(problem) => problems.push(problem),
         }
+        if problems.len() > before {
+            // The error was reported already. The caller only needs to know that there is no law.
+            return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.location, key, "")));
+        }
+        row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
     }
-    if problems.len() > before {
-        // The error was reported already. The caller only needs to know that there is no law.
-        return Err(problems.pop().unwrap_or_else(|| Problem::new(&table.location, key, "")));
-    }
-    row.build(&numbers).map_err(|error| Problem::new(&table.location, key, error.to_string()))
 }
 
 /// The spacing of the values of a range.

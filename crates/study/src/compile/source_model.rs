@@ -115,6 +115,8 @@ pub(crate) struct ModelLists {
     pub motion: Vec<CompiledTable>,
     /// `[disk]`; then the lists state one sector.
     pub disk: Option<DiskSource>,
+    /// True for a model of rotation, whose masses are moments of inertia.
+    pub is_torsional: bool,
 }
 
 impl ModelLists {
@@ -131,11 +133,11 @@ impl ModelLists {
         }
     }
 
-    /// Returns the entries of forces and motions that take their values from a record: list and
+    /// Returns the entries of forces and motions that have a time history: list and
     /// number.
     pub fn records(&self) -> Vec<(&'static str, usize)> {
         let of = |list: &'static str, tables: &[CompiledTable]| {
-            let has = |(index, table): (usize, &CompiledTable)| table.entry("data").map(|_| (list, index));
+            let has = |(index, table): (usize, &CompiledTable)| table.has_time_history().then_some((list, index));
             tables.iter().enumerate().filter_map(has).collect::<Vec<_>>()
         };
         [of("force", &self.force), of("motion", &self.motion)].concat()
@@ -148,11 +150,7 @@ impl ModelLists {
 
     /// Gives quantities at rotations of bodies the dimensions of moments and angles.
     pub fn use_rotation_dimensions(&mut self) {
-        let named = self.body.iter().filter_map(|table| match table.entry("name").map(|entry| &entry.value) {
-            Some(CompiledValue::Fixed(ResolvedValue::Text(name))) => Some(name.clone()),
-            _ => None,
-        });
-        let bodies: BTreeSet<String> = named.collect();
+        let bodies: BTreeSet<String> = self.body.iter().filter_map(|table| table.name().map(str::to_owned)).collect();
         let turns = |place: &str| {
             let split = place.strip_prefix(NEXT).unwrap_or(place).split_once('.');
             split.is_some_and(|(body, along)| ROTATIONS.contains(&along) && bodies.contains(body))

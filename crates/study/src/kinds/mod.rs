@@ -12,7 +12,7 @@
 mod branch;
 mod campbell;
 pub mod hysteresis;
-mod identify;
+pub mod identify;
 pub(crate) mod info;
 pub(crate) mod kind;
 mod map;
@@ -63,16 +63,22 @@ fn check_records(study: &Study) -> Result<(), StudyError> {
         let refuse = |key: &str, message: &str, help: &str| {
             Err(study.error_at(list, index, key, message, Some(help.to_owned())))
         };
+        let is_signal = study.structure.lists.get(list).get(index).is_some_and(|table| table.entry("signal").is_some());
+        let key = if is_signal { "signal" } else { "data" };
         if study.kind().name != "transient" {
-            return refuse("data", "a record needs a study of kind `transient`", "write kind = \"transient\"");
+            return refuse(key, "a time history needs a study of kind `transient`", "write kind = \"transient\"");
         }
         if study.structure.lists.disk.is_some() {
-            return refuse("data", "a record is not possible on a bladed disk", "state the whole model without [disk]");
+            return refuse(
+                key,
+                "a time history is not possible on a bladed disk",
+                "state the whole model without [disk]",
+            );
         }
         let values = study.case(0)?.values;
         if values.frequencies("frequency").is_some() || values.table("run_up").is_some() {
             let help = "remove `frequency` and `run_up`, and state `duration` and `time_step`";
-            return refuse("data", "a record and an excitation frequency exclude each other", help);
+            return refuse(key, "a time history and an excitation frequency exclude each other", help);
         }
     }
     match transient::record::check(study, &study.case(0)?) {

@@ -100,17 +100,28 @@ impl<'a> FigureInput<'a> {
     /// `si`.
     ///
     /// The unit is the requested one, or else one that suits `largest`.
-    pub(crate) fn axis(&self, which: usize, quantity: &str, largest: f64, si: &str) -> (Axis, f64) {
+    pub(crate) fn axis(&self, which: usize, quantity: &str, largest: f64, si: &'static str) -> (Axis, f64) {
+        let si = self.unit(si);
         let options = self.options();
         let (unit_key, scale_key) = [("x_unit", "x"), ("y_unit", "y")][which];
         let asked = options.text(unit_key).and_then(|text| Some((text.to_owned(), units::parse(text)?)));
         let (unit, factor) = match asked {
-            Some((text, unit)) => (text, units::find(si).map_or(1.0, |si| si.si_value("1")) / unit.si_value("1")),
+            Some((text, unit)) => (text, units::parse(si).map_or(1.0, |si| si.si_value("1")) / unit.si_value("1")),
             None if si == "Hz" => (si.to_owned(), 1.0),
             None => prefixed_unit(largest, si),
         };
         let axis = Axis::new(quantity, unit);
         (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
+    }
+
+    /// Returns the unit of a displacement (m) or a force (N) of this study: rad or N m in a model of
+    /// rotation.
+    pub(crate) fn unit(&self, si: &'static str) -> &'static str {
+        match (self.study.is_torsional(), si) {
+            (true, "m") => "rad",
+            (true, "N") => "N m",
+            _ => si,
+        }
     }
 
     /// Returns the colour axis of curves that differ in the varied parameter number `which`.

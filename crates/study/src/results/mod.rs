@@ -4,6 +4,7 @@
 //! - `typed`: reads results back as typed values;
 //! - `columns`: names of columns that several kinds write;
 //! - `table_builder`: builds tables row by row;
+//! - `torsion_columns`: units of the columns of a model of rotation;
 //! - `notes`: notes for the reader;
 //! - `drawing`: tools for kinds to draw figures from finished tables;
 //! - `fitted_study`: the study file with identified values;
@@ -25,6 +26,7 @@ pub(crate) mod histogram;
 pub(crate) mod notes;
 pub(crate) mod percentiles;
 pub(crate) mod table_builder;
+pub(crate) mod torsion_columns;
 mod typed;
 pub(crate) mod weibull;
 

@@ -8,6 +8,7 @@ use crate::case::study::Study;
 use crate::results::columns::{ENERGY_GAP, RESIDUAL};
 use crate::results::dataset::{CellValues, Dataset, Table};
 use crate::results::drawing::{CaseRows, FigureInput};
+use crate::results::torsion_columns::of_rotation;
 
 /// Reason why a dataset cannot be read as the results of a study.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -54,7 +55,7 @@ pub enum ResultsError {
 pub struct Peak {
     /// Frequency of the peak, Hz.
     pub frequency: f64,
-    /// Half of the peak-to-peak value of the motion, m.
+    /// Half of the peak-to-peak value of the motion, m; in a model of rotation rad.
     pub amplitude: f64,
     /// True if the peak is only the end of the frequency range, so that the real peak lies
     /// outside.
@@ -145,8 +146,10 @@ pub(crate) struct TypedTable<'a> {
 }
 
 impl<'a> TypedTable<'a> {
+    /// Returns the numbers of a column; its name states m and N, also for rad and N m.
     pub fn numbers(&self, column: &str) -> Result<&'a [f64], ResultsError> {
-        self.table.numbers(column).ok_or_else(|| self.missing_column(column))
+        let own = self.table.numbers(column);
+        own.or_else(|| self.table.numbers(&of_rotation(column))).ok_or_else(|| self.missing_column(column))
     }
 
     pub fn integers(&self, column: &str) -> Result<&'a [u64], ResultsError> {

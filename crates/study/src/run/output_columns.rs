@@ -111,8 +111,10 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         columns: |system| place_columns(system, |unit| format!("receptance_{unit}_per_N")),
         values: |prepared, orbit, _| {
             let model = &prepared.case.model;
-            let forces = model.forces.iter().filter(|force| force.harmonic == 1 && !model.is_rotation(&force.on));
-            let largest = forces.map(|force| force.amplitude.abs()).fold(0.0, f64::max);
+            let forces = model.forces.iter().enumerate();
+            let forces = forces.filter(|(_, force)| force.harmonic == 1 && !model.is_rotation(&force.on));
+            let omega = TAU / orbit.period();
+            let largest = forces.map(|(i, _)| model.force_amplitude(i, omega).abs()).fold(0.0, f64::max);
             let unit = |x: Complex64| if largest > 0.0 { x.norm() / largest } else { f64::NAN };
             orbit.places.iter().map(|place| unit(place.first_harmonic)).collect()
         },

@@ -11,12 +11,14 @@ use crate::results::dataset::{Dataset, Figure, Record, Table};
 use crate::results::decimation::Decimation;
 use crate::results::drawing::FigureInput;
 use crate::results::notes::Note;
+use crate::results::torsion_columns;
 use crate::run::basis_check::is_checked;
 use crate::run::point_row::describe_location;
 use crate::run::probe::{self, ExpectedTime};
 use crate::run::result_block::{Block, Tally};
 use crate::run::work::{Share, UNITS_AHEAD, UnitResult, UnitTask, WorkUnits, refusal_at_location};
 use crate::syntax::error::StudyError;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -208,7 +210,17 @@ impl CheckedStudy {
             None => Arc::new(PreparedCase::new(&self.study, 0)?),
         };
         let kind = self.study.kind();
-        compute_parts(&self.study, &first, range, context, &mut |unit, part| take(Block::from_unit(kind, unit, part)))
+        let varied = self.study.varied().len();
+        compute_parts(&self.study, &first, range, context, &mut |unit, part| {
+            let mut block = Block::from_unit(kind, unit, part);
+            if self.study.is_torsional() {
+                block
+                    .tables
+                    .iter_mut()
+                    .for_each(|table| torsion_columns::rename(table, varied, torsion_columns::of_rotation));
+            }
+            take(block)
+        })
     }
 
     /// Returns the dataset without its results, as known before the computation; see
@@ -270,6 +282,13 @@ pub fn figure_of_tables(study: &Study, tables: &[Table]) -> Figure {
 
 /// Draws the figure of the rows that a [`Decimation`] has kept.
 pub fn draw(study: &Study, tables: &[Table]) -> Figure {
+    let mut tables = Cow::Borrowed(tables);
+    if study.is_torsional() {
+        let varied = study.varied().len();
+        let rename = |table| torsion_columns::rename(table, varied, torsion_columns::of_displacement);
+        tables.to_mut().iter_mut().for_each(rename);
+    }
+    let tables = &*tables;
     Figure { title: study.title().to_owned(), ..(kinds::kind_of(study).draw)(&FigureInput { study, tables }) }
 }
 

@@ -23,9 +23,9 @@ const ROTATION_PAIRS: [(Dimension, Dimension); 9] = [
     (Dimension::CUBIC_STIFFNESS, dimension(1, 2, -2, -3)),
 ];
 
-const TORSION: &str = "this quantity belongs to a rotation, but places move in metres; to model torsion, enter the \
-    same numbers in other units: kg m^2 as kg, N m/rad as N/m, N m s/rad as N s/m, N m as N; results in metres are \
-    then radians";
+const TORSION: &str = "this quantity belongs to a rotation, but the masses of this model are in kg; in a model of \
+    rotation every `mass` is a moment of inertia in kg m^2, and then stiffnesses are in N m/rad, dampings in N m s/rad, \
+    forces and slip limits in N m, motions in rad";
 
 /// Returns advice for a quantity of dimension `found` where `expected` is required; `text` is
 /// the user's text.
@@ -82,10 +82,10 @@ mod tests {
         for (text, expected, words) in [
             ("10 N/mm^2", Dimension::STIFFNESS, "this is a pressure"),
             ("1 MPa", Dimension::FORCE, "10 N/mm^2 * 25 mm^2"),
-            ("0.05 kg m^2", Dimension::MASS, "kg m^2 as kg"),
-            ("2000 N m/rad", Dimension::STIFFNESS, "N m/rad as N/m"),
-            ("0.05 N m s/rad", Dimension::DAMPING, "N m s/rad as N s/m"),
-            ("3 N m", Dimension::FORCE, "N m as N"),
+            ("0.05 kg m^2", Dimension::MASS, "moment of inertia in kg m^2"),
+            ("2000 N m/rad", Dimension::STIFFNESS, "stiffnesses are in N m/rad"),
+            ("0.05 N m s/rad", Dimension::DAMPING, "dampings in N m s/rad"),
+            ("3 N m", Dimension::FORCE, "slip limits in N m"),
             ("2 g", Dimension::LENGTH, "`g` is the gram"),
             ("2 g", Dimension::FORCE, "2 kg * 9.80665 m/s^2"),
             ("20 m/s^2", Dimension::LENGTH, "over the squared angular frequency"),

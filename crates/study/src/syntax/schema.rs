@@ -10,6 +10,7 @@ use crate::compile::templates;
 use crate::kinds;
 use crate::kinds::kind::Kind;
 use crate::syntax::key::DAMPING_RATIO;
+use crate::syntax::signal_keys::{FORCE_SIGNAL, GROUND_SIGNAL};
 use serde_json::{Map, Value, json};
 use stickslip::dimension::Dimension;
 use stickslip::{law, method};
@@ -395,7 +396,12 @@ const REPEAT: Key = optional(
 
 const MASS: &[Key] = &[
     required("name", ValueType::Name, "name of the place, for springs, joints and forces", "\"blade1\""),
-    required("mass", ValueType::Quantity(Dimension::MASS, Bounds::AtLeastZero), "mass", "\"182 g\""),
+    required(
+        "mass",
+        ValueType::Quantity(Dimension::MASS, Bounds::AtLeastZero),
+        "mass; moments of inertia in kg m^2 make a model of rotation, with N m/rad, N m s/rad, N m and rad",
+        "\"182 g\"",
+    ),
     optional(
         "directions",
         ValueType::Names,
@@ -589,10 +595,17 @@ const FORCE: &[Key] = &[
     optional(
         "amplitude",
         ValueType::Quantity(Dimension::FORCE, Bounds::Finite),
-        "amplitude; on a rotation of a body the amplitude of a moment in N m; required without `data`",
+        "amplitude; on a rotation of a body the amplitude of a moment in N m; may depend on the excitation frequency, as \
+         in \"m_e * frequency^2/(1 rad)^2\"; required without `data`",
         "\"10 N\"",
     ),
     RECORD,
+    optional(
+        "signal",
+        ValueType::Table(FORCE_SIGNAL),
+        "in a transient, instead of `amplitude`: a shock, a chirp or a random process",
+        "{ kind = \"half-sine\", amplitude = \"50 N\", duration = \"11 ms\" }",
+    ),
     RECORD_COLUMN,
     PHASE,
     HARMONIC,
@@ -626,6 +639,12 @@ const MOTION: &[Key] = &[
         "\"2 mm\"",
     ),
     RECORD,
+    optional(
+        "signal",
+        ValueType::Table(GROUND_SIGNAL),
+        "in a transient, for the acceleration of `ground`: a shock, a chirp or a random process",
+        "{ kind = \"half-sine\", amplitude = \"100 m/s^2\", duration = \"11 ms\" }",
+    ),
     optional(
         "column",
         ValueType::Text,

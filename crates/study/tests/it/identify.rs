@@ -256,6 +256,89 @@ fn a_backbone_of_a_hardening_spring() {
     }
 }
 
+/// Amplitude, and loss of the damper per cycle, of settled vibrations; each row has its force.
+#[test]
+fn settled_vibrations() {
+    let (m, k, c): (f64, f64, f64) = (2.0, 2e4, 3.0);
+    let rows = (0..30).map(|i| {
+        let f = 12.0 + 0.3 * f64::from(i);
+        let (omega, force) = (TAU * f, 1.0 + 0.5 * f64::from(i % 4));
+        vec![f, force, omega * force / (k - omega * omega * m).hypot(omega * c)]
+    });
+    let targets = format!(
+        "{FIT}targets = [{{ data = \"test\", is = \"settled\", at = \"m\", quantity = \"velocity\", weight = \
+         \"relative 1 %\" }}]"
+    );
+    let dataset = identify(&csv("frequency_Hz,force_N,amplitude_m_per_s", rows), &oscillator(&targets, FORCE));
+    for (name, truth) in [("k", k), ("c", c)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < 1e-4, "{name}: {}", found.value);
+    }
+    // a sliding mass dissipates 4 F x per cycle: with its amplitude, the loss gives the limit
+    let rows = [(6.0, 0.03), (8.0, 0.012), (10.0, 0.0061)].map(|(f, loss)| vec![f, loss]);
+    let joint =
+        "[[joint]]\nname = \"pad\"\nbetween = [\"m\", \"ground\"]\nlaw = { kind = \"coulomb\", limit = \"b\" }\n";
+    let targets = "fit.b = { from = \"0.01 N\", to = \"5 N\" }\ntargets = [{ data = \"test\", is = \"settled\", at = \
+        \"pad\", weight = \"1 mJ\" }]";
+    let study = oscillator(targets, &format!("{joint}{FORCE}")).replace("x0 = \"1 mm\"", "b = \"0.1 N\"");
+    let dataset =
+        identify(&csv("frequency_Hz,dissipation_J", rows), &study.replace("\"1 N\"\nphase", "\"20 N\"\nphase"));
+    assert_eq!(table(&dataset, "fit").texts("quantity").expect("names")[0], "dissipation_J");
+    let found = estimate(&dataset, "b");
+    assert!(found.value > 0.0 && found.status != "not-determined", "{}", found.value);
+}
+
+/// A model that is linear in its parameter: the profile is a parabola, and its interval that of the
+/// standard error.
+#[test]
+fn the_profile_of_a_linear_parameter() {
+    let mut noise = Noise(11);
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f + 0.02 * noise.normal()]);
+    let study = loop_study(", weight = \"0.02 N\"")
+        .replace("fit.k = { from = \"10 N/m\", to = \"1e5 N/m\", scale = \"log\" }", "profile = true")
+        .replace("k = \"1e2 N/m\"", "k = \"1e3 N/m\"");
+    let dataset = identify(&csv("displacement_m,force_N", rows), &study);
+    let parameters = table(&dataset, "parameters");
+    let number = |column: &str, row: usize| parameters.numbers(column).expect(column)[row];
+    for row in 0..2 {
+        let width = number("high_95", row) - number("low_95", row);
+        for (own, other) in [("profile_low_95", "low_95"), ("profile_high_95", "high_95")] {
+            assert!((number(own, row) - number(other, row)).abs() < 0.05 * width, "{row} {own}: {}", number(own, row));
+        }
+    }
+    let profile = table(&dataset, "profile");
+    let (rise, inside) = (profile.numbers("rise").expect("rise"), profile.flags("within_95").expect("flags"));
+    assert!(profile.rows() > 12 && rise.iter().all(|rise| *rise > -1e-6));
+    assert!(inside.contains(&Some(true)) && inside.contains(&Some(false)));
+    let summary = table(&dataset, "fit_summary");
+    let criterion = |name: &str| summary.numbers(name).expect(name)[0];
+    // 3 parameters with the variance, 300 rows: 2 k n/(n - k - 1) instead of 2 k
+    let difference = criterion("aicc") - criterion("aic");
+    assert!((difference - (6.0 * 300.0 / 296.0 - 6.0)).abs() < 1e-9, "{difference}");
+}
+
+/// Two springs side by side whose ranges differ by a factor of 20: neither is determined, although
+/// the data restrict the first one to a twentieth of its range.
+#[test]
+fn both_of_two_parallel_springs_are_undetermined() {
+    let mut noise = Noise(3);
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f + 0.02 * noise.normal()]);
+    let study = loop_study("")
+        .replace("k = \"1e2 N/m\"", "k = \"500 N/m\"\nl = \"500 N/m\"")
+        .replace(
+            "fit.k = { from = \"10 N/m\", to = \"1e5 N/m\", scale = \"log\" }",
+            "fit.k = { from = \"0 N/m\", to = \
+            \"2e4 N/m\" }\nfit.l = { from = \"0 N/m\", to = \"1e3 N/m\" }",
+        )
+        .replace("[[joint]]", "[[spring]]\nbetween = [\"slider\", \"ground\"]\nstiffness = \"l\"\n[[joint]]");
+    let dataset = identify(&csv("displacement_m,force_N", rows), &study);
+    let status = |name: &str| estimate(&dataset, name).status;
+    let both = dataset.notes.iter().any(|note| note.contains("do not determine `k` and `l` separately"));
+    // the search may end anywhere along the valley, also at the end of a range
+    assert_eq!(status("kt"), "determined");
+    assert!(status("l") == "at-bound" || status("k") == "not-determined" && both, "{:?}", dataset.notes);
+}
+
 #[test]
 fn a_bound_is_no_estimate() {
     let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f]);

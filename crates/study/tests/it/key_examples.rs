@@ -36,6 +36,16 @@ motion = [{ on = "mover", data = "record" }]
 study = { kind = "transient", duration = "1 s", time_step = "0.1 s" }
 "#;
 
+/// A mass under signals.
+const SHOCK: &str = r#"
+schema = 1
+mass = [{ name = "blade1", mass = "180 g" }]
+spring = [{ between = ["blade1", "ground"], stiffness = "1e5 N/m" }]
+force = [{ on = "blade1", signal = { kind = "half-sine", amplitude = "5 N", duration = "1 s" } }]
+motion = [{ on = "ground", signal = { kind = "half-sine", amplitude = "5 m/s^2", duration = "1 s" } }]
+study = { kind = "transient", duration = "1 s", time_step = "0.1 s" }
+"#;
+
 /// A mass with directions on a ground that moves.
 const QUAKE: &str = r#"
 schema = 1
@@ -138,6 +148,7 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
         ("disk", "boundary" | "nodes" | "axis") => (SECTOR, "", &[]),
         ("disk", "blade") => (SECTOR, "mistuning = { of = \"blade.stiffness\", deviation = \"1 %\" }", &[]),
         ("disk.mistuning", "file") => (RING, "", &["deviation", "seed"]),
+        ("force" | "motion", "signal") | ("force.signal" | "motion.signal", _) => (SHOCK, "", &[]),
         ("force", "data" | "column") => (RECORDS, "", &[]),
         ("motion", "data") => (RECORDS, "", &[]),
         ("motion", "column") => (RECORDS, "", &["/force"]),
@@ -274,7 +285,8 @@ fn of_kind(kind: &kinds::Kind, beside: &Key) -> Table {
     study.extend(parsed(match (kind.info.name, beside.name) {
         (
             "transient",
-            "frequency" | "duration" | "samples_per_cycle" | "time_step" | "start" | "start_velocity" | "begin",
+            "frequency" | "duration" | "samples_per_cycle" | "time_step" | "start" | "start_velocity" | "begin"
+            | "also",
         ) => "frequency = \"121 Hz\"\nduration = \"2 s\"",
         ("transient", "cycles") => "frequency = \"121 Hz\"",
         _ => "",

@@ -115,6 +115,144 @@ fn a_logarithmic_run_up() {
     assert!((largest / 0.1676827 - 1.0).abs() < 1e-3 && (time - 41.507).abs() < 0.2, "{largest} {time}");
 }
 
+/// A deck on a sliding bearing under a record of 8 s. Largest slip 0.374564 m (own program: steps
+/// with exact friction, 4e-5 s, force linear between the rows).
+#[test]
+fn a_deck_slides_under_a_record() {
+    let record = include_str!("data/deck.csv");
+    let body = "[[mass]]\nname = \"deck\"\nmass = \"1000 kg\"\n[[spring]]\nbetween = [\"deck\", \"ground\"]\n\
+        stiffness = \"10 kN/m\"\n[[joint]]\nname = \"slide\"\nbetween = [\"deck\", \"ground\"]\n\
+        law = { kind = \"coulomb\", limit = \"600 N\" }\n";
+    let study = "[study]\nkind = \"transient\"\nduration = \"8 s\"\ntime_step = \"10 ms\"\n";
+    let force = format!("{body}[[force]]\non = \"deck\"\ndata = \"record\"\n{study}");
+    let ground = format!("{body}[[motion]]\non = \"ground\"\ndata = \"record\"\n{study}");
+    for study in [force, ground] {
+        let slip = motion(record, &study, "slide_displacement_m").iter().fold(0.0f64, |most, (_, x)| most.max(x.abs()));
+        assert!((slip / 0.374564 - 1.0).abs() < 1e-4, "{slip}");
+    }
+}
+
+/// Displacements of an undamped oscillator of 2 kg and 300 N/m under a signal.
+fn under_signal(signal: &str) -> Vec<(f64, f64)> {
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"300 N/m\"\n\
+         [[force]]\non = \"m\"\nsignal = {signal}\n{TRANSIENT}"
+    );
+    motion("time_s,force_N\n0,0\n1,0\n", &study, "m_displacement_m")
+}
+
+/// Under `F sin pt` from rest, `x = F/(k (1 - r²)) (sin pt - r sin ωt)` with `r = p/ω`; after the
+/// shock, the difference of two such motions.
+#[test]
+fn a_half_sine_shock() {
+    let (omega, p) = (f64::sqrt(150.0), std::f64::consts::PI / 0.4);
+    let r = p / omega;
+    let sine =
+        |t: f64| if t > 0.0 { 7.0 / 300.0 / (1.0 - r * r) * ((p * t).sin() - r * (omega * t).sin()) } else { 0.0 };
+    for (t, x) in under_signal("{ kind = \"half-sine\", amplitude = \"7 N\", duration = \"0.4 s\", begin = \"0.1 s\" }")
+    {
+        let expected = sine(t - 0.1) + sine(t - 0.5);
+        assert!((x - expected).abs() < 1e-4 * 0.03, "{t}: {x} {expected}");
+    }
+}
+
+/// A chirp through resonance against the classical Runge-Kutta method.
+#[test]
+fn a_chirp_through_resonance() {
+    let tau = std::f64::consts::TAU;
+    for (scale, from, to) in [("linear", 1.0f64, 4.0f64), ("log", 4.0, 1.0)] {
+        let phase = |t: f64| match scale {
+            "linear" => tau * (from * t + 0.5 * (to - from) / 2.0 * t * t),
+            _ => tau * from * 2.0 / (to / from).ln() * ((to / from).powf(t / 2.0) - 1.0),
+        };
+        let slope = |t: f64, [x, v]: [f64; 2]| [v, (5.0 * phase(t).sin() - 300.0 * x) / 2.0];
+        let signal = format!(
+            "{{ kind = \"chirp\", amplitude = \"5 N\", from = \"{from} Hz\", to = \"{to} Hz\", duration = \"2 s\", scale \
+             = \"{scale}\" }}"
+        );
+        let (mut state, h, mut worst, mut largest) = ([0.0f64; 2], 1e-3, 0.0f64, 0.0f64);
+        for (row, (t, x)) in under_signal(&signal).into_iter().enumerate() {
+            worst = worst.max((x - state[0]).abs());
+            largest = largest.max(x.abs());
+            for i in 0..10 {
+                let t = t + h * f64::from(i);
+                let on = |k: [f64; 2], h: f64| [state[0] + h * k[0], state[1] + h * k[1]];
+                let a = slope(t, state);
+                let b = slope(t + 0.5 * h, on(a, 0.5 * h));
+                let c = slope(t + 0.5 * h, on(b, 0.5 * h));
+                let d = slope(t + h, on(c, h));
+                state = std::array::from_fn(|k| state[k] + h / 6.0 * (a[k] + 2.0 * b[k] + 2.0 * c[k] + d[k]));
+            }
+            assert!(row < 202);
+        }
+        assert!(worst < 2e-3 * largest, "{scale}: {worst} of {largest}");
+    }
+}
+
+/// A mass slides by 0.45 m under a force above its slip limit of 1.5 N: the work on the joint is the
+/// limit times the distance. The spectra have a line per frequency.
+#[test]
+fn further_tables_of_a_motion() {
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[joint]]\nname = \"j\"\nbetween = [\"m\", \"ground\"]\nlaw = {{ kind = \
+         \"coulomb\", limit = \"1.5 N\" }}\n[[force]]\non = \"m\"\ndata = \"record\"\n{TRANSIENT}also = [\"joint_work\", \
+         \"spectrum\", \"shock_spectrum\"]\n"
+    );
+    let rows = "time_s,force_N\n0,2\n5,2\n";
+    let dataset = try_run(rows, &study).unwrap_or_else(|error| panic!("{error}"));
+    let numbers = |table: &str, column: &str| {
+        let found = dataset.tables.iter().find(|one| one.name == table).unwrap_or_else(|| panic!("no table {table}"));
+        found.numbers(column).unwrap_or_else(|| panic!("no column {column}")).to_vec()
+    };
+    let (work, distance) = (numbers("joint_work", "j_work_J"), numbers("motion", "m_displacement_m"));
+    assert!((distance[200] - 0.5).abs() < 1e-9, "{}", distance[200]);
+    for (work, distance) in work.iter().zip(&distance) {
+        assert!((work - 1.5 * distance).abs() < 1e-9, "{work} {distance}");
+    }
+    let frequency = numbers("spectrum", "frequency_Hz");
+    assert!(frequency.len() == 22 && (frequency[0] - 1.0 / 0.44).abs() < 1e-9, "{frequency:?}");
+    assert!(numbers("spectrum", "m_displacement_density_m2_per_Hz")[0] > 0.0);
+    // a constant acceleration of 0.25 m/s²: an oscillator overshoots to nearly twice of it
+    let shock = numbers("shock_spectrum", "m_largest_acceleration_m_per_s2");
+    assert!(shock.iter().all(|a| (0.25..0.5).contains(a)), "{shock:?}");
+    let error = try_run(rows, &study.replace("\"spectrum\"", "\"spektrum\"")).expect_err("an unknown table");
+    assert!(error.contains("no table `spektrum`"), "{error}");
+}
+
+#[test]
+fn signals_are_checked() {
+    let study = |signal: &str| {
+        format!(
+            "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"300 \
+             N/m\"\n[[motion]]\non = \"ground\"\nsignal = {signal}\n{TRANSIENT}"
+        )
+    };
+    let run = |signal: &str| try_run("time_s,force_N\n0,0\n1,0\n", &study(signal));
+    let random =
+        "{ kind = \"random\", density = \"0.1 m^2/s^4/Hz\", from = \"1 Hz\", to = \"8 Hz\", duration = \"2 s\" }";
+    let rms = |signal: &str| {
+        let dataset = run(signal).unwrap_or_else(|error| panic!("{error}"));
+        let table = dataset.tables.iter().find(|table| table.name == "motion_summary").expect("a summary").clone();
+        table.numbers("rms_displacement_m").expect("a number")[0]
+    };
+    let (first, other) = (rms(random), rms(&random.replace("duration", "seed = 2, duration")));
+    assert!(first > 0.0 && first == rms(random) && first != other, "{first} {other}");
+    for (signal, words) in [
+        ("{ kind = \"half-sine\", duration = \"1 s\" }", "needs `amplitude`"),
+        ("{ kind = \"half-sine\", amplitude = \"1 N\", duration = \"1 s\" }", "expected"),
+        ("{ kind = \"square\", duration = \"1 s\" }", "half-sine"),
+        ("{ kind = \"chirp\", amplitude = \"1 m/s^2\", from = \"1 Hz\", duration = \"1 s\" }", "needs `to`"),
+        (
+            "{ kind = \"chirp\", amplitude = \"1 m/s^2\", from = \"1 Hz\", to = \"1 MHz\", duration = \"9 s\" }",
+            "the limit is 2e6",
+        ),
+        (&random.replace("1 Hz", "1.1 Hz").replace("8 Hz", "1.4 Hz"), "narrower"),
+    ] {
+        let error = run(signal).expect_err(signal);
+        assert!(error.contains(words), "{signal}: {error}");
+    }
+}
+
 #[test]
 fn wrong_records_are_refused() {
     let rows = "time_s,force_N\n0,0\n1,1\n";

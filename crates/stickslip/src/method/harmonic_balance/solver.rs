@@ -61,6 +61,8 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) steep: bool,
     /// Check of orbits by time integration.
     pub(super) orbit_check: OrbitCheck,
+    /// False for orbits that no time integration checks.
+    is_checked: bool,
     /// State in static equilibrium: displacements, velocities (zero), internal states of the
     /// joints.
     pub(super) static_state: Option<Vec<f64>>,
@@ -122,6 +124,7 @@ impl HarmonicBalanceSolver {
             first,
             steep,
             orbit_check: OrbitCheck::new(&system),
+            is_checked: true,
             system,
             static_state: static_start,
             discretizations: BTreeMap::new(),
@@ -329,7 +332,7 @@ impl HarmonicBalanceSolver {
             half_period: self.harmonic_set.has_half_period_symmetry(),
             truncation,
             tolerance: self.method.tolerance.unwrap_or(TOLERANCE),
-            orbit_check: Some(&mut self.orbit_check),
+            orbit_check: if self.is_checked { Some(&mut self.orbit_check) } else { None },
         };
         let discretization = self.discretizations.get_mut(&top).expect("solved");
         let orbit = postprocess::orbit(setting, discretization, motion, x)
@@ -385,7 +388,7 @@ impl HarmonicBalanceSolver {
     /// Finds the orbit of a request within the work limit that is set.
     fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
         let series = request.seed.and_then(|seed| self.series_of(seed));
-        if let (ErrorEstimate::Skipped, Some((top, motion))) = (request.estimate, &series) {
+        if let (ErrorEstimate::Skipped | ErrorEstimate::Unchecked, Some((top, motion))) = (request.estimate, &series) {
             // the number of harmonics of the neighbouring orbit is sufficient
             return self.solve_nearby(*top, omega, motion);
         }
@@ -397,7 +400,7 @@ impl HarmonicBalanceSolver {
             }
             found => found,
         };
-        if let Ok(orbit) = &mut found {
+        if let (Ok(orbit), true) = (&mut found, self.is_checked) {
             orbit.evidence.history_spread = self.history_spread(orbit, omega);
         }
         found
@@ -411,6 +414,7 @@ impl Solver for HarmonicBalanceSolver {
             return Err(OrbitError::Frequency { omega });
         }
         self.begin_point(omega, budget.remaining());
+        self.is_checked = request.estimate != ErrorEstimate::Unchecked;
         let found = self.solve_point(request, omega / self.periods as f64);
         budget.charge(self.work_fraction());
         found

@@ -20,6 +20,7 @@ use crate::case::study::Study;
 use crate::check::size::{SizeInputs, StudySize};
 use crate::check::survey::{SurveyedCase, frequency_range};
 use crate::kinds;
+use crate::results::torsion_columns::of_rotation;
 use crate::run::work::WorkUnits;
 use crate::syntax::error::StudyError;
 use serde_json::{Value as Json, json};
@@ -52,6 +53,8 @@ pub struct ModelSummary {
     /// the study has no excitation or no joint, or if the structure is too large for a quick
     /// answer.
     pub orbits: Option<OrbitCount>,
+    /// True for a model of rotation: limits are in N m, displacements in rad.
+    pub is_torsional: bool,
     /// Lowest and highest excitation frequency of the study, rad/s.
     pub range: Option<(f64, f64)>,
     /// Likely mistakes: sentences that begin with `warning: `.
@@ -182,6 +185,7 @@ impl ModelSummary {
             stuck: first.stuck().clone(),
             joints,
             orbits: range.filter(|_| !first.system().joints().is_empty()).and_then(|_| OrbitCount::new(first.system())),
+            is_torsional: study.is_torsional(),
             range,
             warnings: warnings::all(study, (kind.warnings)(&cases), &cases),
             size: counts.size(&(kind.size)(&counts), WorkUnits::new(study, (kind.unit_size)(study)).len()),
@@ -198,14 +202,15 @@ impl ModelSummary {
                 "lost": modes.unresolved,
             })
         };
+        let column = |name: &'static str| if self.is_torsional { of_rotation(name) } else { name.into() };
         let joint = |joint: &JointSummary| {
             json!({
                 "name": joint.name,
-                "limit_N": Some(joint.limit).filter(|limit| limit.is_finite()),
+                column("limit_N"): Some(joint.limit).filter(|limit| limit.is_finite()),
                 "slips_gradually": joint.micro_slip,
                 "pressed_N": joint.normal_force,
                 "pressed_at_rest_N": joint.normal_force_at_rest,
-                "slip_displacement_m": joint.displacement.filter(|displacement| displacement.is_finite()),
+                column("slip_displacement_m"): joint.displacement.filter(|displacement| displacement.is_finite()),
                 "slips_at_excitation_times": joint.onset.as_ref().map(|onset| 1.0 / relative_load(onset)).filter(|x| x.is_finite()),
                 "most_loaded_at_Hz": joint.onset.as_ref().filter(|onset| relative_load(onset) > 0.0).map(|onset| onset.omega / TAU),
                 "slips_Hz": joint.onset.as_ref()

@@ -64,13 +64,14 @@ impl ModelSummary {
         if joint.limit.is_infinite() {
             return "acts as a spring, never slips".to_owned();
         }
+        let (force, length) = if self.is_torsional { ("N m", "rad") } else { ("N", "m") };
         let (limit, slip) =
-            (format_with_prefix(joint.limit, "N"), if joint.micro_slip { "macro-slip" } else { "slip" });
+            (format_with_prefix(joint.limit, force), if joint.micro_slip { "macro-slip" } else { "slip" });
         let mut text = match joint.displacement {
             Some(displacement) => {
                 let verb = if joint.micro_slip { "macro-slip at" } else { "slips at" };
                 let before = if joint.micro_slip { ", micro-slip before" } else { "" };
-                format!("{verb} {limit}, {} of relative displacement{before}", format_with_prefix(displacement, "m"))
+                format!("{verb} {limit}, {} of relative displacement{before}", format_with_prefix(displacement, length))
             }
             None => format!("slips at {limit}, rigid until then"),
         };

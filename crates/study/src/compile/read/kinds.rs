@@ -1,7 +1,7 @@
 //! Reads tables whose keys depend on `kind`: laws, `[method]`, `[study]`; and `[figure]`.
 
 use super::reader::Reader;
-use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::compiled::{CompiledTable, CompiledValue, LawCoordinate};
 use crate::kinds;
 use crate::kinds::info::KindInfo;
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
@@ -100,7 +100,7 @@ impl Reader {
         {
             problem.help = unknown_law_key_help(row, &problem.key).or(problem.help.take());
         }
-        Some(CompiledValue::Law(row, stated))
+        Some(CompiledValue::Law(row, stated, LawCoordinate::Displacement))
     }
 
     pub(super) fn method(&mut self, root: &TomlTable) -> Option<CompiledTable> {

@@ -3,6 +3,7 @@
 
 use super::reader::Reader;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::frequency_amplitude::FrequencyAmplitude;
 use crate::compile::repeat::{Index, Repetition};
 use crate::compile::source_model::ModelLists;
 use crate::syntax::document::{TomlEntry, TomlNode, TomlTable, TomlValue};
@@ -82,6 +83,7 @@ impl Reader {
         self.require_amplitudes("force", &lists.force, "\"10 N\"");
         self.require_amplitudes("motion", &lists.motion, "\"2 mm\"");
         lists.use_rotation_dimensions();
+        lists.force.iter_mut().for_each(use_frequency);
         lists.spring.iter_mut().for_each(percent);
         for spring in &lists.spring {
             if let (Some(_), Some(ratio)) = (spring.entry("damping"), spring.entry(DAMPING_RATIO)) {
@@ -100,15 +102,17 @@ impl Reader {
     /// Reports forces or motions with neither an amplitude nor a record, or with both.
     fn require_amplitudes(&mut self, list: &str, tables: &[CompiledTable], example: &str) {
         for (i, table) in tables.iter().enumerate() {
-            let problem = match (table.entry("amplitude"), table.entry("data")) {
-                (None, None) => {
+            let stated: Vec<_> =
+                ["amplitude", "data", "signal"].into_iter().filter_map(|key| table.entry(key)).collect();
+            let problem = match stated[..] {
+                [] => {
                     let message = format!("`amplitude` is missing in {list} {}", i + 1);
                     Problem::new(&table.location, "amplitude", message)
                         .help(format!("add amplitude = {example}, or data = \"record\" in a transient"))
                 }
-                (Some(_), Some(data)) => {
-                    Problem::new(&data.location, "data", "`amplitude` and `data` exclude each other")
-                        .help("remove one of them")
+                [first, second, ..] => {
+                    let message = format!("`{}` and `{}` exclude each other", first.key, second.key);
+                    Problem::new(&second.location, second.key, message).help("remove one of them")
                 }
                 _ => continue,
             };
@@ -226,6 +230,18 @@ impl Reader {
                     self.problems.push(Problem::new(&node.location, "wrap", message));
                 }
             }
+        }
+    }
+}
+
+/// Marks the amplitude of a force that reads the excitation frequency.
+fn use_frequency(force: &mut CompiledTable) {
+    for entry in force.entries.iter_mut().filter(|entry| entry.key == "amplitude") {
+        if let CompiledValue::Quantity { quantity, dimension, example, .. } = &entry.value
+            && quantity.expression.reads_frequency()
+        {
+            let amplitude = FrequencyAmplitude { quantity: quantity.clone(), dimension: *dimension, example };
+            entry.value = CompiledValue::OverFrequency(amplitude);
         }
     }
 }

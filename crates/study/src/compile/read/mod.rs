@@ -24,11 +24,12 @@ mod values;
 pub use template::TemplateParameter;
 
 use crate::case::assembled::LastAssembled;
-use crate::case::study::{Study, stated_parameters};
+use crate::case::study::{Parameter, Study, evaluate, stated_parameters};
 use crate::case::values::ResolvedValue;
-use crate::compile::compiled::CompiledValue;
+use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::compile::source_model::SourceModel;
 use crate::compile::template_errors;
+use crate::compile::torsion::use_moments_of_inertia;
 use crate::kinds::check_data;
 use crate::syntax::document::{self, TomlNode, TomlTable, TomlValue};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
@@ -36,6 +37,7 @@ use crate::syntax::schema::{self, FILE, MAX_FILE_BYTES};
 use crate::syntax::suggest::suggest;
 use kinds::StudyRequest;
 use reader::Reader;
+use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -275,11 +277,15 @@ impl Reader {
                 (parameters, self.model_from_lists(&root, file))
             }
         };
-        let StudyRequest { kind, stated: study, vary, over } = self.request(&root)?;
+        let StudyRequest { kind, stated: mut study, vary, over } = self.request(&root)?;
         let method = self.method(&root);
         let figure = self.figure(&root);
         let data = self.data(&root);
         let mut parameters = parameters?;
+        let mut structure = structure;
+        if let Some(structure) = &mut structure {
+            self.moments_of_inertia(structure, &mut study, &parameters);
+        }
         let mut listed = vary.and_then(|entry| self.vary(entry, &mut parameters)).unwrap_or_default();
         if let Some(over) = over {
             let mapped = self.over(&root, over, &mut parameters, &listed).unwrap_or_default();
@@ -325,6 +331,18 @@ impl Reader {
             memory: None,
             assembled: LastAssembled::default(),
         })
+    }
+
+    /// Turns a model of moments of inertia into one of rotations.
+    fn moments_of_inertia(&mut self, structure: &mut SourceModel, study: &mut CompiledTable, parameters: &[Parameter]) {
+        // problems of the parameters are reported later
+        let known = self.problems.len();
+        let order = self.order(parameters, &[]);
+        self.problems.truncate(known);
+        let values = order.and_then(|order| evaluate(&self.names, parameters, &order, &HashMap::new(), &[]).ok());
+        if let Err(problem) = use_moments_of_inertia(structure, study, &values.unwrap_or_default()) {
+            self.problems.push(problem);
+        }
     }
 
     /// Reads the model that the file states itself, without a template.

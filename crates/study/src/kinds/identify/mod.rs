@@ -2,13 +2,17 @@
 //! standard errors and what the data do not determine.
 //!
 //! - `targets`: the trait of all targets, and the targets of a study;
-//! - `response`: frequency responses, with the force of each row;
+//! - `orbit_rows`: orbits in place of measured rows, with the force of each row;
+//! - `response`: frequency responses;
+//! - `settled`: amplitudes, means and losses of settled vibrations;
 //! - `loops`: loops of a joint under measured displacements, with `law_path`;
 //! - `ring_down`: free decays in time;
 //! - `backbone`: frequency and damping over amplitude;
 //! - `weight`: standard deviations of measured values;
 //! - `problem`: residuals and their derivatives over scaled parameters;
+//! - `residuals`: the problem for solvers of other programs;
 //! - `search`: starts and the minimization;
+//! - `profile`: profile likelihood;
 //! - `statistics`: covariance, intervals, undetermined directions, structure of the residuals;
 //! - `tables`, `figure`: results.
 
@@ -16,10 +20,14 @@ mod backbone;
 mod figure;
 mod law_path;
 mod loops;
+mod orbit_rows;
 mod problem;
+mod profile;
+mod residuals;
 mod response;
 mod ring_down;
 mod search;
+mod settled;
 mod statistics;
 mod tables;
 mod targets;
@@ -37,6 +45,7 @@ use crate::run::work::{CONVERGED, Computed, NOT_REACHED, UnitResult, UnitSize, U
 use crate::syntax::error::StudyError;
 use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
 use problem::Problem;
+pub use residuals::Residuals;
 use search::{SearchSettings, search};
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
@@ -51,7 +60,7 @@ const TARGET: &[Key] = &[
     required(
         "at",
         ValueType::Text,
-        "the measured place; for a loop the joint whose displacement and force are measured",
+        "the measured place; for a loop and for a settled dissipation the joint",
         "\"blade1\"",
     ),
     default(
@@ -139,6 +148,13 @@ pub(super) const KIND: Kind = Kind {
                  with outliers",
                 "\"huber\"",
             ),
+            default(
+                "profile",
+                ValueType::Flag,
+                "false",
+                "true: profile likelihood, the rise of the loss over each parameter while the others are fitted anew",
+                "true",
+            ),
             optional(
                 "start",
                 ValueType::ByName(Dimension::LENGTH),
@@ -164,7 +180,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: false,
         needs: |_, _, _| Ok(()),
         adapts: false,
-        tables: &[tables::PARAMETERS, tables::FIT, tables::SUMMARY, tables::CORRELATIONS],
+        tables: &[tables::PARAMETERS, tables::FIT, tables::SUMMARY, tables::CORRELATIONS, tables::PROFILE],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -179,13 +195,16 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let parameters = values.fit("fit").map_or(0, <[_]>::len) as f64;
     // a row of data has at most one row of the table
     let rows = targets::rows(inputs.study, values) as f64;
+    let is_profiled = values.flag("profile") == Some(true);
     let shape = |rows: f64, numbers: f64, words: f64| TableShape { rows: inputs.cases * rows, numbers, words };
     PlannedSize {
         tables: vec![
-            shape(parameters, inputs.varied + 4.0, 3.0),
+            shape(parameters, inputs.varied + 6.0, 3.0),
             shape(rows, inputs.varied + 11.0, 4.0),
-            shape(1.0, inputs.varied + 9.0, 1.0),
+            shape(1.0, inputs.varied + 10.0, 1.0),
             shape(parameters * parameters, inputs.varied + 1.0, 2.0),
+            // the estimate and eight points on each side of it
+            shape(if is_profiled { 17.0 * parameters } else { 0.0 }, inputs.varied + 3.0, 2.0),
         ],
         drawn: 4.0 * rows,
         unit: 8.0 * 2.0 * rows * (parameters + 4.0),
@@ -218,25 +237,37 @@ pub(super) fn check_data(study: &Study) -> Result<(), StudyError> {
     }
 }
 
+/// The identification of a case.
+struct Identification {
+    found: search::Found,
+    statistics: statistics::Statistics,
+    fitted: Vec<targets::Fitted>,
+    profiles: Vec<profile::Profile>,
+    problem: Problem,
+}
+
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let case = &prepared.case;
-    let mut part = UnitResult { tables: (0..4).map(|_| TableBuilder::default()).collect(), ..UnitResult::default() };
+    let mut part = UnitResult { tables: (0..5).map(|_| TableBuilder::default()).collect(), ..UnitResult::default() };
     let found = targets::build(work.study, case).map_err(|error| error.message).and_then(|targets| {
-        let problem = Problem::new(work, targets);
+        let problem = Problem::new(work.study, case, targets, &work.context.stop);
         let settings = SearchSettings::of(&case.values);
         let found = search(&problem, &settings)?;
         let statistics = statistics::Statistics::new(&problem, &found, settings.loss);
         if let Some(reason) = statistics.failure() {
             return Err(reason);
         }
+        let is_profiled = case.values.flag("profile") == Some(true);
+        let profiles =
+            if is_profiled { profile::profiles(&problem, &settings, &found, &statistics) } else { Vec::new() };
         let fitted = problem.fitted(&found.x)?;
-        Ok((found, statistics, fitted, problem))
+        Ok(Identification { found, statistics, fitted, profiles, problem })
     });
     (work.context.finished)();
     match found {
         _ if work.context.stopped() => part.count(|| case.label(), NOT_REACHED, None),
-        Ok((found, statistics, fitted, problem)) => {
+        Ok(Identification { found, statistics, fitted, profiles, problem }) => {
             let warnings = statistics.warnings(&problem);
             part.notes
                 .extend(warnings.into_iter().map(|text| Note::for_case(&case.label(), format!("{WARNING}{text}"))));
@@ -246,7 +277,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             part.tables = tables::write(
                 work,
                 &problem,
-                &tables::Outcome { found: &found, statistics: &statistics, fitted: &fitted },
+                &tables::Outcome { found: &found, statistics: &statistics, fitted: &fitted, profiles: &profiles },
             );
             part.count(|| case.label(), CONVERGED, None);
         }

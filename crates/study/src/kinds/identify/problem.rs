@@ -7,19 +7,25 @@
 use super::targets::{Fitted, RowStates, Target};
 use crate::case::study::{Case, Study};
 use crate::case::values::FitRange;
-use crate::run::work::UnitTask;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
+/// The targets whose derivatives are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum DerivativesOf {
+    FittedTargets,
+    AllTargets,
+}
+
 /// The residuals of a case.
 #[derive(Debug)]
-pub(super) struct Problem<'a> {
-    study: &'a Study,
-    case: &'a Case,
+pub(super) struct Problem {
+    study: Study,
+    case: Case,
     pub targets: Vec<Box<dyn Target>>,
-    pub ranges: &'a [FitRange],
+    pub ranges: Vec<FitRange>,
     stop: Arc<AtomicBool>,
     evaluations: AtomicU64,
     /// The last reason why the model had no residuals.
@@ -28,20 +34,21 @@ pub(super) struct Problem<'a> {
     states: Mutex<Vec<RowStates>>,
 }
 
-impl<'a> Problem<'a> {
-    /// Fraction of a range by which derivatives change a parameter. The error is of the order of
-    /// its square; orbits have errors of 1e-10.
-    pub const DIFFERENCE: f64 = 1e-5;
+impl Problem {
+    /// Fraction of a range by which derivatives change a parameter. The error of a central
+    /// difference is of the order of its square, 1e-8; orbits and motions in time, whose steps are
+    /// adapted, differ by up to 1e-9 in addition.
+    pub const DIFFERENCE: f64 = 1e-4;
 
-    pub fn new(work: &'a UnitTask<'_>, targets: Vec<Box<dyn Target>>) -> Self {
-        let case = &work.case().case;
+    /// The residuals of a case; `stop` ends all computations.
+    pub fn new(study: &Study, case: &Case, targets: Vec<Box<dyn Target>>, stop: &Arc<AtomicBool>) -> Self {
         let states = vec![RowStates::new(); targets.len()];
         Problem {
-            study: work.study,
-            case,
+            study: study.clone(),
+            case: case.clone(),
             targets,
-            ranges: case.values.fit("fit").unwrap_or_default(),
-            stop: work.context.stop.clone(),
+            ranges: case.values.fit("fit").unwrap_or_default().to_vec(),
+            stop: stop.clone(),
             evaluations: AtomicU64::new(0),
             failure: Mutex::new(None),
             states: Mutex::new(states),
@@ -60,6 +67,11 @@ impl<'a> Problem<'a> {
     /// Returns the last reason why the model had no residuals.
     pub fn failure(&self) -> Option<String> {
         self.failure.lock().ok().and_then(|failure| failure.clone())
+    }
+
+    /// Returns the indices of all parameters.
+    pub fn all(&self) -> Vec<usize> {
+        (0..self.ranges.len()).collect()
     }
 
     /// Returns the parameters in SI.
@@ -158,9 +170,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the derivatives of all numbers of all targets by the scaled parameters, one column
-    /// each; of predicted targets only if `with_predicted`. NaN where the model has none.
-    pub fn derivatives(&self, x: &[f64], with_predicted: bool) -> Vec<DMatrix<f64>> {
-        let used = |target: &dyn Target| with_predicted || !target.is_predicted();
+    /// each; of predicted targets only if `which` says so. NaN where the model has none.
+    pub fn derivatives(&self, x: &[f64], columns: &[usize], which: DerivativesOf) -> Vec<DMatrix<f64>> {
+        let used = |target: &dyn Target| which == DerivativesOf::AllTargets || !target.is_predicted();
         let before = self.states.lock().map(|states| states.clone()).unwrap_or_default();
         let states: Vec<RowStates> = match self.fitted_from(x, &before, &used) {
             Ok(found) => found.into_iter().map(|fitted| fitted.states).collect(),
@@ -180,27 +192,27 @@ impl<'a> Problem<'a> {
             };
             low.iter().zip(&high).map(slope).collect()
         };
-        let columns: Vec<Vec<Vec<f64>>> = (0..x.len()).into_par_iter().map(column).collect();
+        let columns: Vec<Vec<Vec<f64>>> = columns.par_iter().map(|k| column(*k)).collect();
         (0..self.targets.len())
             .map(|target| {
                 let rows = columns.first().map_or(0, |column| column[target].len());
-                DMatrix::from_fn(rows, x.len(), |row, k| columns[k][target][row])
+                DMatrix::from_fn(rows, columns.len(), |row, k| columns[k][target][row])
             })
             .collect()
     }
 
-    /// Returns the derivatives of the residuals by the scaled parameters.
-    pub fn jacobian(&self, x: &[f64]) -> DMatrix<f64> {
-        self.jacobian_of(&self.derivatives(x, false))
+    /// Returns the derivatives of the residuals by the scaled parameters with these indices.
+    pub fn jacobian(&self, x: &[f64], columns: &[usize]) -> DMatrix<f64> {
+        self.jacobian_of(columns.len(), &self.derivatives(x, columns, DerivativesOf::FittedTargets))
     }
 
     /// Returns the derivatives of the residuals from those of the numbers.
-    pub fn jacobian_of(&self, derivatives: &[DMatrix<f64>]) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.count(), self.ranges.len());
+    fn jacobian_of(&self, columns: usize, derivatives: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(self.count(), columns);
         let mut at = 0;
         for (target, derivatives) in self.targets.iter().zip(derivatives).filter(|(target, _)| !target.is_predicted()) {
             for (row, measured) in target.measured().iter().enumerate() {
-                for k in 0..self.ranges.len() {
+                for k in 0..columns {
                     jacobian[(at, k)] = derivatives[(row, k)] / measured.deviation;
                 }
                 at += 1;

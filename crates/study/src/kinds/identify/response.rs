@@ -4,15 +4,13 @@
 //! The first harmonic of the orbit is compared. A measured phase is that of `phase_of` relative
 //! to the force, positive where the quantity leads.
 
-use super::targets::{Fitted, Measured, RowStates, Target, TargetInput, method_of};
+use super::orbit_rows::{ForcedOrbit, OrbitRow, OrbitRows};
+use super::targets::{Fitted, Measured, RowStates, Target, TargetInput};
 use crate::case::study::Case;
 use crate::case::values::hertz;
 use crate::data::ColumnError;
 use num_complex::Complex64;
 use stickslip::dimension::Dimension;
-use stickslip::method::{Budget, Request};
-use stickslip::model::System;
-use stickslip::orbit::Seed;
 
 /// Rows of a frequency response.
 #[derive(Debug)]
@@ -23,16 +21,8 @@ pub(super) struct ResponseTarget {
     per_force: bool,
     predict: bool,
     complex: bool,
-    rows: Vec<ResponseRow>,
+    rows: OrbitRows,
     measured: Vec<Measured>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct ResponseRow {
-    omega: f64,
-    /// Measured force, N; without it the force of the model counts.
-    force: Option<f64>,
-    group: f64,
 }
 
 impl ResponseTarget {
@@ -40,26 +30,13 @@ impl ResponseTarget {
         let quantity = input.quantity;
         let per_force = input.values.flag("per_force") == Some(true);
         let dimension = if per_force { per_newton(quantity.dimension()) } else { quantity.dimension() };
-        let omegas = input.column("frequency", Dimension::FREQUENCY)?;
-        let forces = input.optional_column("force", Dimension::FORCE)?;
-        let count = input.case.model.forces.iter().filter(|force| force.harmonic == 1).count();
-        if (forces.is_some() || per_force) && count != 1 {
-            let message = format!("a measured force needs exactly one [[force]] with `harmonic = 1`, found {count}");
-            let help = "the force of each row replaces the amplitude of that [[force]]; without a column `force`, \
-                several forces and motions are possible";
-            return Err(ColumnError { message, help: help.to_owned() });
-        }
-        if let Some(row) = omegas.iter().position(|omega| *omega <= 0.0) {
-            let message =
-                format!("row {} has a frequency that is not more than zero", input.measured(row, 0.0, 0.0, 1.0).row);
-            return Err(ColumnError { message, help: "remove the row".to_owned() });
-        }
+        let rows = OrbitRows::new(input, per_force)?;
         let values = complex_values(input, dimension)?;
         let complex = values.is_complex;
         let deviations = input.deviations(&values.magnitudes, dimension)?;
         let mut measured = Vec::new();
-        for (i, omega) in omegas.iter().enumerate() {
-            let x = hertz(*omega);
+        for (i, row) in rows.rows.iter().enumerate() {
+            let x = hertz(row.omega);
             match values.complex.get(i) {
                 Some(value) => {
                     measured.push(input.measured(i, x, value.re, deviations[i]));
@@ -68,11 +45,6 @@ impl ResponseTarget {
                 None => measured.push(input.measured(i, x, values.magnitudes[i], deviations[i])),
             }
         }
-        let row = |(i, omega): (usize, &f64)| ResponseRow {
-            omega: *omega,
-            force: forces.as_ref().map(|forces| forces[i]),
-            group: input.group(i),
-        };
         Ok(ResponseTarget {
             data: input.data.name.clone(),
             place: input.at.to_owned(),
@@ -80,7 +52,7 @@ impl ResponseTarget {
             per_force,
             predict: input.predict,
             complex,
-            rows: omegas.iter().enumerate().map(row).collect(),
+            rows,
             measured,
         })
     }
@@ -140,50 +112,17 @@ impl Target for ResponseTarget {
     }
 
     fn fitted(&self, case: &Case, starts: &RowStates) -> Result<Fitted, String> {
-        let method = method_of(case)?;
-        let mut fitted = Fitted::default();
-        let mut before: Option<Seed> = None;
-        for chunk in self.rows.chunk_by(|a, b| a.force == b.force && a.group == b.group) {
-            let mut model = case.model.clone();
-            if let (Some(force), Some(excitation)) =
-                (chunk[0].force, model.forces.iter_mut().find(|force| force.harmonic == 1))
-            {
-                excitation.amplitude = force;
+        let read = |row: &OrbitRow, forced: &ForcedOrbit<'_>| {
+            let place = forced.orbit.place(&self.place).ok_or_else(|| format!("there is no place `{}`", self.place))?;
+            let mut value = place.first_harmonic
+                * Complex64::from_polar(1.0, -forced.phase)
+                * self.quantity.displacement_factor(row.omega);
+            if self.per_force {
+                value /= forced.force;
             }
-            let (amplitude, phase) = model
-                .forces
-                .iter()
-                .find(|force| force.harmonic == 1)
-                .map_or((1.0, 0.0), |force| (force.amplitude, force.phase));
-            let system: System = model.assemble().map_err(|error| error.to_string())?;
-            let mut solver = method.solver(&system).map_err(|error| error.to_string())?;
-            for row in chunk {
-                let own = starts.get(fitted.states.len()).and_then(Option::as_ref);
-                let seed = own.or(before.as_ref());
-                let request = Request::at(row.omega).without_estimate();
-                let found = solver.solve(&request.near(seed), &mut Budget::default());
-                let found = match (found, seed) {
-                    // an orbit of other parameters may be no good initial guess
-                    (Err(_), Some(_)) => solver.solve(&request, &mut Budget::default()),
-                    (found, _) => found,
-                };
-                let orbit = found.map_err(|error| format!("no orbit at {:.6} Hz: {error}", hertz(row.omega)))?;
-                let place = orbit.place(&self.place).ok_or_else(|| format!("there is no place `{}`", self.place))?;
-                let mut value = place.first_harmonic
-                    * Complex64::from_polar(1.0, -phase)
-                    * self.quantity.displacement_factor(row.omega);
-                if self.per_force {
-                    value /= amplitude;
-                }
-                if self.complex {
-                    fitted.values.extend([value.re, value.im]);
-                } else {
-                    fitted.values.push(value.norm());
-                }
-                before = Some(orbit.seed());
-                fitted.states.push(before.clone());
-            }
-        }
-        Ok(fitted)
+            Ok(if self.complex { vec![value.re, value.im] } else { vec![value.norm()] })
+        };
+        let (values, states) = self.rows.values(case, starts, &read)?;
+        Ok(Fitted { values, states })
     }
 }

@@ -73,7 +73,7 @@ const SAME_COST: f64 = 1e-4;
 ///
 /// # Errors
 /// The model has no residuals at any start, or no minimization converged.
-pub(super) fn search(problem: &Problem<'_>, settings: &SearchSettings) -> Result<Found, String> {
+pub(super) fn search(problem: &Problem, settings: &SearchSettings) -> Result<Found, String> {
     let stated = problem.stated();
     let dimensions = stated.len();
     let sobol = |index: usize| -> Vec<f64> {
@@ -100,7 +100,7 @@ pub(super) fn search(problem: &Problem<'_>, settings: &SearchSettings) -> Result
             continue;
         }
         searches += 1;
-        minima.extend(minimize(problem, settings, start));
+        minima.extend(minimize(problem, settings, start, None));
         if problem.is_stopped() {
             return Err("the run was stopped".to_owned());
         }
@@ -113,66 +113,100 @@ pub(super) fn search(problem: &Problem<'_>, settings: &SearchSettings) -> Result
     Ok(Found { x: best.1, cost: best.0, searches, agreeing })
 }
 
+/// The parameter that a minimization does not change, by its index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Fixed(pub usize);
+
 /// Minimizes from one start. Returns loss and scaled parameters.
-fn minimize(problem: &Problem<'_>, settings: &SearchSettings, start: Vec<f64>) -> Option<(f64, Vec<f64>)> {
+pub(super) fn minimize(
+    problem: &Problem,
+    settings: &SearchSettings,
+    start: Vec<f64>,
+    fixed: Option<Fixed>,
+) -> Option<(f64, Vec<f64>)> {
     fn run<L: LossFunction<f64>>(
         loss: L,
-        problem: &Problem<'_>,
+        problem: &Problem,
         settings: &SearchSettings,
         start: Vec<f64>,
+        fixed: Option<Fixed>,
     ) -> Option<Vec<f64>> {
-        let bounded = Bounded { problem, lower: vec![0.0; start.len()], upper: vec![1.0; start.len()] };
+        let free: Vec<usize> = (0..start.len()).filter(|k| fixed != Some(Fixed(*k))).collect();
+        let bounded =
+            Bounded { problem, lower: vec![0.0; free.len()], upper: vec![1.0; free.len()], all: start.clone(), free };
+        if bounded.free.is_empty() {
+            return Some(start);
+        }
+        let start: Vec<f64> = bounded.free.iter().map(|k| start[*k]).collect();
+        let (all, free) = (bounded.all.clone(), bounded.free.clone());
         let solver = TrustRegionReflective::new().with_relative_cost_change_tolerance(settings.tolerance);
         let executor = Executor::from_start(RobustLeastSquares::new(bounded, loss), solver, start);
         let result = executor.max_iter(settings.steps).run().ok()?;
-        Some(result.best_param().clone())
+        Some(with_free(&all, &free, result.best_param()))
     }
     let x = match settings.loss {
-        Loss::Squares => run(SquaredLoss, problem, settings, start),
-        Loss::SoftL1 => run(SoftL1Loss, problem, settings, start),
-        Loss::Huber => run(HuberLoss, problem, settings, start),
-        Loss::Cauchy => run(CauchyLoss, problem, settings, start),
+        Loss::Squares => run(SquaredLoss, problem, settings, start, fixed),
+        Loss::SoftL1 => run(SoftL1Loss, problem, settings, start, fixed),
+        Loss::Huber => run(HuberLoss, problem, settings, start, fixed),
+        Loss::Cauchy => run(CauchyLoss, problem, settings, start, fixed),
     }?;
     let cost = settings.loss.sum(&problem.residuals(&x));
     cost.is_finite().then_some((cost, x))
 }
 
 /// The problem in the form of the solver.
-struct Bounded<'p, 'a> {
-    problem: &'p Problem<'a>,
+struct Bounded<'p> {
+    problem: &'p Problem,
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// All parameters; those that are not free keep these values.
+    all: Vec<f64>,
+    /// Indices of the free parameters.
+    free: Vec<usize>,
 }
 
-impl Constraints for Bounded<'_, '_> {
+/// Returns all parameters with other values of the free ones.
+fn with_free(all: &[f64], free: &[usize], x: &[f64]) -> Vec<f64> {
+    let mut all = all.to_vec();
+    free.iter().zip(x).for_each(|(k, x)| all[*k] = *x);
+    all
+}
+
+impl Bounded<'_> {
+    fn all(&self, x: &[f64]) -> Vec<f64> {
+        with_free(&self.all, &self.free, x)
+    }
+}
+
+impl Constraints for Bounded<'_> {
     type Set = ConstraintSet<BoxBounds<Vec<f64>>>;
     fn constraints(&self) -> <Self::Set as ConstraintDescription>::Borrowed<'_> {
         ConstraintSet::new().with_bounds(BoxBounds::new(Some(&self.lower), Some(&self.upper)))
     }
 }
 
-impl CostFunction for Bounded<'_, '_> {
+impl CostFunction for Bounded<'_> {
     type Param = Vec<f64>;
     type Output = f64;
     type Error = Infallible;
     fn cost(&self, x: &Vec<f64>) -> Result<f64, Infallible> {
-        Ok(Loss::Squares.sum(&self.problem.residuals(x)))
+        Ok(Loss::Squares.sum(&self.problem.residuals(&self.all(x))))
     }
 }
 
-impl Residual for Bounded<'_, '_> {
+impl Residual for Bounded<'_> {
     type Param = Vec<f64>;
     type Output = Vec<f64>;
     type Error = Infallible;
     fn residual(&self, x: &Vec<f64>) -> Result<Vec<f64>, Infallible> {
-        Ok(self.problem.residuals(x))
+        Ok(self.problem.residuals(&self.all(x)))
     }
 }
 
-impl Jacobian for Bounded<'_, '_> {
+impl Jacobian for Bounded<'_> {
     type Jacobian = DenseMatrix;
     fn jacobian(&self, x: &Vec<f64>) -> Result<DenseMatrix, Infallible> {
-        let jacobian = self.problem.jacobian(x);
+        let jacobian = self.problem.jacobian(&self.all(x), &self.free);
         let rows: Vec<f64> = jacobian.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect();
         Ok(DenseMatrix::from_row_slice(jacobian.nrows(), jacobian.ncols(), &rows))
     }

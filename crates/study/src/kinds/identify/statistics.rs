@@ -90,6 +90,17 @@ pub(super) struct ParameterEstimate {
     pub estimate: Estimate,
 }
 
+/// A direction that the data do not determine.
+#[derive(Debug, Clone, PartialEq)]
+struct Undetermined {
+    /// Change of the scaled parameters, of unit length.
+    change: Vec<f64>,
+    /// Standard deviation along it, on the scale of the parameters, at most their range.
+    deviation: f64,
+    /// Indices of the parameters that it makes uncertain.
+    parameters: Vec<usize>,
+}
+
 /// Statistics of a minimum.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Statistics {
@@ -98,7 +109,9 @@ pub(super) struct Statistics {
     /// Covariance of the scaled parameters.
     covariance: DMatrix<f64>,
     /// Quantile of Student's distribution for a 95 % interval.
-    quantile: f64,
+    pub quantile: f64,
+    /// Variance of the normalized residuals.
+    pub variance: f64,
     /// Number of residuals.
     pub count: usize,
     /// Root mean square of the residuals, in standard deviations.
@@ -107,11 +120,12 @@ pub(super) struct Statistics {
     pub autocorrelation: f64,
     /// Information criteria of Akaike and of Schwarz, for laws that compete over the same data.
     pub aic: f64,
+    /// Akaike's criterion corrected for few residuals.
+    pub aicc: f64,
     pub bic: f64,
     /// Length of the remaining Gauss-Newton step, in standard errors.
     distance: f64,
-    /// Directions that the data do not determine: changes of the scaled parameters.
-    undetermined: Vec<Vec<f64>>,
+    undetermined: Vec<Undetermined>,
     searches: usize,
     agreeing: usize,
 }
@@ -120,6 +134,11 @@ pub(super) struct Statistics {
 const AT_BOUND: f64 = 2e-3;
 /// A standard error of this fraction of the range makes a direction undetermined.
 const UNDETERMINED: f64 = 0.3;
+/// Ratio of a parameter's deviation along an undetermined direction to its other standard error,
+/// above which the direction makes it uncertain too.
+const UNCERTAIN: f64 = 3.0;
+/// Changes of a scaled parameter below this are rounding of the derivatives.
+const ROUNDING: f64 = 1e-3;
 /// Smallest eigenvalue of the correlations of the derivatives that differs from zero. Derivatives
 /// have relative errors of about 1e-6.
 const SINGULAR: f64 = 1e-10;
@@ -129,10 +148,10 @@ const LARGEST_STEP: f64 = 0.5;
 const EXACT: f64 = 1e-5;
 
 impl Statistics {
-    pub fn new(problem: &Problem<'_>, found: &Found, loss: Loss) -> Self {
+    pub fn new(problem: &Problem, found: &Found, loss: Loss) -> Self {
         let (x, p) = (&found.x, found.x.len());
         let residuals = problem.residuals(x);
-        let jacobian = problem.jacobian(x);
+        let jacobian = problem.jacobian(x, &problem.all());
         let at_bound: Vec<bool> = x.iter().map(|x| *x < AT_BOUND || *x > 1.0 - AT_BOUND).collect();
         let free: Vec<usize> = (0..p).filter(|k| !at_bound[*k]).collect();
         let n = residuals.len();
@@ -151,7 +170,9 @@ impl Statistics {
             DVector::from_fn(free.len(), |a, _| (0..n).map(|i| weights[i] * unit(a, i) * residuals[i]).sum::<f64>());
         let eigen = SymmetricEigen::new(normal);
         let mut covariance: DMatrix<f64> = DMatrix::zeros(p, p);
-        let mut undetermined = Vec::new();
+        let mut undetermined: Vec<Undetermined> = Vec::new();
+        // variances by the directions that the data determine
+        let mut own = vec![0.0; p];
         let mut squared_step = 0.0;
         for (index, value) in eigen.eigenvalues.iter().enumerate() {
             let vector = eigen.eigenvectors.column(index);
@@ -162,7 +183,10 @@ impl Statistics {
             if deviation > UNDETERMINED || !lengths.iter().all(|length| *length > 0.0) && *value <= SINGULAR {
                 let mut direction = vec![0.0; p];
                 free.iter().enumerate().for_each(|(a, k)| direction[*k] = change(a) / size);
-                undetermined.push(direction);
+                let parameters = Vec::new();
+                undetermined.push(Undetermined { change: direction, deviation: deviation.min(1.0), parameters });
+            } else {
+                free.iter().enumerate().for_each(|(a, k)| own[*k] += variance / value * change(a).powi(2));
             }
             if *value > SINGULAR {
                 for (a, k) in free.iter().enumerate() {
@@ -174,7 +198,15 @@ impl Statistics {
             }
         }
         let quantile = student_quantile(freedom as f64);
-        let in_undetermined = |k: usize| undetermined.iter().any(|direction: &Vec<f64>| direction[k].abs() > 0.1);
+        for direction in &mut undetermined {
+            let largest = direction.change.iter().fold(0.0f64, |largest, change| largest.max(change.abs()));
+            let makes_uncertain = |k: &usize| {
+                let change = direction.change[*k].abs();
+                change > 0.1 * largest || change * direction.deviation > UNCERTAIN * own[*k].sqrt() + ROUNDING
+            };
+            direction.parameters = (0..p).filter(makes_uncertain).collect();
+        }
+        let in_undetermined = |k: usize| undetermined.iter().any(|direction| direction.parameters.contains(&k));
         let estimate = |k: usize| {
             if at_bound[k] {
                 Estimate::AtBound
@@ -209,15 +241,25 @@ impl Statistics {
             correlations,
             covariance,
             quantile,
+            variance: variance.max(f64::MIN_POSITIVE),
             count: n,
             rms: (residuals.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
             autocorrelation: autocorrelation(problem, &residuals),
             aic: likelihood + 2.0 * parameter_count,
+            aicc: likelihood + 2.0 * parameter_count * count / (count - parameter_count - 1.0).max(1.0),
             bic: likelihood + count.ln() * parameter_count,
             distance: (squared_step / variance / free.len().max(1) as f64).sqrt(),
             undetermined,
             searches: found.searches,
             agreeing: found.agreeing,
+        }
+    }
+
+    /// Returns the standard error of a scaled parameter; NaN if it has none.
+    pub fn scaled_error(&self, k: usize) -> f64 {
+        match self.parameters[k].estimate {
+            Estimate::Determined => self.covariance[(k, k)].sqrt(),
+            Estimate::AtBound | Estimate::NotDetermined => f64::NAN,
         }
     }
 
@@ -240,7 +282,7 @@ impl Statistics {
     }
 
     /// Returns what a reader must know of the estimates, as sentences.
-    pub fn warnings(&self, problem: &Problem<'_>) -> Vec<String> {
+    pub fn warnings(&self, problem: &Problem) -> Vec<String> {
         let mut warnings = Vec::new();
         for (range, parameter) in problem.ranges.iter().zip(&self.parameters) {
             if parameter.estimate == Estimate::AtBound {
@@ -251,7 +293,7 @@ impl Statistics {
                 ));
             }
         }
-        warnings.extend(self.undetermined.iter().map(|direction| undetermined_text(problem, direction)));
+        warnings.extend(self.undetermined.iter().map(|direction| direction.text(problem)));
         let significant = 3.0 / (self.count as f64).sqrt();
         if self.autocorrelation > significant && self.rms > EXACT {
             warnings.push(format!(
@@ -270,42 +312,45 @@ impl Statistics {
     }
 }
 
-/// Describes a direction that the data do not determine.
-fn undetermined_text(problem: &Problem<'_>, direction: &[f64]) -> String {
-    let largest = direction.iter().fold(0.0f64, |largest, change| largest.max(change.abs()));
-    let taking_part: Vec<usize> = (0..direction.len()).filter(|k| direction[*k].abs() > 0.1 * largest).collect();
-    let name = |k: &usize| format!("`{}`", problem.ranges[*k].name);
-    match taking_part.as_slice() {
-        [one] => format!("the data do not determine {}: the residuals do not depend on it.", name(one)),
-        several => {
-            let names: Vec<String> = several.iter().map(name).collect();
-            // relative changes: a step of the scaled parameter on a logarithmic scale is a ratio
-            let relative = |k: usize| {
-                let range = &problem.ranges[k];
-                if range.is_log { direction[k] * (range.to / range.from).ln() } else { direction[k] }
-            };
-            let all_log = several.iter().all(|k| problem.ranges[*k].is_log);
-            let first = relative(several[0]);
-            let changes: Vec<String> = several
-                .iter()
-                .map(|k| {
-                    let change = relative(*k) / first;
-                    let (word, unit) =
-                        (if change > 0.0 { "raised" } else { "lowered" }, if all_log { "%" } else { "% of its range" });
-                    format!("{} {word} by {:.2} {unit}", name(k), change.abs())
-                })
-                .collect();
-            format!(
-                "the data do not determine {} separately: {} changes no residual noticeably. Fix one of them, or add data.",
-                names.join(" and "),
-                changes.join(" with ")
-            )
+impl Undetermined {
+    /// Describes the direction in words.
+    fn text(&self, problem: &Problem) -> String {
+        let direction = &self.change;
+        let name = |k: &usize| format!("`{}`", problem.ranges[*k].name);
+        match self.parameters.as_slice() {
+            [one] => format!("the data do not determine {}: the residuals do not depend on it.", name(one)),
+            several => {
+                let names: Vec<String> = several.iter().map(name).collect();
+                // relative changes: a step of the scaled parameter on a logarithmic scale is a ratio
+                let relative = |k: usize| {
+                    let range = &problem.ranges[k];
+                    if range.is_log { direction[k] * (range.to / range.from).ln() } else { direction[k] }
+                };
+                let all_log = several.iter().all(|k| problem.ranges[*k].is_log);
+                let first = relative(several[0]);
+                let changes: Vec<String> = several
+                    .iter()
+                    .map(|k| {
+                        let change = relative(*k) / first;
+                        let (word, unit) = (
+                            if change > 0.0 { "raised" } else { "lowered" },
+                            if all_log { "%" } else { "% of its range" },
+                        );
+                        format!("{} {word} by {:.2} {unit}", name(k), change.abs())
+                    })
+                    .collect();
+                format!(
+                    "the data do not determine {} separately: {} changes no residual noticeably. Fix one of them, or add data.",
+                    names.join(" and "),
+                    changes.join(" with ")
+                )
+            }
         }
     }
 }
 
 /// Returns the correlation of residuals in neighbouring rows of the same group.
-fn autocorrelation(problem: &Problem<'_>, residuals: &[f64]) -> f64 {
+fn autocorrelation(problem: &Problem, residuals: &[f64]) -> f64 {
     let (mut products, mut squares, mut at) = (0.0, 0.0, 0);
     for target in problem.targets.iter().filter(|target| !target.is_predicted()) {
         let (measured, per_row) = (target.measured(), target.quantities().len());

@@ -1,6 +1,7 @@
 //! Tables of an identification.
 
-use super::problem::Problem;
+use super::problem::{DerivativesOf, Problem};
+use super::profile::Profile;
 use super::search::Found;
 use super::statistics::Statistics;
 use super::targets::{Fitted, Measured, Target};
@@ -20,31 +21,40 @@ pub(super) const SUMMARY: &str = "fit_summary";
 /// Correlations of the parameters.
 pub(super) const CORRELATIONS: &str = "correlations";
 
+/// Rise of the loss over each parameter.
+pub(super) const PROFILE: &str = "profile";
+
 /// The result of a case.
 pub(super) struct Outcome<'a> {
     pub found: &'a Found,
     pub statistics: &'a Statistics,
     pub fitted: &'a [Fitted],
+    /// One profile for each parameter; empty if none was requested.
+    pub profiles: &'a [Profile],
 }
 
 /// Writes the rows of all tables of a case.
-pub(super) fn write(work: &UnitTask<'_>, problem: &Problem<'_>, outcome: &Outcome<'_>) -> Vec<TableBuilder> {
+pub(super) fn write(work: &UnitTask<'_>, problem: &Problem, outcome: &Outcome<'_>) -> Vec<TableBuilder> {
     let case = &work.case().case;
     let statistics = outcome.statistics;
     let (mut parameters, mut fit) = (TableBuilder::default(), TableBuilder::default());
     let (mut summary, mut correlations) = (TableBuilder::default(), TableBuilder::default());
-    for (range, parameter) in problem.ranges.iter().zip(&statistics.parameters) {
+    for (k, (range, parameter)) in problem.ranges.iter().zip(&statistics.parameters).enumerate() {
         parameters.varied(case);
         parameters.text("parameter", &range.name);
         parameters.number("value", parameter.value);
         parameters.number("standard_error", parameter.standard_error);
         parameters.number("low_95", parameter.low);
         parameters.number("high_95", parameter.high);
+        if let Some(profile) = outcome.profiles.get(k) {
+            parameters.number("profile_low_95", range.at(profile.low));
+            parameters.number("profile_high_95", range.at(profile.high));
+        }
         parameters.text("unit", &si_unit(range.dimension));
         parameters.text("status", parameter.estimate.word());
         parameters.end_row();
     }
-    let derivatives = problem.derivatives(&outcome.found.x, true);
+    let derivatives = problem.derivatives(&outcome.found.x, &problem.all(), DerivativesOf::AllTargets);
     for (number, (target, fitted)) in problem.targets.iter().zip(outcome.fitted).enumerate() {
         let (per_row, names) = (target.quantities().len(), target.quantities());
         let rows = target.measured().chunks(per_row).zip(fitted.values.chunks(per_row));
@@ -80,6 +90,7 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &Problem<'_>, outcome: &Outcom
     summary.number("rms_residual", statistics.rms);
     summary.number("autocorrelation", statistics.autocorrelation);
     summary.number("aic", statistics.aic);
+    summary.number("aicc", statistics.aicc);
     summary.number("bic", statistics.bic);
     summary.integer("searches", outcome.found.searches as u64);
     summary.integer("agreeing", outcome.found.agreeing as u64);
@@ -94,7 +105,19 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &Problem<'_>, outcome: &Outcom
             correlations.end_row();
         }
     }
-    vec![parameters, fit, summary, correlations]
+    let mut rises = TableBuilder::default();
+    for (range, profile) in problem.ranges.iter().zip(outcome.profiles) {
+        for point in &profile.points {
+            rises.varied(case);
+            rises.text("parameter", &range.name);
+            rises.number("value", range.at(point.x));
+            rises.text("unit", &si_unit(range.dimension));
+            rises.number("rise", point.rise);
+            rises.flag("within_95", Some(point.rise <= statistics.quantile.powi(2)));
+            rises.end_row();
+        }
+    }
+    vec![parameters, fit, summary, correlations, rises]
 }
 
 fn correlation(correlations: &DMatrix<f64>, k: usize, l: usize) -> f64 {
@@ -157,7 +180,7 @@ fn shown_values(
 
 /// Returns sentences about the targets that were predicted: the largest value and its place, group
 /// by group, and the typical deviation.
-pub(super) fn predictions(problem: &Problem<'_>, fitted: &[Fitted]) -> Vec<String> {
+pub(super) fn predictions(problem: &Problem, fitted: &[Fitted]) -> Vec<String> {
     let mut sentences = Vec::new();
     for (target, fitted) in problem.targets.iter().zip(fitted).filter(|(target, _)| target.is_predicted()) {
         let per_row = target.quantities().len();

@@ -4,10 +4,12 @@ use super::backbone::Backbone;
 use super::loops::LoopTarget;
 use super::response::ResponseTarget;
 use super::ring_down::RingDown;
+use super::settled::Settled;
 use super::weight::Weight;
 use crate::case::names::ModelNames;
 use crate::case::study::{Case, Study};
 use crate::case::values::Values;
+use crate::compile::torsion::of_rotation;
 use crate::data::{ColumnError, DataTable};
 use crate::kinds::info::KeyError;
 use crate::syntax::suggest::{alternatives, excerpt};
@@ -77,6 +79,11 @@ pub(super) fn kinds() -> Vec<(&'static str, &'static str)> {
              `response_imaginary`, and the measured `force` of each row",
         ),
         ("loop", "loops of a joint: the columns `displacement` and `force`, for laws with velocity also `time`"),
+        (
+            "settled",
+            "settled vibration: the columns `frequency`, `force`, and `amplitude` (half of peak to peak) or `mean` of a \
+             place, or `dissipation` of a joint per cycle",
+        ),
         ("ring-down", "free decay: the columns `time` and `response`"),
         ("backbone", "frequency over amplitude: the columns `amplitude`, `frequency` and `damping`"),
     ]
@@ -147,6 +154,7 @@ pub(super) struct TargetInput<'a> {
 impl TargetInput<'_> {
     /// Returns the numbers of a column in the rows of the target.
     pub fn column(&self, role: &str, dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
+        let dimension = if self.case.is_torsional { of_rotation(dimension) } else { dimension };
         let all = self.data.values(role, dimension)?;
         let missing = self.rows.iter().find(|row| !all.get(**row).is_some_and(|value| value.is_finite()));
         if let Some(row) = missing {
@@ -164,6 +172,7 @@ impl TargetInput<'_> {
     /// Returns the standard deviations of values with these magnitudes, group by group.
     pub fn deviations(&self, magnitudes: &[f64], dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
         let text = self.values.text("weight").unwrap_or("1 % of largest");
+        let dimension = if self.case.is_torsional { of_rotation(dimension) } else { dimension };
         let weight = Weight::read(text, dimension).map_err(|message| ColumnError {
             message,
             help: "write `relative 2 %`, `1 % of largest`, or a quantity with its unit".to_owned(),
@@ -213,6 +222,7 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
                 return Err(KeyError::unknown_name("targets", "joint", at, &joints));
             }
         }
+        Some("settled") if model.joints.iter().any(|joint| joint.name == at) => {}
         Some(kind) => {
             ModelNames::places(model).single_label("targets", "place", at)?;
             let moves = ["start", "start_velocity"].iter().any(|key| values.by_name(key).is_some());
@@ -278,6 +288,7 @@ fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Targ
         "loop" => Box::new(LoopTarget::new(&input)?),
         "ring-down" => Box::new(RingDown::new(&input)?),
         "backbone" => Box::new(Backbone::new(&input)?),
+        "settled" => Box::new(Settled::new(&input)?),
         _ => Box::new(ResponseTarget::new(&input)?),
     })
 }

@@ -96,7 +96,7 @@ fn disk_shapes(
     let shape_panel = |row: usize| {
         let at = |column: &str| numbers(table, column, row..row + 1)[0];
         let most = places.iter().map(|name| at(&amplitude_of(name))).fold(0.0, f64::max);
-        let (unit, factor) = prefixed_unit(most, "m");
+        let (unit, factor) = prefixed_unit(most, drawing.unit("m"));
         let words = format!("{mode} at {} {unit}", format_significant(most * factor, 3));
         let frequency = format!("{} Hz", format_significant(at("frequency_Hz"), 5));
         let size = |name: &str| match table.column(&first_harmonic_of(name)) {

@@ -38,12 +38,12 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         if !system.places().is_empty() {
             let shown = drawing.displacements(&system);
             let names = shown.iter().map(|(name, _)| name.as_str()).collect();
-            panels.push(panel("displacement", "m", names, "displacement_m", 0));
+            panels.push(panel("displacement", drawing.unit("m"), names, "displacement_m", 0));
         }
         if !system.joints().is_empty() {
             let labels: Vec<String> = system.joints().iter().flat_map(|joint| joint.labels()).collect();
             let names = labels.iter().map(String::as_str).filter(|name| drawing.shows(name)).collect();
-            panels.push(panel("joint force", "N", names, "force_N", system.places().len()));
+            panels.push(panel("joint force", drawing.unit("N"), names, "force_N", system.places().len()));
         }
         panels.retain(|panel| !panel.series.is_empty());
         panels

@@ -29,7 +29,8 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let tables = [Some(curve), drawing.table(tables::REVERSE_SWEEP)];
     let highest = tables.into_iter().flatten().map(|table| largest(table, columns())).fold(0.0, f64::max);
     let (y, y_factor) = drawing.axis(1, "amplitude", highest, "m");
-    let (unit, force_factor) = prefixed_unit(largest(curve, joints.iter().map(|joint| force(joint))), "N");
+    let (unit, force_factor) =
+        prefixed_unit(largest(curve, joints.iter().map(|joint| force(joint))), drawing.unit("N"));
     let cases = drawing.case_rows(curve);
     let mut drawn = FigureData {
         drawing,

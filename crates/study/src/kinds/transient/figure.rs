@@ -12,7 +12,7 @@ use std::ops::Range;
 /// Draws damping over amplitude, cycle by cycle, of the place that moves most, with a curve for
 /// every case.
 fn damping(drawing: &FigureInput<'_>, table: &Table, places: &[String]) -> Panel {
-    let (unit, factor) = prefixed_unit(largest(table, ["amplitude_m".to_owned()]), "m");
+    let (unit, factor) = prefixed_unit(largest(table, ["amplitude_m".to_owned()]), drawing.unit("m"));
     let cases = drawing.case_rows(table);
     let line = |(colour, case_rows): (usize, &&CaseRows)| {
         let x = numbers(table, "amplitude_m", case_rows.rows.clone()).iter().map(|x| x * factor).collect();

@@ -2,7 +2,9 @@
 //! switched-on excitation, or run-up.
 
 mod figure;
+mod further_tables;
 pub(super) mod record;
+mod signal;
 
 use super::orbit::write_sample;
 use super::shared::keys::MAX_SAMPLES;
@@ -20,6 +22,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::describe_location;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optional, required};
+use further_tables::History;
 use record::Records;
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -91,6 +94,14 @@ pub(super) const KIND: Kind = Kind {
                 "points of the table per excitation period (for a run-up: of its highest frequency)",
                 "64",
             ),
+            optional(
+                "also",
+                ValueType::Names,
+                "further tables: `joint_work` (work done on every joint since the beginning, with the energy in its springs), \
+                 `spectrum` (power spectral density of every displacement), `shock_spectrum` (largest acceleration of \
+                 oscillators with 5 % damping on every place)",
+                "[\"joint_work\"]",
+            ),
             optional("time_step", DURATION, "time step of the table; required for a free decay", "\"0.1 ms\""),
         ],
         check,
@@ -99,7 +110,15 @@ pub(super) const KIND: Kind = Kind {
         uses_method: false,
         needs: |_, options, system| TimeHistory::check(system, options.get(WIDTH).copied()),
         adapts: false,
-        tables: &["motion", "motion_summary", "decay", "decay_summary"],
+        tables: &[
+            "motion",
+            "motion_summary",
+            "decay",
+            "decay_summary",
+            further_tables::JOINT_WORK,
+            further_tables::SPECTRUM,
+            further_tables::SHOCK_SPECTRUM,
+        ],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -133,19 +152,30 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let free = inputs.range().is_none();
     let cycles = if free { points * periods.floor() } else { 0.0 };
     let summaries = if free { points } else { 0.0 };
+    let wanted = inputs.case.values.names("also").unwrap_or_default();
+    let further = |name: &str, rows: f64| TableShape {
+        rows: if wanted.iter().any(|wanted| wanted == name) { points * rows } else { 0.0 },
+        numbers: table.numbers,
+        words: 0.0,
+    };
+    // places and accelerations of all samples, for the further tables
+    let kept = if wanted.is_empty() { 0.0 } else { 16.0 * samples * table.numbers };
     PlannedSize {
         tables: vec![
             TableShape { numbers: table.numbers + inputs.frequency_columns(), ..table },
             TableShape {
                 rows: points * inputs.places,
-                numbers: inputs.varied + inputs.frequency_columns() + 2.0,
+                numbers: inputs.varied + inputs.frequency_columns() + 3.0,
                 words: 1.0,
             },
             TableShape { rows: cycles, numbers: inputs.varied + 4.0, words: 1.0 },
             TableShape { rows: summaries, numbers: inputs.varied + 10.0, words: 1.0 },
+            further(further_tables::JOINT_WORK, samples),
+            further(further_tables::SPECTRUM, samples / 9.0),
+            further(further_tables::SHOCK_SPECTRUM, 300.0),
         ],
         drawn: points.min(MAX_PANELS as f64) * samples * inputs.places,
-        unit: 0.0,
+        unit: kept,
     }
 }
 
@@ -157,6 +187,11 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
             free.single_label(key, "free mass", name)?;
         }
+    }
+    let unknown =
+        values.names("also").unwrap_or_default().iter().find(|name| !further_tables::ALL.contains(&name.as_str()));
+    if let Some(name) = unknown {
+        return Err(KeyError::unknown_name("also", "table", name, &further_tables::ALL));
     }
     let (drive, run_up) = (values.frequencies("frequency"), values.table("run_up"));
     let (duration, cycles) = (values.quantity("duration"), values.count("cycles"));
@@ -236,6 +271,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     }
     let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
     let (mut decay, mut summary) = (TableBuilder::default(), TableBuilder::default());
+    let wanted = values.names("also").unwrap_or_default();
+    let mut further: Vec<TableBuilder> = further_tables::ALL.iter().map(|_| TableBuilder::default()).collect();
     let motions = drives.len() as f64;
     for (number, drive) in drives.into_iter().enumerate() {
         let excitation = drive.map(Excitation::Steady).or(run_up).unwrap_or(Excitation::Free);
@@ -263,6 +300,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         // largest displacement of every place, and its time
         let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
+        // sum of the squared displacements of every place, and number of samples
+        let mut history = History::default();
+        let (mut squares, mut count) = (vec![0.0f64; prepared.system.places().len()], 0usize);
         let is_free = excitation == Excitation::Free && records.is_none();
         let mut visitor = |instant: TimeSample<'_>| {
             let TimeSample { time, omega, state: sample, between: since } = instant;
@@ -275,6 +315,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             write_sample(prepared, sample, &mut rows);
             rows.end_row();
             sampled = true;
+            if !wanted.is_empty() {
+                history.add(prepared, time, sample);
+            }
+            count += 1;
             // the turning points are located exactly only for the place that moves most
             let most = largest_range(&decays).filter(|_| is_free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.place_axes()).enumerate() {
@@ -283,6 +327,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                 let [x, v] = motion_along(sample);
                 let motion = |time: f64| motion_along(&since(time));
                 decay.add([time, x, v], (Some(i) == most).then_some(&motion as &PlaceMotionFn<'_>));
+                squares[i] += x * x;
                 if x.abs() > largest[i].0 {
                     largest[i] = (x.abs(), time);
                 }
@@ -298,10 +343,18 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             }
             None => transient.visit(&prepared.system, &mut visitor),
         };
+        let begin_row = |table: &mut TableBuilder| {
+            table.varied(case);
+            if work.several_frequencies() {
+                table.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
+            }
+        };
+        history.write(prepared, wanted, &begin_row, &mut further);
         // a motion without a sample has no largest displacement
         let displacements = prepared.system.place_axes().iter().map(|along| !along.is_rotation());
-        let places = prepared.system.places().iter().zip(largest).zip(displacements).filter(|(_, counts)| *counts);
-        for (place, (displacement, time)) in places.map(|(of, _)| of).filter(|_| sampled) {
+        let places = prepared.system.places().iter().zip(largest).zip(&squares).zip(displacements);
+        let places = places.filter(|(_, counts)| *counts && sampled).map(|(of, _)| of);
+        for ((place, (displacement, time)), squares) in places {
             extremes.varied(case);
             if work.several_frequencies() {
                 extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
@@ -309,6 +362,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             extremes.text("mass", place);
             extremes.number("largest_displacement_m", displacement);
             extremes.number(TIME, time);
+            extremes.number("rms_displacement_m", (squares / count as f64).sqrt());
             extremes.reduction_error(prepared.system.reduction_evidence());
             extremes.end_row();
         }
@@ -329,6 +383,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         }
     }
     part.tables = vec![rows, extremes, decay, summary];
+    part.tables.extend(further);
     Ok(part)
 }
 

@@ -1,4 +1,4 @@
-//! Forces and motions from records: `data` in `[[force]]` and `[[motion]]`.
+//! Forces and motions from records and signals: `data` and `signal` in `[[force]]` and `[[motion]]`.
 //!
 //! A record is linear between its rows and zero outside of them. The motion is computed from row
 //! to row. Within an interval of length `h`, the linear part is
@@ -9,10 +9,13 @@
 //! An acceleration of the ground acts as `-m a` on every mass, and displacements are those
 //! relative to the ground.
 
+use super::signal::SignalRows;
 use crate::case::study::{Case, Study};
-use crate::case::values::ResolvedValue;
-use crate::compile::compiled::{CompiledTable, CompiledValue};
-use crate::data::ColumnError;
+use crate::case::values::{ResolvedValue, Values};
+use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
+use crate::compile::torsion::of_rotation;
+use crate::data::{ColumnError, DataTable};
+use crate::syntax::expression::ExpressionValue;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
@@ -88,44 +91,60 @@ impl Records {
         let (mut channels, mut ground_moves): (Vec<Channel>, bool) = (Vec::new(), false);
         for (list, tables) in lists {
             for (index, table) in tables.iter().enumerate() {
-                let Some(name) = text(table, "data") else { continue };
+                if !table.has_time_history() {
+                    continue;
+                }
+                let history = if table.entry("signal").is_some() { "signal" } else { "data" };
                 let fail = |key: &'static str, error: ColumnError| RecordError { list, index, key, error };
                 let error =
                     |key, message: String, help: &str| fail(key, ColumnError { message, help: help.to_owned() });
-                let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
-                    error("data", format!("there is no [[data]] `{name}`"), "add [[data]] with this name and `file`")
-                })?;
-                if !data.is_read() {
-                    return Ok(None);
-                }
                 // the records use the harmonics themselves
-                let forced = case.model.forces.iter().any(|force| force.harmonic > 0 && force.amplitude != 0.0);
+                let forced = case.model.forces.iter().any(|force| force.harmonic > 0 && force.amplitude != 0.0)
+                    || !case.model.frequency_forces.is_empty();
                 let moved = case.model.motions.iter().any(|motion| motion.harmonic > 0 && motion.amplitude != 0.0);
                 if forced || moved {
                     let help =
                         "write all forces as records; only constant forces (harmonic = 0) may act at the same time";
-                    return Err(error("data", "a record and a harmonic force exclude each other".to_owned(), help));
+                    return Err(error(history, "a record and a harmonic force exclude each other".to_owned(), help));
                 }
                 let on = text(table, "on").unwrap_or_default().to_owned();
                 let harmonic = channels.len() as u32 + 1;
                 let on_ground = list == "motion" && on == GROUND;
                 ground_moves |= on_ground;
-                let (dimension, role) = match (list, on_ground, model.is_rotation(&on)) {
+                let (displacement, role) = match (list, on_ground, model.is_rotation(&on)) {
                     ("force", _, false) => (Dimension::FORCE, "force"),
                     ("force", _, true) => (Dimension::ENERGY, "force"),
                     (_, true, _) => (ACCELERATION, "acceleration"),
                     (_, _, false) => (Dimension::LENGTH, "displacement"),
                     (_, _, true) => (Dimension::ANGLE, "displacement"),
                 };
-                let times = data.values("time", Dimension::TIME).map_err(|cause| fail("data", cause))?;
-                let values = data.values(text(table, "column").unwrap_or(role), dimension);
-                let values = values.map_err(|cause| fail("column", cause))?;
-                let finite = times.len() == values.len() && times.iter().chain(&values).all(|value| value.is_finite());
-                if !finite || times.len() < 2 || times.windows(2).any(|pair| pair[0] >= pair[1]) {
-                    let message =
-                        format!("the record `{name}` needs two rows or more with rising times and without gaps");
-                    return Err(error("data", message, "remove incomplete rows and sort the others by time"));
-                }
+                let dimension = if case.is_torsional { of_rotation(displacement) } else { displacement };
+                let rows = if history == "signal" {
+                    if list == "motion" && !on_ground {
+                        let help = "state the motion of this place by a record, or name `ground`";
+                        return Err(error("signal", "a signal is an acceleration of the ground".to_owned(), help));
+                    }
+                    let mut problems = Vec::new();
+                    let stated = table.values(&environment(study, case), &mut problems);
+                    // problems were found when the case was resolved
+                    SignalRows::new(stated.table("signal").unwrap_or(&Values::default()))
+                        .map_err(|cause| fail("signal", cause))?
+                } else {
+                    let column = text(table, "column").unwrap_or(role);
+                    let name = text(table, "data").unwrap_or_default();
+                    let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
+                        error(
+                            "data",
+                            format!("there is no [[data]] `{name}`"),
+                            "add [[data]] with this name and `file`",
+                        )
+                    })?;
+                    if !data.is_read() {
+                        return Ok(None);
+                    }
+                    record_rows(data, column, dimension).map_err(|(key, cause)| fail(key, cause))?
+                };
+                let SignalRows { times, values } = rows;
                 if on_ground {
                     push_inertia(&mut model, text(table, "along"), harmonic).map_err(|cause| fail("on", cause))?;
                 } else if list == "force" {
@@ -183,6 +202,33 @@ impl Records {
         let omega = if next < self.knots.len() { omega } else { 0.0 };
         DrivenInterval { system, omega, reported: 0.0, length }
     }
+}
+
+/// Returns the values of the parameters of a case.
+fn environment<'a>(study: &'a Study, case: &Case) -> Environment<'a> {
+    let value = |name: &String| match case.parameters.get(name) {
+        Some((si, Some(dimension))) => ExpressionValue::new(*si, *dimension),
+        Some((si, None)) => ExpressionValue::bare(*si),
+        None => ExpressionValue::bare(f64::NAN),
+    };
+    Environment { names: &study.names, values: study.names.iter().map(value).collect() }
+}
+
+/// Reads a column over time. An error has the key to which it belongs.
+fn record_rows(
+    data: &DataTable,
+    column: &str,
+    dimension: Dimension,
+) -> Result<SignalRows, (&'static str, ColumnError)> {
+    let times = data.values("time", Dimension::TIME).map_err(|cause| ("data", cause))?;
+    let values = data.values(column, dimension).map_err(|cause| ("column", cause))?;
+    let finite = times.len() == values.len() && times.iter().chain(&values).all(|value| value.is_finite());
+    if !finite || times.len() < 2 || times.windows(2).any(|pair| pair[0] >= pair[1]) {
+        let message = format!("the record `{}` needs two rows or more with rising times and without gaps", data.name);
+        let help = "remove incomplete rows and sort the others by time".to_owned();
+        return Err(("data", ColumnError { message, help }));
+    }
+    Ok(SignalRows { times, values })
 }
 
 /// Checks the records of a case.

@@ -1,7 +1,7 @@
 //! Quantities and expressions: `"25 s/mm"`, `"m - m1/2"`, `"sqrt(k/m) * 1 rad"`.
 //!
 //! An expression has `+ - * / ^`, parentheses, numbers, numbers with a unit, names of
-//! parameters, `pi`, and the functions of [`FUNCTIONS`].
+//! parameters, `pi`, `frequency` (the excitation frequency), and the functions of [`FUNCTIONS`].
 //!
 //! - `value`: numbers with or without a dimension;
 //! - `operation`: the steps of an expression, and the reserved words;
@@ -33,7 +33,7 @@ use crate::syntax::units::{TextError, power, times};
 pub use operation::FUNCTIONS;
 use operation::Operation;
 pub(crate) use operation::is_reserved;
-use parser::Parser;
+use parser::{EXCITATION_HELP, Parser};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 pub use value::ExpressionValue;
@@ -132,6 +132,23 @@ impl Expression {
     /// Returns a [`TextError`] with the byte range of the sub-expression whose dimensions do not
     /// fit or whose value is not finite.
     pub fn evaluate(&self, parameters: &[ExpressionValue]) -> Result<ExpressionValue, TextError> {
+        self.evaluate_at(None, parameters)
+    }
+
+    /// Returns true if the expression reads the excitation frequency.
+    pub(crate) fn reads_frequency(&self) -> bool {
+        self.steps.iter().any(|(operation, _)| *operation == Operation::Frequency)
+    }
+
+    /// Does the same as [`Expression::evaluate`] at an excitation frequency (rad/s).
+    ///
+    /// # Errors
+    /// Those of [`Expression::evaluate`], and an expression that reads the frequency without one.
+    pub(crate) fn evaluate_at(
+        &self,
+        frequency: Option<f64>,
+        parameters: &[ExpressionValue],
+    ) -> Result<ExpressionValue, TextError> {
         let mut stack: Vec<ExpressionValue> = Vec::with_capacity(8);
         for (operation, span) in &self.steps {
             let fault = |message: String| TextError::new(span.clone(), message);
@@ -141,6 +158,12 @@ impl Expression {
                 Operation::Push(value) => value,
                 Operation::Parameter(index) => {
                     parameters.get(index).copied().unwrap_or(ExpressionValue::bare(f64::NAN))
+                }
+                Operation::Frequency => {
+                    let omega = frequency.ok_or_else(|| {
+                        fault("the excitation frequency has no value here".to_owned()).help(EXCITATION_HELP)
+                    })?;
+                    ExpressionValue::new(omega, Dimension::FREQUENCY)
                 }
                 Operation::Negate => {
                     let a = pop();

@@ -1,16 +1,17 @@
 //! Parses the text of an expression into steps by recursive descent.
 
 use super::ExpressionValue;
-use super::operation::{FUNCTIONS, Operation, is_not_finite};
+use super::operation::{FREQUENCY, FUNCTIONS, Operation, is_not_finite};
 use crate::syntax::suggest::{excerpt, suggest};
 use crate::syntax::units::{self, ReservedNames, TextError};
 use std::ops::Range;
 use stickslip::dimension::Dimension;
 
 /// Lower-case names that users give to the excitation frequency.
-const EXCITATION_NAMES: [&str; 5] = ["frequency", "freq", "omega", "ohm", "w"];
-/// Help text: expressions read parameters only, so the frequency must be a parameter.
-const EXCITATION_HELP: &str = "an expression cannot read the excitation frequency of each point. Define a parameter \
+const EXCITATION_NAMES: [&str; 4] = ["freq", "omega", "ohm", "w"];
+/// Help text: most expressions read parameters only, so the frequency must be a parameter.
+pub(super) const EXCITATION_HELP: &str = "only the amplitude of a [[force]] can read the excitation frequency, by the \
+    name `frequency`. For other quantities define a parameter \
     f = \"100 Hz\" in [parameters], use `f` here, and set kind = \"orbit\", frequency = \"f\" and \
     vary = { f = { from = \"90 Hz\", to = \"110 Hz\", points = 41 } }";
 
@@ -242,6 +243,10 @@ impl Parser<'_> {
         }
         if let Some(index) = (self.index)(name) {
             self.push(Operation::Parameter(index), start);
+            return Ok(());
+        }
+        if name == FREQUENCY {
+            self.push(Operation::Frequency, start);
             return Ok(());
         }
         if name == "pi" {

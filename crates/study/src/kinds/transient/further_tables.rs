@@ -1,0 +1,231 @@
+//! Further tables of a transient, on request: work done on the joints over time, spectra by Welch's
+//! method, shock response spectra.
+//!
+//! Sources: P. D. Welch (1967), with Hann windows of half overlap and the degrees of freedom of
+//! D. B. Percival, A. T. Walden (1993), section 6.17; D. O. Smallwood (1981), the ramp-invariant
+//! filter of ISO 18431-4.
+
+use crate::results::table_builder::TableBuilder;
+use crate::run::work::PreparedCase;
+use std::f64::consts::TAU;
+use stickslip::orbit::Sample;
+use stickslip_numerics::fourier::FourierPlan;
+
+/// Work done on every joint over time.
+pub(super) const JOINT_WORK: &str = "joint_work";
+/// Power spectral density of every place.
+pub(super) const SPECTRUM: &str = "spectrum";
+/// Largest acceleration of oscillators on every place.
+pub(super) const SHOCK_SPECTRUM: &str = "shock_spectrum";
+
+/// The tables, in the order in which the kind lists them.
+pub(super) const ALL: [&str; 3] = [JOINT_WORK, SPECTRUM, SHOCK_SPECTRUM];
+
+/// Half-overlapping segments of a spectrum.
+const SEGMENTS: usize = 8;
+/// Damping ratio of the oscillators of a shock response spectrum.
+const SHOCK_DAMPING: f64 = 0.05;
+/// Their frequencies per octave.
+const PER_OCTAVE: f64 = 12.0;
+
+/// The samples of a motion.
+#[derive(Debug, Default)]
+pub(super) struct History {
+    times: Vec<f64>,
+    /// Displacements and accelerations, place by place.
+    displacement: Vec<Vec<f64>>,
+    acceleration: Vec<Vec<f64>>,
+    /// Work on every direction of the joints since the beginning, sample by sample.
+    work: Vec<Vec<f64>>,
+    /// Relative displacement and force of every direction at the last sample.
+    before: Vec<[f64; 2]>,
+}
+
+impl History {
+    pub fn add(&mut self, prepared: &PreparedCase, time: f64, sample: &Sample) {
+        let axes = prepared.system.place_axes();
+        self.displacement.resize(axes.len(), Vec::new());
+        self.acceleration.resize(axes.len(), Vec::new());
+        for (i, axis) in axes.iter().enumerate() {
+            self.displacement[i].push(axis.component(&sample.displacement));
+            self.acceleration[i].push(axis.component(&sample.acceleration));
+        }
+        let joints = prepared.system.joints().iter().zip(&sample.joints);
+        let now: Vec<[f64; 2]> = joints
+            .flat_map(|(joint, state)| (0..joint.axes().len()).map(|a| [state.displacement[a], state.force[a]]))
+            .collect();
+        self.work.resize(now.len(), Vec::new());
+        for (j, [u, force]) in now.iter().enumerate() {
+            let done = self.work[j].last().copied().unwrap_or(0.0);
+            let step = self.before.get(j).map_or(0.0, |before| 0.5 * (force + before[1]) * (u - before[0]));
+            self.work[j].push(done + step);
+        }
+        self.before = now;
+        self.times.push(time);
+    }
+
+    /// Writes the tables of [`ALL`] that `wanted` names. `begin` writes the first cells of a row.
+    pub fn write(
+        &self,
+        prepared: &PreparedCase,
+        wanted: &[String],
+        begin: &dyn Fn(&mut TableBuilder),
+        tables: &mut [TableBuilder],
+    ) {
+        for (table, name) in tables.iter_mut().zip(ALL) {
+            if !wanted.iter().any(|wanted| wanted == name) || self.times.len() < 2 {
+                continue;
+            }
+            match name {
+                JOINT_WORK => self.write_work(prepared, begin, table),
+                SPECTRUM => self.write_spectrum(prepared, begin, table),
+                _ => self.write_shock(prepared, begin, table),
+            }
+        }
+    }
+
+    fn step(&self) -> f64 {
+        (self.times[self.times.len() - 1] - self.times[0]) / (self.times.len() - 1) as f64
+    }
+
+    fn write_work(&self, prepared: &PreparedCase, begin: &dyn Fn(&mut TableBuilder), table: &mut TableBuilder) {
+        let labels: Vec<String> = prepared.system.joints().iter().flat_map(|joint| joint.labels()).collect();
+        for (row, time) in self.times.iter().enumerate() {
+            begin(table);
+            table.number("time_s", *time);
+            for (label, work) in labels.iter().zip(&self.work) {
+                table.number(&format!("{label}_work_J"), work[row]);
+            }
+            table.end_row();
+        }
+    }
+
+    fn write_spectrum(&self, prepared: &PreparedCase, begin: &dyn Fn(&mut TableBuilder), table: &mut TableBuilder) {
+        let Some(segments) = Segments::new(self.times.len()) else { return };
+        let spectra: Vec<Vec<f64>> =
+            self.displacement.iter().map(|values| segments.density(values, self.step())).collect();
+        let [low, high] = segments.confidence();
+        for line in 1..=segments.length / 2 {
+            begin(table);
+            table.number("frequency_Hz", line as f64 / (segments.length as f64 * self.step()));
+            for (place, spectrum) in prepared.system.places().iter().zip(&spectra) {
+                table.number(&format!("{place}_displacement_density_m2_per_Hz"), spectrum[line]);
+            }
+            table.number("low_95_factor", low);
+            table.number("high_95_factor", high);
+            table.end_row();
+        }
+    }
+
+    fn write_shock(&self, prepared: &PreparedCase, begin: &dyn Fn(&mut TableBuilder), table: &mut TableBuilder) {
+        let step = self.step();
+        // from one period in the record to ten samples a period
+        let (first, last) = (1.0 / (step * self.times.len() as f64), 0.1 / step);
+        let count = (PER_OCTAVE * (last / first).log2()).floor().max(0.0) as usize;
+        for i in 0..=count {
+            let frequency = first * (i as f64 / PER_OCTAVE).exp2();
+            begin(table);
+            table.number("frequency_Hz", frequency);
+            for (place, values) in prepared.system.places().iter().zip(&self.acceleration) {
+                let largest = largest_acceleration(values, TAU * frequency * step);
+                table.number(&format!("{place}_largest_acceleration_m_per_s2"), largest);
+            }
+            table.end_row();
+        }
+    }
+}
+
+/// Returns the largest absolute acceleration of an oscillator on a base with this acceleration.
+/// `phase` is its natural frequency times the sampling step.
+fn largest_acceleration(base: &[f64], phase: f64) -> f64 {
+    let decay = (-SHOCK_DAMPING * phase).exp();
+    let turn = phase * (1.0 - SHOCK_DAMPING * SHOCK_DAMPING).sqrt();
+    let (c, s) = (decay * turn.cos(), decay * turn.sin() / turn);
+    let (b, a) = ([1.0 - s, 2.0 * (s - c), decay * decay - s], [-2.0 * c, decay * decay]);
+    let (mut x, mut y) = ([0.0; 2], [0.0; 2]);
+    let mut largest = 0.0f64;
+    for value in base {
+        let next = b[0] * value + b[1] * x[0] + b[2] * x[1] - a[0] * y[0] - a[1] * y[1];
+        x = [*value, x[0]];
+        y = [next, y[0]];
+        largest = largest.max(next.abs());
+    }
+    largest
+}
+
+/// Segments of a record, each of this even length.
+struct Segments {
+    length: usize,
+    count: usize,
+}
+
+impl Segments {
+    /// Divides `samples` samples; `None` if there are too few.
+    fn new(samples: usize) -> Option<Segments> {
+        let length = 2 * samples / (SEGMENTS + 1) / 2 * 2;
+        (length >= 16).then(|| Segments { length, count: (samples - length) / (length / 2) + 1 })
+    }
+
+    /// Returns the one-sided power spectral density at the multiples of the inverse length.
+    fn density(&self, values: &[f64], step: f64) -> Vec<f64> {
+        let n = self.length;
+        let window: Vec<f64> = (0..n).map(|i| 0.5 - 0.5 * (TAU * i as f64 / n as f64).cos()).collect();
+        let power: f64 = window.iter().map(|w| w * w).sum();
+        let mut plan = FourierPlan::new(n);
+        let mut density = vec![0.0; n / 2 + 1];
+        for segment in 0..self.count {
+            let part = &values[segment * n / 2..segment * n / 2 + n];
+            let mean = part.iter().sum::<f64>() / n as f64;
+            let mut windowed: Vec<f64> = part.iter().zip(&window).map(|(value, w)| (value - mean) * w).collect();
+            for (sum, line) in density.iter_mut().zip(plan.transform(&mut windowed)) {
+                *sum += 2.0 * line.norm_sqr() * step / power / self.count as f64;
+            }
+        }
+        density
+    }
+
+    /// Returns the ends of the 95 % interval of a density, as factors on its estimate.
+    fn confidence(&self) -> [f64; 2] {
+        let count = self.count as f64;
+        let freedom = 36.0 * count * count / (19.0 * count - 1.0);
+        // quantiles of the chi-squared distribution by Wilson and Hilferty (1931)
+        let quantile = |z: f64| {
+            let part = 2.0 / (9.0 * freedom);
+            freedom * (1.0 - part + z * part.sqrt()).powi(3)
+        };
+        [freedom / quantile(1.959_963_985), freedom / quantile(-1.959_963_985)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The density of a sine, summed over its lines, is its power.
+    #[test]
+    fn a_spectrum_has_the_power_of_its_signal() {
+        let step = 1e-3;
+        let values: Vec<f64> = (0..9000).map(|i| 3.0 * (TAU * 50.0 * step * f64::from(i)).sin() + 7.0).collect();
+        let segments = Segments::new(values.len()).expect("segments");
+        let density = segments.density(&values, step);
+        let width = 1.0 / (segments.length as f64 * step);
+        let power: f64 = density.iter().map(|d| d * width).sum();
+        assert!((power / 4.5 - 1.0).abs() < 1e-6, "{power}");
+        let highest = (0..density.len()).max_by(|a, b| density[*a].total_cmp(&density[*b])).expect("a line");
+        assert!((highest as f64 * width - 50.0).abs() < width);
+        // eight half-overlapping segments have 15.2 degrees of freedom: 0.55 to 2.43
+        let [low, high] = segments.confidence();
+        assert!(segments.count == SEGMENTS && (low - 0.55).abs() < 0.01 && (high - 2.43).abs() < 0.03, "{low} {high}");
+    }
+
+    /// A sine on a resonant oscillator: `|y| = a sqrt(1 + 4ζ²)/(2ζ)`; a soft one hardly moves, and a
+    /// stiff one moves with its base.
+    #[test]
+    fn a_shock_spectrum_has_its_resonance() {
+        let values: Vec<f64> = (0..40_000).map(|i| 2.0 * (TAU * 1e-2 * f64::from(i)).sin()).collect();
+        let at = |ratio: f64| largest_acceleration(&values, TAU * 1e-2 * ratio);
+        let resonant = 2.0 * (1.0 + 4.0 * SHOCK_DAMPING * SHOCK_DAMPING).sqrt() / (2.0 * SHOCK_DAMPING);
+        assert!((at(1.0) / resonant - 1.0).abs() < 3e-3, "{} {resonant}", at(1.0));
+        assert!(at(0.01) < 0.1 && (at(9.0) / 2.0 - 1.0).abs() < 0.03, "{} {}", at(0.01), at(9.0));
+    }
+}
