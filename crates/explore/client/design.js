@@ -54,6 +54,8 @@ function search(kind, title, letters) {
   const button = make("button", { type: "button", class: "primary", text: "Compute", id: `compute-${kind}`, onclick: () => (running ? stop(kind) : compute()) });
   let running = false;
   let turn = 0;
+  /** True if the user has read how long the search takes. */
+  let asked = false;
   const fields = Object.fromEntries(letters.map((letter, index) => [letter, axisFields(`${kind}-${letter}`, index)]));
   body.append(make("section", { class: "tile wide", "aria-label": title }, make("h2", { text: title }), make("div", { class: "tools" }, ...letters.map((letter) => fields[letter].box), button), words, legendPlace, place));
 
@@ -71,12 +73,20 @@ function search(kind, title, letters) {
     try {
       let all = 0;
       // the value of a searched parameter does not matter, but its removal from `vary` does
-      const event = await run(kind, { study: state.study, changes: changeList(), tables: true, view }, (event) => {
+      const event = await run(kind, { study: state.study, changes: changeList(), tables: true, view, wait: !asked }, (event) => {
         if (event.event === "begin") { all = event.points; }
         if (event.event === "progress" && all) { words.textContent = `${Math.round(100 * event.done / all)} % computed`; }
       });
       if (own !== turn) { return; }
       if (event === null) { words.textContent = "Stopped."; return; }
+      if (event.event === "expect") {
+        const others = state.description.varied.filter((/** @type {string} */ name) => ranges.every((range) => range.name !== name));
+        const each = others.length > 0 ? ` for all values of ${others.join(" and ")}; move the slider to keep one value` : "";
+        words.textContent = `This takes ${event.text}${each}. Press the button again to start.`;
+        asked = true;
+        return;
+      }
+      asked = false;
       if (event.event === "error") { words.textContent = event.help ? `${event.message}. ${event.help}.` : event.message; return; }
       result = { ...event, ranges };
       found = others(ranges);
@@ -161,7 +171,7 @@ function search(kind, title, letters) {
 
   return {
     show,
-    forget() { result = null; words.textContent = purpose; legendPlace.replaceChildren(); place.hidden = legendPlace.hidden = true; letters.forEach((letter) => fields[letter].forget()); },
+    forget() { stop(kind); turn += 1; running = asked = false; button.textContent = "Compute"; result = null; words.textContent = purpose; legendPlace.replaceChildren(); place.hidden = legendPlace.hidden = true; letters.forEach((letter) => fields[letter].forget()); },
     changed() { if (visible && result && result.seconds < 0.5 && others(result.ranges) !== found) { compute(); } else { show(); } },
     offer() { letters.forEach((letter) => fields[letter].offer()); },
   };

@@ -26,7 +26,7 @@ export function start(body) {
   tile = make("section", { class: "tile wide", "aria-label": "Worst blade of mistuned disks", hidden: true }, make("h2", { text: "Worst blade of mistuned disks" }),
     make("div", { class: "tools" }, make("label", {}, "Differs from blade to blade", menu), make("label", {}, "by", deviation), make("label", {}, "number of disks", disks), button), words, place);
   body.append(tile);
-  on("opened", () => { found = null; words.textContent = PURPOSE; place.hidden = true; menu.replaceChildren(); });
+  on("opened", () => { stop("mistuning"); found = null; words.textContent = PURPOSE; place.hidden = true; menu.replaceChildren(); });
   on("theme", show);
   on("changed", () => { place.classList.toggle("stale", found !== null && basis !== JSON.stringify(changeList())); });
 }
@@ -58,7 +58,7 @@ async function compute() {
     const event = await run("mistuning", { study: state.study, changes: changeList(), view }, (event) => {
       if (event.event === "partial") { take(event, number); }
     });
-    if (event === null) { words.textContent = `Stopped. ${sentence()}`; return; }
+    if (event === null) { words.textContent = found ? `Stopped. ${sentence()}` : PURPOSE; return; }
     if (event.event === "error") { words.textContent = event.help ? `${event.message}. ${event.help}.` : event.message; return; }
     take(event, number);
     words.textContent = `${sentence()} Computed in ${duration((performance.now() - begun) / 1000)}.`;
@@ -96,5 +96,5 @@ function show() {
   const width = Math.max((high - low) / 12, 1e-3);
   drawOwn(place, [
     { x: values, type: "histogram", xbins: { start: low, end: high + width, size: width }, marker: { color: colour(0) }, hovertemplate: "%{x}: %{y} disks<extra></extra>" },
-  ], { height: 280, xaxis: { title: "largest amplitude ÷ that of the tuned disk" }, yaxis: { title: `disks of ${all}`, rangemode: "tozero" }, bargap: 0.05 });
+  ], { height: 280, xaxis: { title: "largest amplitude ÷ that of the tuned disk" }, yaxis: { title: `disks of ${all}`, rangemode: "tozero", ...(all <= 12 ? { dtick: 1 } : {}) }, bargap: 0.05 });
 }

@@ -62,7 +62,11 @@ export function start(panel) {
   on("tab", (/** @type {string} */ name) => { if (name === "response") { show(); } });
 }
 
-const hasOrbits = () => ["response", "branch"].includes(state.description.kind);
+/** Whether the curves are over frequency, so that a click finds an orbit. */
+const hasOrbits = () => {
+  const axis = (partial ?? state.result)?.plot.axes[0]?.x;
+  return ["response", "branch"].includes(state.description.kind) && (axis ? axis.quantity.includes("frequency") : state.description.kind === "response");
+};
 
 function opened() {
   for (const element of document.querySelectorAll(".only-response")) { /** @type {any} */ (element).hidden = state.description.kind !== "response"; }
@@ -152,10 +156,10 @@ function take(event, reduced, seconds) {
   message();
   empty.hidden = true;
   place.hidden = false;
-  hint.hidden = !hasOrbits();
   if (!reduced) { cost = { seconds, points: state.description.points }; }
   if (!reduced && state.result && !state.result.reduced) { previous = state.result; }
   state.result = { ...event, reduced };
+  hint.hidden = !hasOrbits();
   status.textContent = reduced ? "fewer points while moving" : duration(seconds);
   show();
   tell("result", state.result);

@@ -46,23 +46,23 @@ fn latency_of_the_blade_couple() {
     browser.go(server.address());
     std::thread::sleep(Duration::from_secs(1));
     let again = first_curve(&mut browser);
-    println!("first curve of Fig. 6 after {cold:.0} ms, again {again:.0} ms");
+    eprintln!("first curve of Fig. 6 after {cold:.0} ms, again {again:.0} ms");
     browser.wait(CURVE);
     let times = slide(&mut browser, "q-parameters-kt-slider", 50);
-    println!("slider to the curve of Fig. 6, 50 values: {}", describe(&times));
+    eprintln!("slider to the curve of Fig. 6, 50 values: {}", describe(&times));
     let bytes = browser.number(
         "performance.getEntriesByType('resource').filter((one) => one.name.endsWith('/api/run')).at(-1).transferSize",
     );
-    println!("bytes per curve of Fig. 6: {bytes:.0}");
+    eprintln!("bytes per curve of Fig. 6: {bytes:.0}");
 }
 
 #[test]
 #[ignore = "measures times"]
 fn latency_of_a_ring_of_24_blades() {
     let Some((_server, mut browser)) = open(Start::Template("bladed-ring".into())) else { return };
-    println!("first curves of the tuned ring after {:.0} ms", first_curve(&mut browser));
+    eprintln!("first curves of the tuned ring after {:.0} ms", first_curve(&mut browser));
     let times = slide(&mut browser, "q-parameters-kt-slider", 20);
-    println!("slider to the curves of the tuned ring: {}", describe(&times));
+    eprintln!("slider to the curves of the tuned ring: {}", describe(&times));
     let text = stickslip_study::templates::find("bladed-ring").unwrap().study;
     let text =
         text.replace("sectors = \"N\"", "sectors = \"N\"\nmistuning = { of = \"k\", deviation = \"1 %\", seed = 1 }");
@@ -73,9 +73,9 @@ fn latency_of_a_ring_of_24_blades() {
     let Some((_server, mut browser)) = open(Start::File(file)) else { return };
     let begun = Instant::now();
     browser.wait_long(CURVE);
-    println!("first curve of the mistuned ring (181 points) after {:.2} s", begun.elapsed().as_secs_f64());
+    eprintln!("first curve of the mistuned ring (181 points) after {:.2} s", begun.elapsed().as_secs_f64());
     let times = slide(&mut browser, "q-parameters-kt-slider", 10);
-    println!("slider to a curve of the mistuned ring: {}", describe(&times));
+    eprintln!("slider to a curve of the mistuned ring: {}", describe(&times));
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn latency_memory_while_a_slider_moves() {
                 moving.dispatchEvent(new Event('change')); i";
     for half_minute in 1..=6 {
         let moves = browser.evaluate(drag);
-        println!(
+        eprintln!(
             "after {} s and {moves} more moves: page {:.1} MB, server {} MB",
             30 * half_minute,
             browser.heap() / 1e6,

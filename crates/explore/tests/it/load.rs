@@ -98,7 +98,8 @@ fn the_server_bears_load_for_a_minute() {
     let after = Instant::now();
     let answer = read(page.run(&study("afterwards", 9)));
     let answered = after.elapsed();
-    println!("{counts:?} in {took:?}; memory every 5 s, MB: {samples:?}; afterwards an answer in {answered:?}");
+    samples.lock().unwrap().push(memory() / 1_000_000);
+    eprintln!("{counts:?} in {took:?}; memory every 5 s, MB: {samples:?}; afterwards an answer in {answered:?}");
     assert_eq!(events(&answer).last().unwrap()["event"], "result");
     assert!(counts.others.is_empty(), "{counts:?}");
     assert!(answered < Duration::from_secs(2), "{answered:?}");

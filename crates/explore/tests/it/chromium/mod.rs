@@ -98,6 +98,10 @@ impl Browser {
         self.call("Page.navigate", json!({ "url": address }));
     }
 
+    pub fn hide_scrollbars(&mut self) {
+        self.call("Emulation.setScrollbarsHidden", json!({ "hidden": true }));
+    }
+
     pub fn forget_cookies(&mut self) {
         self.call("Network.clearBrowserCookies", json!({}));
     }
