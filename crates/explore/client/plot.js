@@ -38,7 +38,7 @@ export async function draw(place, plot, more = {}) {
   delete layout.width;
   const least = more.height ?? 0;
   // several panels shrink a little, so that all of them are seen at once
-  const lowest = (wide ? 0.68 : 1) * layout.height;
+  const lowest = (wide ? 0.82 : 1) * layout.height;
   layout.height = plot.axes.length === 1 ? Math.max(340, least) : Math.min(Math.max(least, lowest), 1.3 * layout.height);
   // plotly.js takes the height of the element when the window changes its size
   place.style.height = `${layout.height}px`;
