@@ -35,7 +35,7 @@ async function checked(response) {
  * Runs a study. The newest run of a slot wins; the older one ends without a result.
  * @param {string} slot
  * @param {any} request
- * @param {(event: any) => void} [progress] gets `begin` and `progress`
+ * @param {(event: any) => void} [progress] gets `begin`, `progress` and `partial`
  * @returns {Promise<any>} the last event, or null if a newer run took its place
  */
 export async function run(slot, request, progress = () => {}) {
@@ -47,9 +47,10 @@ export async function run(slot, request, progress = () => {}) {
       method: "POST", headers, signal: control.signal, body: JSON.stringify({ client, slot, ...request }),
     });
     if (!response.ok || !response.body) { throw new Error(await response.text()); }
+    /** @type {any} */
     let last = null;
     for await (const event of lines(response.body)) {
-      if (event.event === "begin" || event.event === "progress") { progress(event); } else { last = event; }
+      if (["begin", "progress", "partial"].includes(event.event)) { progress(event); } else { last = event; }
     }
     return last?.event === "superseded" ? null : last;
   } catch (error) {
@@ -65,7 +66,7 @@ export const stop = (slot) => running.get(slot)?.abort();
 
 /** Reads JSON lines. @param {ReadableStream<Uint8Array>} body */
 async function* lines(body) {
-  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  const reader = body.pipeThrough(/** @type {ReadableWritablePair<string, Uint8Array>} */ (/** @type {unknown} */ (new TextDecoderStream()))).getReader();
   let rest = "";
   for (;;) {
     const { value, done } = await reader.read();

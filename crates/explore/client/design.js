@@ -1,9 +1,10 @@
 // The fourth tab: the peak over one parameter, with its optimum, and over two parameters, as a
 // map. The present point can be dragged and moves the sliders.
 
-import { run } from "./api.js";
+import { run, stop } from "./api.js";
 import { make, perFrame } from "./dom.js";
 import { digits, duration, si } from "./format.js";
+import * as mistuning from "./mistuning.js";
 import { draggable, draw, legend, pixel } from "./plot.js";
 import { change, changeList, commit, keyOf, on, quantityText, setQuantity, state, tell } from "./store.js";
 
@@ -20,6 +21,7 @@ export function start(place) {
   body = make("div", { class: "grid" });
   panel.append(empty, body);
   searches.push(search("performance", "Peak over one parameter", ["x"]), search("map", "Peak over two parameters", ["x", "y"]));
+  mistuning.start(body);
   on("opened", () => searches.forEach((one) => one.forget()));
   on("described", () => { if (visible) { offer(); } });
   on("moving", () => searches.forEach((one) => one.show()));
@@ -29,14 +31,14 @@ export function start(place) {
 }
 
 /** The parameters that can be searched. */
-const plain = () => state.description.quantities.filter((/** @type {any} */ one) => one.group === "parameters" && one.number !== null && one.number > 0);
+const plain = () => state.description.quantities.filter((/** @type {any} */ one) => one.group === "parameters" && one.number !== null && one.number > 0 && one.range !== "count");
 
 function offer() {
   const possible = plain().length > 0 && ["response", "performance", "map"].includes(state.description.kind);
   empty.hidden = possible;
   body.hidden = !possible;
   empty.textContent = plain().length === 0 ? "The study has no entry of [parameters] with a plain value to search over." : `A study of kind ${state.description.kind} has no resonance peak to minimize.`;
-  if (possible) { searches.forEach((one) => one.offer()); }
+  if (possible) { searches.forEach((one) => one.offer()); mistuning.offer(); }
 }
 
 /** @param {"performance" | "map"} kind @param {string} title @param {("x" | "y")[]} letters */
@@ -46,38 +48,55 @@ function search(kind, title, letters) {
   /** Changes of the result, without those of its own parameters. */
   let found = "";
   const place = make("div", { class: "plot", id: `design-${kind}`, hidden: true });
-  const legendPlace = make("div", { class: "legend" });
-  const words = make("p", { class: "hint", role: "status" });
-  const button = make("button", { type: "button", class: "primary", text: "Compute", id: `compute-${kind}`, onclick: () => compute() });
+  const legendPlace = make("div", { class: "legend", hidden: true });
+  const purpose = kind === "map" ? "How high is the resonance peak for each pair of values? The lowest cell is the best design." : "How high is the resonance peak for each value? The lowest point of the curve is the best value.";
+  const words = make("p", { class: "hint", role: "status", text: purpose });
+  const button = make("button", { type: "button", class: "primary", text: "Compute", id: `compute-${kind}`, onclick: () => (running ? stop(kind) : compute()) });
+  let running = false;
+  let turn = 0;
+  /** True if the user has read how long the search takes. */
+  let asked = false;
   const fields = Object.fromEntries(letters.map((letter, index) => [letter, axisFields(`${kind}-${letter}`, index)]));
-  body.append(make("section", { class: "tile wide", "aria-label": title }, make("h3", { text: title }), make("div", { class: "tools" }, ...letters.map((letter) => fields[letter].box), button), words, legendPlace, place));
+  body.append(make("section", { class: "tile wide", "aria-label": title }, make("h2", { text: title }), make("div", { class: "tools" }, ...letters.map((letter) => fields[letter].box), button), words, legendPlace, place));
 
   async function compute() {
-    const ranges = letters.map((letter) => fields[letter].read());
+    const ranges = /** @type {any[]} */ (letters.map((letter) => fields[letter].read()));
     if (ranges.some((range) => range === null)) { words.textContent = "Choose different parameters with a range from a smaller to a larger value."; return; }
     if (ranges.length === 2 && ranges[0].name === ranges[1].name) { words.textContent = "Choose two different parameters."; return; }
     const view = kind === "map" ? { kind, x: ranges[0], y: ranges[1] } : { kind, over: ranges[0] };
     const begun = performance.now();
     words.textContent = "computing …";
-    button.disabled = true;
+    turn += 1;
+    const own = turn;
+    running = true;
+    button.textContent = "Stop";
     try {
       let all = 0;
       // the value of a searched parameter does not matter, but its removal from `vary` does
-      const event = await run(kind, { study: state.study, changes: changeList(), tables: true, view }, (event) => {
+      const event = await run(kind, { study: state.study, changes: changeList(), tables: true, view, wait: !asked }, (event) => {
         if (event.event === "begin") { all = event.points; }
         if (event.event === "progress" && all) { words.textContent = `${Math.round(100 * event.done / all)} % computed`; }
       });
-      if (event === null) { return; }
+      if (own !== turn) { return; }
+      if (event === null) { words.textContent = "Stopped."; return; }
+      if (event.event === "expect") {
+        const others = state.description.varied.filter((/** @type {string} */ name) => ranges.every((range) => range.name !== name));
+        const each = others.length > 0 ? ` for all values of ${others.join(" and ")}; move the slider to keep one value` : "";
+        words.textContent = `This takes ${event.text}${each}. Press the button again to start.`;
+        asked = true;
+        return;
+      }
+      asked = false;
       if (event.event === "error") { words.textContent = event.help ? `${event.message}. ${event.help}.` : event.message; return; }
       result = { ...event, ranges };
       found = others(ranges);
-      words.textContent = `${sentence(event, ranges)} Computed in ${duration((performance.now() - begun) / 1000)}. Drag the point in the plot to move the sliders.`;
+      words.textContent = `${sentence(event, ranges)} Computed in ${duration((performance.now() - begun) / 1000)}. Drag the ${kind === "map" ? "crossing of the lines" : "dotted line"} to move the slider${kind === "map" ? "s" : ""}.`;
       show();
     } catch (error) {
       words.textContent = "";
       tell("offline", error);
     } finally {
-      button.disabled = false;
+      if (own === turn) { running = false; button.textContent = "Compute"; }
     }
   }
 
@@ -88,7 +107,7 @@ function search(kind, title, letters) {
 
   const show = perFrame(() => {
     if (!result || !visible) { return; }
-    place.hidden = false;
+    place.hidden = legendPlace.hidden = false;
     place.classList.toggle("stale", others(result.ranges) !== found);
     legend(legendPlace, result.plot, place);
     draw(place, result.plot, { shapes: kind === "map" ? [cross()].flat() : upright(), height: 400 });
@@ -152,7 +171,7 @@ function search(kind, title, letters) {
 
   return {
     show,
-    forget() { result = null; words.textContent = ""; legendPlace.replaceChildren(); place.hidden = true; letters.forEach((letter) => fields[letter].forget()); },
+    forget() { stop(kind); turn += 1; running = asked = false; button.textContent = "Compute"; result = null; words.textContent = purpose; legendPlace.replaceChildren(); place.hidden = legendPlace.hidden = true; letters.forEach((letter) => fields[letter].forget()); },
     changed() { if (visible && result && result.seconds < 0.5 && others(result.ranges) !== found) { compute(); } else { show(); } },
     offer() { letters.forEach((letter) => fields[letter].offer()); },
   };
@@ -191,9 +210,10 @@ function axisFields(id, index) {
       const all = plain();
       // the varied parameter first, then those of joints
       const order = [...all].sort((a, b) => Number(Boolean(b.varied)) - Number(Boolean(a.varied)));
-      const joint = order.find((one) => one !== order[0] && /contact|slip|friction|limit|joint|damper/.test(one.doc));
-      const chosen = index === 0 ? order[0] : joint ?? order[1] ?? order[0];
-      menu.replaceChildren(...all.map((/** @type {any} */ one) => make("option", { value: one.name, text: one.name, title: one.doc, selected: one === chosen })));
+      const joint = order.find((one) => one !== order[0] && /contact|slip|friction|limit|joint|damper|shroud|tangential|preload|press/.test(one.doc));
+      const first = order[0]?.varied ? order[0] : order.find((one) => /slip limit|preload|press/.test(one.doc)) ?? order[0];
+      const chosen = index === 0 ? first : joint && joint !== first ? joint : order.find((one) => one !== first) ?? first;
+      menu.replaceChildren(...all.map((/** @type {any} */ one) => make("option", { value: one.name, text: one.doc ? `${one.name}: ${one.doc}` : one.name, selected: one === chosen })));
       fill();
     },
     read() {

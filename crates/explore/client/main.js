@@ -10,7 +10,7 @@ import * as output from "./output.js";
 import * as parameters from "./parameters.js";
 import * as pins from "./pins.js";
 import * as response from "./response.js";
-import { canRedo, canUndo, changeList, on, open, redo, reset, state, tell, undo } from "./store.js";
+import { canRedo, canUndo, changeList, on, open, redo, reset, restore, state, tell, undo } from "./store.js";
 import * as trust from "./trust.js";
 
 const TABS = [["response", "Response", response], ["orbit", "Orbit", orbit], ["motion", "Motion", motion], ["design", "Design", design], ["compare", "Compare", pins]];
@@ -101,7 +101,8 @@ function sentence(event) {
 /** @param {any} error */
 function offline(error) {
   const lost = error instanceof TypeError;
-  message(lost ? "The server does not answer. Start `stickslip explore` again; this page then continues." : String(error.message ?? error));
+  const again = `Start the explorer again with --port ${location.port}, and open the address that it prints: your changes are kept.`;
+  message(lost ? `The server does not answer. ${again}` : String(error.message ?? error));
   if (lost) { setTimeout(reconnect, 1500); }
 }
 
@@ -116,10 +117,12 @@ async function reconnect() {
 }
 
 function buttons() {
+  const none = !byId("gallery").hidden;
+  for (const id of ["skip", "undo", "redo", "reset", "show-parameters"]) { byId(id).hidden = none; }
   byId("undo").disabled = !canUndo();
   byId("redo").disabled = !canRedo();
   byId("reset").disabled = state.changes.size === 0;
-  byId("save").hidden = !state.study;
+  byId("save").hidden = none || !state.study;
 }
 
 function theme() {
@@ -127,6 +130,22 @@ function theme() {
   const dark = kept ? kept === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   document.documentElement.dataset.theme = dark ? "dark" : "light";
   document.documentElement.style.colorScheme = dark ? "dark" : "light";
+}
+
+/** On a narrow page the parameters are a sheet below the curve, which a button opens. */
+function drawer() {
+  const sheet = byId("parameters");
+  const button = byId("show-parameters");
+  const set = (/** @type {boolean} */ open) => {
+    sheet.classList.toggle("open", open);
+    button.setAttribute("aria-expanded", String(open));
+  };
+  button.addEventListener("click", () => { set(!sheet.classList.contains("open")); if (sheet.classList.contains("open")) { byId("search").focus({ preventScroll: true }); } });
+  document.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || !sheet.classList.contains("open") || getComputedStyle(button).display === "none") { return; }
+    set(false);
+    button.focus();
+  });
 }
 
 async function start() {
@@ -153,6 +172,8 @@ async function start() {
   });
   window.addEventListener("resize", () => tell("theme"));
   on("choose", choose);
+  on("gallery", buttons);
+  drawer();
   on("show", show);
   on("changed", describe);
   on("failed", (event) => message(sentence(event)));
@@ -162,7 +183,7 @@ async function start() {
     const answer = await api.catalog();
     entries = answer.entries;
     const wanted = decodeURIComponent(location.hash.slice(1)) || answer.first;
-    if (wanted) { await choose(wanted); } else { gallery.show(entries); }
+    if (wanted) { await choose(wanted); restore(); } else { gallery.show(entries); }
   } catch (error) {
     offline(error);
   }

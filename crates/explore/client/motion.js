@@ -2,6 +2,7 @@
 
 import { make } from "./dom.js";
 import { digits } from "./format.js";
+import * as loops from "./moving_loops.js";
 import { colour, isDark } from "./plot.js";
 import { present } from "./orbit.js";
 import { sceneOf } from "./scene.js";
@@ -26,7 +27,7 @@ export function start(place) {
   empty = make("p", { class: "empty", hidden: true });
   box = make("div", {}, make("div", { class: "tools" }, play, make("button", { type: "button", text: "◂ Step", onclick: step(-0.01) }), make("button", { type: "button", text: "Step ▸", onclick: step(0.01) }),
     make("label", {}, "Speed", speed), make("label", {}, "Scale", size), make("label", {}, "Time", position), status), canvas,
-    make("p", { class: "hint", text: "Blue: the joint sticks. Orange: it slips. Pink, dashed: it is open. Grey: springs. The arrow shows a force." }));
+    make("p", { class: "hint", text: "Blue: the joint sticks. Orange: it slips. Pink, dashed: it is open. Grey: springs. The arrow shows a force." }), loops.start());
   panel.append(empty, box);
   on("orbit", () => draw());
   on("theme", () => draw());
@@ -69,7 +70,7 @@ function draw() {
   const bounds = [...scene.masses, ...scene.ground];
   const [left, right] = [Math.min(...bounds.map((one) => one.x)) - 1.3, Math.max(...bounds.map((one) => one.x)) + 1.3];
   const [top, bottom] = [Math.min(...bounds.map((one) => one.y)) - 1.2, Math.max(...bounds.map((one) => one.y)) + 0.8];
-  const unit = Math.min(width / (right - left), Math.min(560, window.innerHeight * 0.62) / (bottom - top), 90);
+  const unit = Math.min(width / (right - left), Math.min(620, window.innerHeight * 0.55) / (bottom - top), scene.wheel ? 90 : 130);
   const height = Math.max(240, (bottom - top) * unit);
   const ratio = devicePixelRatio || 1;
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -82,7 +83,7 @@ function draw() {
   pen.clearRect(0, 0, width, height);
   const shift = (width - (right - left) * unit) / 2;
   const to = (/** @type {number} */ x, /** @type {number} */ y) => [shift + (x - left) * unit, (y - top) * unit];
-  const most = Math.max(1e-30, ...orbit.places.map((/** @type {string} */ name) => Math.max(...orbit.columns.get(`${name}_displacement_m`).map(Math.abs))));
+  const most = Math.max(1e-30, ...orbit.places.map((/** @type {string} */ name) => { const values = orbit.columns.get(`${name}_displacement_m`); return Math.max(...values) - mean(values); }));
   const gain = 0.75 * Number(size.value) / most;
   const places = new Map(bounds.map((one) => [one.name, { ...one, ...moved(orbit, one, gain) }]));
   const dark = isDark();
@@ -106,7 +107,7 @@ function draw() {
   pen.textAlign = "center";
   pen.font = `${Math.max(11, Math.min(14, unit * 0.24))}px system-ui, sans-serif`;
   scene.masses.forEach((mass, index) => {
-    const place = places.get(mass.name);
+    const place = /** @type {any} */ (places.get(mass.name));
     const [x, y] = to(place.x, place.y);
     const r = 0.45 * mass.radius * unit;
     pen.fillStyle = scene.wheel ? colour(0) : colour(index);
@@ -117,24 +118,43 @@ function draw() {
     if (scene.masses.length <= 16) { pen.fillText(mass.name, x, y - r - 6); }
     for (const force of scene.forces.filter((force) => force.on === mass.name)) {
       const size = Math.cos(2 * Math.PI * phase * force.harmonic + force.phase) * 0.6 * unit;
-      arrow(pen, [x + (r + 4) * mass.along[0], y + (r + 4) * mass.along[1]], mass.along, size, text);
+      const along = vector(mass, force.direction);
+      arrow(pen, [x + (r + 4) * along[0], y + (r + 4) * along[1]], along, size, text);
     }
   });
+  loops.draw(orbit, (column) => at(orbit, column));
   position.value = String(phase);
   status.textContent = `${digits(phase * orbit.time.at(-1) * 1e3, 3)} ms of ${digits(orbit.time.at(-1) * 1e3, 4)} ms, displacements × ${digits(gain, 2)}`;
 }
 
-/** The displaced position of a mass. @param {any} orbit @param {any} one @param {number} gain */
+/** The unit vector of a direction of a mass. On a wheel, `x` and `t` are along the circumference. @param {any} one @param {string} direction */
+function vector(one, direction) {
+  return ["", "x", "t", "t1"].includes(direction) ? one.along : direction === "y" && one.along[1] === 0 && one.along[0] === 1 ? [0, -1] : one.out;
+}
+
+/** The displaced position of a mass. The mean over the period is not drawn. @param {any} orbit @param {any} one @param {number} gain */
 function moved(orbit, one, gain) {
-  const along = { x: [1, 0], y: [0, -1], z: [0, -1], r: one.along, t: one.along, n: [0, -1] };
   let [x, y] = [one.x, one.y];
-  const own = at(orbit, `${one.name}_displacement_m`);
-  if (own !== null) { return { x: x + gain * own * one.along[0], y: y + gain * own * one.along[1] }; }
-  for (const [name, direction] of Object.entries(along)) {
-    const value = at(orbit, `${one.name}.${name}_displacement_m`) ?? at(orbit, `${one.name}_${name}_displacement_m`);
-    if (value !== null) { x += gain * value * direction[0]; y += gain * value * direction[1]; }
+  for (const direction of ["", "x", "y", "z", "r", "t", "n"]) {
+    const column = direction === "" ? `${one.name}_displacement_m` : `${one.name}.${direction}_displacement_m`;
+    const value = at(orbit, column);
+    if (value === null) { continue; }
+    const along = vector(one, direction);
+    const by = gain * (value - mean(orbit.columns.get(column)));
+    x += by * along[0];
+    y += by * along[1];
   }
   return { x, y };
+}
+
+/** The means of columns, which do not change. @type {WeakMap<number[], number>} */
+const means = new WeakMap();
+
+/** The middle of a column. @param {number[]} values */
+function mean(values) {
+  let value = means.get(values);
+  if (value === undefined) { value = (Math.max(...values) + Math.min(...values)) / 2; means.set(values, value); }
+  return value;
 }
 
 /** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} to @param {number} [width] */

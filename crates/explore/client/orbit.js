@@ -33,9 +33,11 @@ export function start(place) {
   panel.append(tools, empty, grid);
   for (const [name, title] of [["loops", "Hysteresis loops"], ["words", "Evidence"], ["time", "Motion over one period"], ["spectrum", "Harmonics of the displacement"], ["energy", "Energy per cycle"], ["multipliers", "Floquet multipliers"]]) {
     plots[name] = name === "words" ? make("ul", { id: "orbit-words" }) : make("div", { class: "plot", id: `orbit-${name}` });
-    grid.append(make("section", { class: `tile${name === "time" ? " wide" : ""}`, "aria-label": title }, make("h3", { text: title }), plots[name]));
+    grid.append(make("section", { class: `tile${name === "time" ? " wide" : ""}`, "aria-label": title }, make("h2", { text: title }), plots[name],
+      name === "time" ? make("p", { class: "hint", text: "Shading: a joint sticks (blue) or is open (pink); it slips where there is none. Several joints have one strip each." }) : null,
+      name === "time" ? make("p", { class: "hint", id: "first-sector", hidden: true, text: "The plots show the first sector of the tuned disk; the others do the same, one after the other." }) : null));
   }
-  on("opened", () => { orbit = null; wanted = ""; });
+  on("opened", () => { orbit = null; wanted = ""; grid.hidden = true; status.textContent = ""; });
   on("marker", () => { follow(); });
   on("result", () => { atPeakFirst(); follow(); });
   on("theme", () => show());
@@ -60,6 +62,7 @@ function peakFrequency(index) {
   const column = (/** @type {string} */ name) => table?.find((/** @type {any} */ one) => one.name === name)?.values;
   const [frequencies, amplitudes] = [column("frequency_Hz"), column("amplitude_m")];
   const chosen = state.result?.cases?.[index]?.values ?? [];
+  /** @type {number | null} */
   let best = null;
   for (let row = 0; row < (frequencies?.length ?? 0); row += 1) {
     const same = chosen.every((/** @type {any} */ one, /** @type {number} */ k) => Math.abs(table[k].values[row] - siLike(table[k], one)) <= 1e-9 * Math.abs(table[k].values[row]));
@@ -96,7 +99,8 @@ async function follow() {
   if (!visible) { return; }
   const shown = canShow() && state.marker;
   empty.hidden = Boolean(shown);
-  grid.hidden = tools.hidden = !shown;
+  tools.hidden = !shown;
+  grid.hidden = !shown || orbit === null;
   if (!shown) {
     empty.textContent = `A study of kind ${state.description.kind} has no orbits at an excitation frequency.`;
     return;
@@ -153,8 +157,11 @@ function read(event) {
   const joints = [...columns.keys()].filter((name) => name.endsWith("_contact")).map((name) => name.slice(0, -8));
   const labels = [...columns.keys()].filter((name) => name.endsWith("_force_N")).map((name) => name.slice(0, -8));
   const places = [...columns.keys()].filter((name) => name.endsWith("_displacement_m")).map((name) => name.slice(0, -15)).filter((name) => !labels.includes(name));
+  // the sectors of a tuned disk move alike, one after the other: the plots have the first one
+  const tuned = state.description.model?.ring?.equal === true;
+  const inFirst = (/** @type {string} */ name) => !tuned || !/_\d+(\.|$)/.test(name) || /_0(\.|$)/.test(name);
   return {
-    event, columns, first, joints, labels, places, time: columns.get("time_s"),
+    event, columns, first, joints, labels, places, tuned, shown: { joints: joints.filter(inFirst), labels: labels.filter(inFirst), places: places.filter(inFirst) }, time: columns.get("time_s"),
     multipliers: event.tables.multipliers ?? null,
   };
 }
@@ -166,6 +173,8 @@ function show() {
   spectrum();
   energy();
   multipliers();
+  const note = grid.querySelector("#first-sector");
+  note.hidden = !orbit.tuned;
   plots.words.replaceChildren(...words().map((text) => make("li", { text })));
 }
 
@@ -177,8 +186,8 @@ function lines(names, end, unit) {
 }
 
 function loops() {
-  const [x, y] = [lines(orbit.labels, "_displacement_m", "m"), lines(orbit.labels, "_force_N", "N")];
-  const data = orbit.labels.map((/** @type {string} */ name, /** @type {number} */ i) => ({ x: x.values[i], y: y.values[i], name, mode: "lines", line: { color: colour(orbit.places.length + i), width: 2, simplify: false } }));
+  const [x, y] = [lines(orbit.shown.labels, "_displacement_m", "m"), lines(orbit.shown.labels, "_force_N", "N")];
+  const data = orbit.shown.labels.map((/** @type {string} */ name, /** @type {number} */ i) => ({ x: x.values[i], y: y.values[i], name, mode: "lines", line: { color: colour(orbit.shown.places.length + i), width: 2, simplify: false } }));
   drawOwn(plots.loops, data, { height: 320, xaxis: { title: `relative displacement (${x.unit})`, range: around(x.values.flat()) }, yaxis: { title: `joint force (${y.unit})`, range: around(y.values.flat()) }, ...legendIf(data) });
 }
 
@@ -197,9 +206,9 @@ function time() {
   const { factor, unit } = scale([orbit.time.at(-1)], "s");
   const t = orbit.time.map((/** @type {number} */ value) => value * factor);
   const rows = [
-    { what: "displacement", list: lines(orbit.places, "_displacement_m", "m"), names: orbit.places, first: 0 },
-    { what: "velocity", list: lines(orbit.places, "_velocity_m_per_s", "m/s"), names: orbit.places, first: 0 },
-    { what: "joint force", list: lines(orbit.labels, "_force_N", "N"), names: orbit.labels, first: orbit.places.length },
+    { what: "displacement", list: lines(orbit.shown.places, "_displacement_m", "m"), names: orbit.shown.places, first: 0 },
+    { what: "velocity", list: lines(orbit.shown.places, "_velocity_m_per_s", "m/s"), names: orbit.shown.places, first: 0 },
+    { what: "joint force", list: lines(orbit.shown.labels, "_force_N", "N"), names: orbit.shown.labels, first: orbit.shown.places.length },
   ].filter((row) => row.names.length > 0);
   const layout = /** @type {any} */ ({ height: 150 * rows.length + 80, margin: { l: 62, r: 12, t: 40, b: 42 }, xaxis: { title: `time (${unit})`, range: [0, t.at(-1)], anchor: `y${rows.length > 1 ? rows.length : ""}` }, shapes: shading(t, rows.length) });
   const data = rows.flatMap((row, r) => {
@@ -214,7 +223,7 @@ function time() {
 
 /** Shades the times in which a joint sticks or is open. The strip of each joint is a part of the height. @param {number[]} t @param {number} rows */
 function shading(t, rows) {
-  const joints = orbit.joints.filter((/** @type {string} */ joint) => orbit.columns.get(`${joint}_contact`)?.some((/** @type {string} */ word) => word !== "")).slice(0, 6);
+  const joints = orbit.shown.joints.filter((/** @type {string} */ joint) => orbit.columns.get(`${joint}_contact`)?.some((/** @type {string} */ word) => word !== "")).slice(0, 6);
   return joints.flatMap((/** @type {string} */ joint, /** @type {number} */ j) => {
     const states = orbit.columns.get(`${joint}_contact`).map((/** @type {string} */ word) => (word.startsWith("slip") ? "slip" : word));
     const shapes = [];
@@ -232,7 +241,7 @@ function shading(t, rows) {
 }
 
 function spectrum() {
-  const data = orbit.places.map((/** @type {string} */ name, /** @type {number} */ i) => {
+  const data = orbit.shown.places.map((/** @type {string} */ name, /** @type {number} */ i) => {
     const values = [1, 2, 3, 4, 5].map((h) => orbit.first.get(`${name}_harmonic${h}_m`) ?? null);
     return { x: [1, 2, 3, 4, 5], y: values.map((value) => (value === null ? null : value * 1e3)), name, type: "bar", marker: { color: colour(i) } };
   });
@@ -255,6 +264,29 @@ function multipliers() {
   ], { xaxis: { title: "real part", range: [-1.3, 1.3] }, yaxis: { title: "imaginary part", scaleanchor: "x", range: [-1.2, 1.2] }, annotations: column("real").length === 0 ? [{ text: "not known for this method", x: 0, y: 0, showarrow: false }] : [] });
 }
 
+/** What the joints do. The joints of a ring, which have a name and a number, share a sentence. @param {(name: string) => any} get */
+function jointWords(get) {
+  /** @type {Map<string, {slip: number, open: number, loss: number}[]>} */
+  const groups = new Map();
+  for (const joint of orbit.joints) {
+    const slip = get(`${joint}_slip_fraction`);
+    if (slip === null) { continue; }
+    const name = orbit.joints.length > 6 ? joint.replace(/_\d+$/, "") : joint;
+    groups.set(name, [...(groups.get(name) ?? []), { slip, open: get(`${joint}_open_fraction`) ?? 0, loss: get(`${joint}_dissipation_J`) ?? 0 }]);
+  }
+  const share = (/** @type {number[]} */ values) => {
+    const [low, high] = [Math.min(...values), Math.max(...values)].map((value) => digits(100 * value, 3));
+    return low === high ? `${low} %` : `${low} to ${high} %`;
+  };
+  return [...groups].map(([name, list]) => {
+    const open = list.map((one) => one.open);
+    const loss = list.reduce((sum, one) => sum + one.loss, 0);
+    const who = list.length > 1 ? `${list.length} joints ${name}: slip` : `${name}: slips`;
+    const parts = [`${who} ${share(list.map((one) => one.slip))} of the period`, Math.max(...open) > 0 ? `open ${share(open)}` : "", `${list.length > 1 ? "dissipate together" : "dissipates"} ${si(loss, "J", 3)} per cycle`];
+    return `${parts.filter((part) => part !== "").join(", ")}.`;
+  });
+}
+
 /** The evidence as sentences. */
 function words() {
   const get = (/** @type {string} */ name) => orbit.first.get(name) ?? null;
@@ -267,12 +299,6 @@ function words() {
   list.push(`The motion returns to its start to ${evidence(get("return_defect") ?? get("residual"))}.`);
   if (get("truncation") !== null) { list.push(`Estimated error of the series: ${evidence(get("truncation"))}.`); }
   if (get("reduction_error") !== null) { list.push(`Error of the reduced model: ${evidence(get("reduction_error"))}.`); }
-  for (const joint of orbit.joints) {
-    const slip = get(`${joint}_slip_fraction`);
-    const open = get(`${joint}_open_fraction`);
-    const loss = get(`${joint}_dissipation_J`);
-    if (slip !== null) { list.push(`${joint}: slips ${digits(100 * slip, 3)} % of the period${open ? `, is open ${digits(100 * open, 3)} %` : ""}, and dissipates ${si(loss, "J", 3)} per cycle.`); }
-  }
-  list.push("Blue shading: a joint sticks; pink: it is open; none: it slips.");
+  list.push(...jointWords(get));
   return [...list, ...orbit.event.notes.filter((/** @type {string} */ note) => !list.includes(note))];
 }

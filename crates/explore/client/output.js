@@ -5,7 +5,7 @@ import { describe, run } from "./api.js";
 import { byId, download, make, message } from "./dom.js";
 import { peaks } from "./pins.js";
 import { picture } from "./plot.js";
-import { figurePlace } from "./response.js";
+import { pinned } from "./response.js";
 import { digits, si } from "./format.js";
 import { changeList, state, tell } from "./store.js";
 
@@ -13,7 +13,7 @@ export function start() {
   /** @type {[string, string, () => void][]} */
   const items = [
     ["save-study", "Study file", saveStudy], ["save-python", "Copy as Python", copyPython], ["save-csv", "Tables as CSV", saveTables],
-    ["save-svg", "Figure as SVG", () => picture(figurePlace(), "svg", name())], ["save-png", "Figure as PNG", () => picture(figurePlace(), "png", name())],
+    ["save-svg", "Figure as SVG", () => savePicture("svg")], ["save-png", "Figure as PNG", () => savePicture("png")],
     ["save-report", "Report of the pins (HTML)", saveReport],
   ];
   byId("save-items").append(...items.map(([id, text, action]) => make("button", { type: "button", id, text, onclick: async () => {
@@ -22,6 +22,9 @@ export function start() {
   } })));
   document.addEventListener("click", (event) => { if (!byId("save").contains(/** @type {Node} */ (event.target))) { byId("save").open = false; } });
 }
+
+/** @param {"svg" | "png"} format */
+const savePicture = (format) => state.result && picture(state.result.plot, pinned(), format, name());
 
 const name = () => `${state.description.name}_explored`;
 

@@ -52,6 +52,9 @@ function shown(quantity) {
   return { text, number };
 }
 
+/** The name of a quantity; inside a table of [study] with the name of the table. @param {any} quantity */
+const labelOf = (quantity) => (quantity.path[0] === "study" && quantity.group === "study" && quantity.path.length > 2 ? quantity.path.slice(1).join(" ") : quantity.name);
+
 /** @param {any} quantity */
 function row(quantity) {
   const key = keyOf(quantity.path);
@@ -59,7 +62,7 @@ function row(quantity) {
   const { text, number } = shown(quantity);
   const plain = number !== null && Number.isFinite(number);
   const changed = state.changes.has(key);
-  const name = make("label", { class: "name", for: id, title: quantity.doc }, quantity.name);
+  const name = make("label", { class: "name", for: id, title: quantity.doc }, labelOf(quantity));
   if (quantity.doc && quantity.group === "parameters") { name.append(make("small", { text: quantity.doc })); }
   const problem = make("span", { class: "problem", id: `${id}-problem`, role: "status", hidden: true });
   const field = make("input", {

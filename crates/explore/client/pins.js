@@ -59,9 +59,20 @@ function show() {
     panel.append(make("p", { class: "empty", text: "Nothing is pinned. Move sliders, then press “Pin this curve” beside the response: the curve stays in the plot, dashed, and its peaks are compared here." }));
     return;
   }
-  panel.append(make("div", { class: "scroll" }, make("table", {},
-    make("thead", {}, make("tr", {}, ...["Pin", "Case", "Place", "Peak at (Hz)", "Peak", ""].map((text, i) => make("th", { text, scope: "col", class: i === 3 || i === 4 ? "number" : null })))),
+  panel.append(summary(), make("h2", { text: "Peaks of every place and case" }), make("div", { class: "scroll" }, make("table", {},
+    make("thead", {}, make("tr", {}, ...["Pin", "Case", "Place", "Peak at (Hz)", "Peak", "Action"].map((text, i) => make("th", { text, scope: "col", class: i === 3 || i === 4 ? "number" : null })))),
     make("tbody", {}, ...state.pins.flatMap((/** @type {any} */ one, /** @type {number} */ index) => rows(one, index))))));
+}
+
+/** The highest peak of every pin, and how it compares with the first pin. */
+function summary() {
+  const best = state.pins.map((/** @type {any} */ pin) => peaks(pin.result).reduce((/** @type {any} */ so, /** @type {any} */ peak) => (so && so.amplitude >= peak.amplitude ? so : peak), null));
+  const change = (/** @type {any} */ one) => (one && best[0] && one !== best[0] ? `${one.amplitude > best[0].amplitude ? "+" : "−"}${digits(Math.abs(100 * (one.amplitude / best[0].amplitude - 1)), 3)} %` : "");
+  return make("div", { class: "scroll" }, make("table", { id: "pin-summary" }, make("caption", { text: "Highest peak of each pin" }),
+    make("thead", {}, make("tr", {}, ...["Pin", "Highest peak", "Against the first pin", "At (Hz)", "Place", "Case"].map((text, i) => make("th", { text, scope: "col", class: i >= 1 && i <= 3 ? "number" : null })))),
+    make("tbody", {}, ...state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => make("tr", {}, make("th", { scope: "row", text: pin.name }),
+      make("td", { class: "number", text: best[index] ? si(best[index].amplitude, "m", 4) : "–" }), make("td", { class: "number", text: change(best[index]) }),
+      make("td", { class: "number", text: best[index]?.frequency ? digits(best[index].frequency, 6) : "" }), make("td", { text: best[index]?.mass ?? "" }), make("td", { text: best[index]?.case ?? "" }))))));
 }
 
 /** The highest peak of every place in every case. @param {any[]} list */

@@ -12,46 +12,105 @@ const CONFIG = {
 
 export const isDark = () => document.documentElement.dataset.theme === "dark";
 
-/** A copy with the dark counterparts of all colours. @param {any} value @param {Record<string, string>} dark */
-function tinted(value, dark) {
+/** A copy with the dark counterparts of all colours. @param {any} value @param {Record<string, string>} dark @param {boolean} [wanted] false keeps the light colours */
+function tinted(value, dark, wanted = isDark()) {
   return JSON.parse(JSON.stringify(value), (key, item) =>
-    (typeof item === "string" && !WORDS.has(key) && isDark() && dark[item]) || item);
+    (typeof item === "string" && !WORDS.has(key) && wanted && dark[item]) || item);
 }
 
 /** Hidden legend groups by plot. @type {WeakMap<any, Set<string>>} */
 const hidden = new WeakMap();
 
 /**
+ * @typedef {{plot: any, opacity: number, name?: string, dash?: string}} Behind a figure whose curves are drawn behind
+ */
+
+/**
  * Draws a figure of the server.
  * @param {any} place
  * @param {any} plot data of the server
- * @param {{behind?: {plot: any, opacity: number, name?: string, dash?: string, colour?: string}[], shapes?: any[], height?: number}} [more]
+ * @param {{behind?: Behind[], shapes?: any[], height?: number}} [more]
  */
 export async function draw(place, plot, more = {}) {
   const wide = place.clientWidth > plot.break || plot.axes.length === 1;
-  const layout = tinted(wide ? plot.wide : plot.narrow, plot.dark);
+  const { data, layout } = figure(plot, { behind: more.behind ?? [], wide, dark: isDark() });
   layout.autosize = true;
   delete layout.width;
   const least = more.height ?? 0;
-  layout.height = plot.axes.length === 1 ? Math.max(340, least) : Math.max(layout.height, Math.min(least, 1.3 * layout.height));
+  // several panels shrink a little, so that all of them are seen at once
+  const lowest = (wide ? 0.82 : 1) * layout.height;
+  layout.height = plot.axes.length === 1 ? Math.max(340, least) : Math.min(Math.max(least, lowest), 1.3 * layout.height);
   // plotly.js takes the height of the element when the window changes its size
   place.style.height = `${layout.height}px`;
   layout.paper_bgcolor = layout.plot_bgcolor = "rgba(0,0,0,0)";
   layout.shapes = [...(layout.shapes ?? []), ...(more.shapes ?? [])];
   layout.uirevision = place.dataset.revision ?? "same";
   const off = hidden.get(place) ?? new Set();
-  const data = tinted(plot.data, plot.dark).map(plain);
   for (const trace of data) { if (off.has(trace.legendgroup)) { trace.visible = false; } }
-  const behind = (more.behind ?? []).flatMap((other) => {
-    if (other.plot.axes.length !== plot.axes.length) { return []; }
-    const lines = tinted(other.plot.data, other.plot.dark).filter((/** @type {any} */ trace) => trace.mode === "lines");
-    return lines.map((/** @type {any} */ trace) => {
-      const line = { ...trace.line, ...(other.dash ? { dash: other.dash } : {}), ...(other.colour ? { color: other.colour } : {}) };
-      const name = other.name ? { hovertemplate: trace.hovertemplate.replace("<extra>", `<extra>${other.name}: `) } : { hoverinfo: "skip", hovertemplate: null };
-      return { ...plain(trace), ...name, line, opacity: other.opacity, showlegend: false, legendgroup: "" };
-    });
+  await Plotly.react(place, data, layout, CONFIG);
+}
+
+/** The traces and the layout of a figure with other curves behind its own. @param {any} plot @param {{behind: Behind[], wide: boolean, dark: boolean}} how */
+function figure(plot, { behind, wide, dark }) {
+  const layout = tinted(wide ? plot.wide : plot.narrow, plot.dark, dark);
+  const others = behind.flatMap((other) => {
+    const lines = tinted(other.plot.data, other.plot.dark, dark).filter((/** @type {any} */ trace) => trace.mode === "lines" && !REFERENCE.test(trace.legendgroup ?? ""));
+    return lines.flatMap((/** @type {any} */ trace) => panelsFor(other.plot, plot, panelOf(trace)).map((/** @type {number} */ panel) => {
+      const title = other.plot.axes[panelOf(trace)].title;
+      const owner = [other.name, title].filter((part) => part).join(", ");
+      const name = other.name && trace.hovertemplate ? { hovertemplate: trace.hovertemplate.replace("<extra>", `<extra>${owner}: `) } : { hoverinfo: "skip", hovertemplate: null };
+      const line = { ...trace.line, ...(other.dash ? { dash: other.dash } : {}) };
+      return { ...plain(moved(trace, other.plot, plot, panel)), ...name, line, opacity: other.opacity, legendgroup: "", owner: other.name };
+    }));
   });
-  await Plotly.react(place, [...behind, ...data], layout, CONFIG);
+  extend(layout, others.filter((trace) => trace.owner));
+  const data = [...others, ...tinted(plot.data, plot.dark, dark).map(plain)];
+  return { data, layout };
+}
+
+/** Extends the vertical axes for pinned curves. @param {any} layout @param {any[]} traces */
+function extend(layout, traces) {
+  for (const trace of traces) {
+    const axis = layout[`yaxis${trace.yaxis.slice(1)}`];
+    if (!axis?.range) { continue; }
+    const most = trace.y.reduce((/** @type {number} */ so, /** @type {number | null} */ value) => Math.max(so, value ?? -Infinity), -Infinity);
+    const end = axis.type === "log" ? Math.log10(most) : most;
+    const [low, high] = axis.range;
+    if (end > high) { axis.range = [low, end + 0.05 * (end - low)]; }
+  }
+}
+
+/** Names of linear curves, which belong to the present values only. */
+const REFERENCE = /joints (free|stuck)/;
+
+/** The number of the panel of a trace, from 0. @param {any} trace */
+const panelOf = (trace) => Number((trace.xaxis ?? "x").slice(1) || 1) - 1;
+
+/**
+ * The panels in which a curve of another figure belongs: that with the same title, or all if one
+ * of the figures has a single panel. A curve of another quantity belongs nowhere.
+ * @param {any} from @param {any} to @param {number} panel
+ */
+function panelsFor(from, to, panel) {
+  const own = from.axes[panel];
+  if (!own) { return []; }
+  const all = to.axes.map((/** @type {any} */ _, /** @type {number} */ index) => index);
+  const same = all.filter((/** @type {number} */ index) => ["x", "y"].every((letter) => ["quantity", "unit"].every((key) => own[letter][key] === to.axes[index][letter][key])));
+  const titled = same.filter((/** @type {number} */ index) => to.axes[index].title === own.title);
+  if (titled.length > 0) { return titled; }
+  if (from.axes.length === to.axes.length) { return same.filter((/** @type {number} */ index) => index === panel); }
+  return from.axes.length === 1 || to.axes.length === 1 ? same : [];
+}
+
+/** A trace in a panel of another figure, whose axes may leave out other powers of ten. @param {any} trace @param {any} from @param {any} to @param {number} panel */
+function moved(trace, from, to, panel) {
+  const name = panel === 0 ? "" : String(panel + 1);
+  const own = panelOf(trace);
+  const scaled = (/** @type {"x" | "y"} */ letter) => {
+    const power = from.axes[own][letter].power - to.axes[panel][letter].power;
+    return power === 0 ? trace[letter] : trace[letter].map((/** @type {number | null} */ value) => (value === null ? null : value * 10 ** power));
+  };
+  return { ...trace, x: scaled("x"), y: scaled("y"), xaxis: `x${name}`, yaxis: `y${name}` };
 }
 
 /** Drawing by the graphics processor needs scripts that the policy of the page forbids. @param {any} trace */
@@ -139,9 +198,24 @@ export function drawOwn(place, data, layout) {
   return Plotly.react(place, data, whole, { ...CONFIG, displayModeBar: false });
 }
 
-/** Saves a plot as a picture on white. @param {any} place @param {"svg" | "png"} format @param {string} filename */
-export function picture(place, format, filename) {
-  return Plotly.downloadImage(place, { format, filename, width: place.clientWidth, height: place.clientHeight, scale: format === "png" ? 2 : 1 });
+/**
+ * Saves a figure as a picture: on white, with its title and legend.
+ * @param {any} plot data of the server @param {Behind[]} behind @param {"svg" | "png"} format @param {string} filename
+ */
+export function picture(plot, behind, format, filename) {
+  const { data, layout } = figure(plot, { behind, wide: true, dark: false });
+  const named = new Set();
+  for (const trace of plot.data) {
+    const own = data.find((/** @type {any} */ other) => other.legendgroup === trace.legendgroup && other.name === trace.name);
+    if (trace.showlegend && own && !named.has(trace.legendgroup)) { own.showlegend = true; named.add(trace.legendgroup); }
+  }
+  behind.forEach((other) => {
+    const first = data.find((/** @type {any} */ trace) => trace.owner === other.name);
+    if (other.name && first) { Object.assign(first, { showlegend: true, name: other.name }); }
+  });
+  const height = Math.max(layout.height ?? 0, 520) + 60;
+  const more = { showlegend: named.size > 0, legend: { orientation: "h", y: -0.12, yanchor: "top" }, paper_bgcolor: "#ffffff", plot_bgcolor: "#ffffff" };
+  return Plotly.downloadImage({ data, layout: { ...layout, ...more, height, margin: { ...layout.margin, b: 110 } } }, { format, filename, width: 1000, height, scale: format === "png" ? 2 : 1 });
 }
 
 /** @param {any} place */

@@ -18,6 +18,8 @@ let place, status, button, legendPlace, hint, quantity, panels, logarithmic, emp
 let cost = { seconds: 0, points: 0 };
 /** The curve before the last change. @type {any} */
 let previous = null;
+/** The finished part of a run that takes long. @type {any} */
+let partial = null;
 /** @type {any} */
 let timer = 0;
 /** True until the user has asked for a long study. */
@@ -51,7 +53,7 @@ export function start(panel) {
     tell("show", "orbit");
   });
   draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
-  on("opened", () => { previous = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
+  on("opened", () => { previous = partial = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
   on("moving", () => compute(true));
   on("changed", () => compute(false));
   on("theme", () => show());
@@ -60,7 +62,11 @@ export function start(panel) {
   on("tab", (/** @type {string} */ name) => { if (name === "response") { show(); } });
 }
 
-const hasOrbits = () => ["response", "branch"].includes(state.description.kind);
+/** Whether the curves are over frequency, so that a click finds an orbit. */
+const hasOrbits = () => {
+  const axis = (partial ?? state.result)?.plot.axes[0]?.x;
+  return ["response", "branch"].includes(state.description.kind) && (axis ? axis.quantity.includes("frequency") : state.description.kind === "response");
+};
 
 function opened() {
   for (const element of document.querySelectorAll(".only-response")) { /** @type {any} */ (element).hidden = state.description.kind !== "response"; }
@@ -74,7 +80,8 @@ function opened() {
 async function compute(moving, asked = false) {
   clearTimeout(timer);
   if (moving && cost.seconds > PATIENCE) { stale(); return; }
-  if (!moving && !asked && cost.seconds > PATIENCE) { stale(); return; }
+  // the change may have made the study short: the server estimates its time again
+  const first = !asked && (waiting || cost.seconds > PATIENCE);
   if (moving) {
     timer = setTimeout(() => compute(false), REST);
     // one run at a time while the slider moves: the next one takes the newest values
@@ -86,7 +93,6 @@ async function compute(moving, asked = false) {
   const reduced = moving && state.description.kind === "response" && cost.seconds > LIVE ? few : null;
   const begun = performance.now();
   inFlight = true;
-  const first = waiting;
   const request = {
     study: state.study, changes: changeList(), wait: first, quantity: quantity.value || null,
     view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" && logarithmic.checked ? "log" : null, panels: panels.value || null },
@@ -97,7 +103,15 @@ async function compute(moving, asked = false) {
     const event = await run("study", request, (event) => {
       if (event.event === "begin") { points_done = event.points ?? 0; }
       if (event.event === "progress" && performance.now() - begun > 500) {
-        status.textContent = points_done ? `${event.done} of ${points_done} points` : `${event.done} points`;
+        status.textContent = points_done ? `${event.done} of ${points_done} points${remaining(event.done, points_done, performance.now() - begun)}` : `${event.done} points`;
+      }
+      if (event.event === "partial") {
+        partial = event;
+        empty.hidden = true;
+        place.hidden = false;
+        place.classList.remove("stale");
+        show();
+        tell("partial", event);
       }
     });
     clearTimeout(late);
@@ -106,6 +120,7 @@ async function compute(moving, asked = false) {
   } catch (error) {
     place.classList.remove("stale");
     status.textContent = "";
+    partial = null;
     tell("offline", error);
   } finally {
     inFlight = false;
@@ -113,13 +128,21 @@ async function compute(moving, asked = false) {
   }
 }
 
+/** The remaining time, if it is worth a word. @param {number} done @param {number} all @param {number} time ms */
+function remaining(done, all, time) {
+  const seconds = time / 1000 * (all - done) / Math.max(done, 1);
+  return seconds > 2 ? `, ${duration(seconds)} left` : "";
+}
+
 /** @param {any} event @param {boolean} reduced @param {number} seconds */
 function take(event, reduced, seconds) {
+  partial = null;
   place.classList.remove("stale");
   if (event.event === "expect") {
     waiting = true;
     cost = { seconds: Infinity, points: 0 };
-    explain(`This study takes ${event.text}.`, "Compute");
+    explain(`This study takes ${event.text}.`, "Compute", state.result !== null);
+    place.classList.toggle("stale", state.result !== null);
     status.textContent = "";
     return;
   }
@@ -133,10 +156,10 @@ function take(event, reduced, seconds) {
   message();
   empty.hidden = true;
   place.hidden = false;
-  hint.hidden = !hasOrbits();
   if (!reduced) { cost = { seconds, points: state.description.points }; }
   if (!reduced && state.result && !state.result.reduced) { previous = state.result; }
   state.result = { ...event, reduced };
+  hint.hidden = !hasOrbits();
   status.textContent = reduced ? "fewer points while moving" : duration(seconds);
   show();
   tell("result", state.result);
@@ -160,14 +183,16 @@ function explain(text, action, keep = false) {
 }
 
 const show = perFrame(() => {
-  if (!state.result || place.closest("[hidden]")) { return; }
-  const { plot } = state.result;
+  const shown = partial ?? state.result;
+  if (!shown || place.closest("[hidden]")) { return; }
+  const { plot } = shown;
   legend(legendPlace, plot, place);
-  const behind = state.pins.map((/** @type {any} */ pin) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: "dash" }));
-  if (previous && previous !== state.result) { behind.push({ plot: previous.plot, opacity: 0.28 }); }
+  for (const pin of state.pins) { legendPlace.append(make("span", { class: "pin", text: `– – ${pin.name}` })); }
+  const behind = pinned();
+  if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: 0.28 }); }
   // the figure fills the window; on a narrow page it leaves room for the parameters
   const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - 110;
-  const height = Math.max(340, window.innerWidth < 820 ? 0 : free);
+  const height = window.innerWidth < 820 ? plot.narrow?.height ?? 340 : Math.max(340, free);
   draw(place, plot, { behind, shapes: markers(plot), height }).then(drawn);
 });
 
@@ -205,7 +230,7 @@ function drawn() {
   listened = true;
   place.on("plotly_click", (/** @type {any} */ event) => {
     const point = event.points?.find((/** @type {any} */ point) => point.data.hoverinfo !== "skip");
-    if (!point || !hasOrbits()) { return; }
+    if (!point || !hasOrbits() || !state.result || partial) { return; }
     const index = Number((point.xaxis._name.match(/\d+/) ?? [1])[0]) - 1;
     const label = point.data.legendgroup;
     const found = state.result.cases.findIndex((/** @type {any} */ one) => one.label === label);
@@ -227,5 +252,5 @@ export function mark(frequency, index, last) {
   tell("marker", last);
 }
 
-/** The element of the figure, for pictures. */
-export const figurePlace = () => place;
+/** The pinned curves, to be drawn behind. @returns {import("./plot.js").Behind[]} */
+export const pinned = () => state.pins.map((/** @type {any} */ pin) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: "dash" }));

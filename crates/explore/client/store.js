@@ -61,6 +61,23 @@ export function change(list) {
   tell("moving");
 }
 
+/** Keeps the changes for a reload of this tab. */
+function keep() {
+  sessionStorage.setItem(`changes:${state.study}`, JSON.stringify([...state.changes]));
+}
+
+/** Takes the changes of this tab before its reload. */
+export function restore() {
+  const kept = sessionStorage.getItem(`changes:${state.study}`);
+  const changes = kept ? new Map(JSON.parse(kept)) : new Map();
+  if (changes.size === 0) { return; }
+  past.push(state.changes);
+  state.changes = /** @type {Map<string, Change>} */ (changes);
+  tell("changed");
+}
+
+on("changed", keep);
+
 /** Ends a movement: one step of undo. */
 export function commit() {
   if (!before) { return; }
@@ -118,6 +135,7 @@ export function setQuantity(quantity, text) {
   const value = quantity.unit === "" && quantity.number !== null && /^[\d.+-]/.test(text)
     ? (quantity.range === "count" ? { count: Math.round(Number(text)) } : { number: Number(text) })
     : { text };
+  /** @type {Change[]} */
   const list = [{ path: quantity.path, value }];
   if (quantity.varied) { list.push({ path: ["study", "vary", quantity.name], value: "remove" }); }
   return list;

@@ -2,6 +2,7 @@
 //! `python/stickslip`.
 
 mod error;
+mod explorer;
 mod law;
 mod lock;
 mod model;
@@ -19,6 +20,8 @@ mod _core {
     use pyo3::prelude::*;
     use pyo3::types::PyDict;
 
+    #[pymodule_export]
+    use crate::explorer::PyExplorer;
     #[pymodule_export]
     use crate::law::{_law, _rate_law};
     #[pymodule_export]

@@ -1,5 +1,6 @@
 //! Studies from files, texts and dictionaries: reading, checking and running.
 
+use crate::explorer::PyExplorer;
 use crate::model::PyModel;
 use crate::progress::{bar, close};
 use crate::result::{PyResultSet, Table};
@@ -13,6 +14,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use stickslip::dimension::Dimension;
 use stickslip::model::Model;
+use stickslip_explore::catalog::Source;
+use stickslip_explore::change::{Change, NewValue, changed};
+use stickslip_explore::quantities::{path, quantities};
 use stickslip_study::dataset::{self, CellValues, Column};
 use stickslip_study::result_block::{Block, Tally};
 use stickslip_study::run::{CheckedStudy, check, figure_of_tables, units};
@@ -127,6 +131,36 @@ fn typed(
 
 #[pymethods]
 impl PyStudy {
+    /// Opens the study in the explorer: a page whose curves follow the parameters.
+    ///
+    /// A notebook shows the page in a frame of this height, px. ``port`` 0 takes a free port.
+    ///
+    /// >>> import stickslip
+    /// >>> explorer = stickslip.Study.from_template("blade-couple").explore()
+    /// >>> explorer.address.startswith("http://127.0.0.1:")
+    /// True
+    /// >>> explorer.stop()
+    #[pyo3(signature = (*, port = 0, height = 900))]
+    fn explore(&self, py: Python<'_>, port: u16, height: u32) -> PyResult<PyExplorer> {
+        let wrong = |cause: String| error::exception(py, "StudyError", cause);
+        if let Some(method) = &self.method {
+            let advice = "the explorer uses the method of the study: write it into [method]";
+            return Err(wrong(format!("`{method}` was chosen by a call; {advice}")));
+        }
+        let text = self.study.text();
+        let document = changed(text, &[]).map_err(|cause| wrong(cause.to_string()))?;
+        let known = quantities(&document);
+        let is_varied = |name: &str| known.iter().any(|one| one.name == name && one.varied.is_some());
+        let changes = self.overrides.iter().flat_map(|(name, value)| {
+            let at = |table: &str| path(&format!("{table}.{name}"));
+            let own = Change { path: at("parameters"), value: NewValue::Text(value.clone()) };
+            let varied = is_varied(name).then(|| Change { path: at("study.vary"), value: NewValue::Remove });
+            std::iter::once(own).chain(varied)
+        });
+        let text = changed(text, &changes.collect::<Vec<_>>()).map_err(|cause| wrong(cause.to_string()))?;
+        PyExplorer::start(py, Source { file: self.file.clone(), text: text.to_string() }, port, height)
+    }
+
     /// Reads the study file (TOML) at ``path``.
     ///
     /// Keyword arguments change the values of parameters, as ``--set`` does.

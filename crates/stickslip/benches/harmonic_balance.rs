@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Instant;
 use stickslip::curve::performance::Performance;
+use stickslip::curve::sweep::Watch;
 use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, Solver, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
@@ -175,6 +176,7 @@ fn performance_curve_50_slip_limits(bencher: Bencher) {
             range: (TAU * 120.0, TAU * 121.5),
             points: 31,
             quantities: &|orbit| vec![orbit.places[0].amplitude()],
+            watch: Watch::none(),
         }
         .curve(&limits)
         .unwrap();

@@ -27,7 +27,10 @@ pub use case::stress_stiffening::StiffnessExports;
 pub use case::study::{Case, MethodChoice, Study, VariedValue};
 pub use case::values::{Frequencies, Values, hertz};
 pub use check::{memory_limit, size, summary};
-pub use compile::read::{TemplateParameter, read_bytes, read_document, read_file, read_for_results, read_study};
+pub use compile::read::{
+    StructureCache, StructureCacheSettings, TemplateParameter, read_bytes, read_document, read_file, read_for_results,
+    read_study, read_study_with,
+};
 pub use compile::templates;
 pub use results::{dataset, decimation};
 pub use run::{result_block, work};

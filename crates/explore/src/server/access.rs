@@ -41,6 +41,11 @@ impl Access {
         Ok(Access { token, port, embedding })
     }
 
+    /// Takes the token of an earlier server.
+    pub fn with_token(port: u16, embedding: Embedding, token: String) -> Access {
+        Access { token, port, embedding }
+    }
+
     /// Returns the address of the page.
     pub fn address(&self) -> String {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)

@@ -1,9 +1,10 @@
 //! Accepts connections on the loopback address and limits them.
 //!
-//! A client that sends its request slowly is disconnected, and the number of connections is
-//! bounded: the server serves one person, or a few windows of one person.
+//! A client that sends its request or reads its answer slowly is disconnected, and the number
+//! of connections is bounded: the server serves one person, or a few windows of one person.
 
 use super::routes::{State, answer};
+use super::timed_stream::TimedStream;
 use axum::body::Body;
 use axum::http::Request;
 use hyper::body::Incoming;
@@ -24,11 +25,14 @@ struct ConnectionSettings {
     connections: usize,
     /// Time in which the head of a request must arrive. Default 10 s.
     head: Duration,
+    /// Time after which a client that does not read its answer is disconnected. Default 20 s:
+    /// a page in the background may pause for some seconds.
+    write: Duration,
 }
 
 impl Default for ConnectionSettings {
     fn default() -> Self {
-        ConnectionSettings { connections: 96, head: Duration::from_secs(10) }
+        ConnectionSettings { connections: 96, head: Duration::from_secs(10), write: Duration::from_secs(20) }
     }
 }
 
@@ -69,7 +73,7 @@ async fn accept(listener: tokio::net::TcpListener, state: &Arc<State>) {
             let connection = http1::Builder::new()
                 .timer(TokioTimer::new())
                 .header_read_timeout(settings.head)
-                .serve_connection(TokioIo::new(stream), service);
+                .serve_connection(TokioIo::new(TimedStream::new(stream, settings.write)), service);
             // a client that disappears is no error of the server
             let _ = connection.await;
             drop(place);

@@ -4,13 +4,15 @@
 //! - `assets`: the files of the page, which are part of the program;
 //! - `routes`: what every address answers;
 //! - `runs`: runs of studies, of which the newest of a page wins;
-//! - `connections`: accepts connections and limits them.
+//! - `connections`: accepts connections and limits them;
+//! - `timed_stream`: a connection whose client must read.
 
 mod access;
 mod assets;
 mod connections;
 mod routes;
 mod runs;
+mod timed_stream;
 
 pub use access::Embedding;
 
@@ -37,13 +39,16 @@ pub struct Settings {
     pub threads: usize,
     /// Pages that may contain the page in a frame. Default [`Embedding::Never`].
     pub embedding: Embedding,
+    /// The token of an earlier server, so that its open pages continue. Default none: a random
+    /// token.
+    pub token: Option<String>,
 }
 
 impl Settings {
     /// Default settings: the gallery of the current folder on a free port.
     pub fn new(start: Start) -> Settings {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Settings { start, folder: PathBuf::from("."), port: 0, threads, embedding: Embedding::Never }
+        Settings { start, folder: PathBuf::from("."), port: 0, threads, embedding: Embedding::Never, token: None }
     }
 }
 
@@ -125,7 +130,14 @@ impl Server {
             .and_then(|listener| listener.set_nonblocking(true).map(|()| listener))
             .map_err(|cause| ExploreError::Port { port, cause })?;
         let port = listener.local_addr().map_err(|cause| ExploreError::Port { port, cause })?.port();
-        let access = Access::new(port, settings.embedding).map_err(ExploreError::System)?;
+        let access = match settings.token {
+            // shorter ones could be guessed
+            Some(token) if token.len() < 32 => {
+                return Err(ExploreError::System("a token needs at least 32 characters".to_owned()));
+            }
+            Some(token) => Access::with_token(port, settings.embedding, token),
+            None => Access::new(port, settings.embedding).map_err(ExploreError::System)?,
+        };
         let address = access.address();
         let state = Arc::new(State::new(catalog, access, first, settings.threads));
         let (end, ended) = oneshot::channel();

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-use stickslip_study::read_study;
+use stickslip_study::{StructureCache, read_study_with};
 
 /// State of the server.
 #[derive(Debug)]
@@ -23,6 +23,8 @@ pub(crate) struct State {
     pub catalog: Catalog,
     pub runs: Runs,
     pub threads: usize,
+    /// The structures of the last studies, so that a change of a joint reduces no matrices again.
+    pub structures: Arc<StructureCache>,
     access: Access,
     /// The study that the page shows first.
     first: Option<String>,
@@ -52,7 +54,16 @@ impl Default for RequestSettings {
 impl State {
     pub fn new(catalog: Catalog, access: Access, first: Option<String>, threads: usize) -> State {
         let settings = RequestSettings::default();
-        State { catalog, runs: Runs::default(), threads, access, first, rate: Rate::new(), settings }
+        State {
+            catalog,
+            runs: Runs::default(),
+            threads,
+            structures: Arc::default(),
+            access,
+            first,
+            rate: Rate::new(),
+            settings,
+        }
     }
 
     /// Stops all runs.
@@ -158,7 +169,7 @@ fn describe(state: &State, request: &DescribeRequest) -> Value {
         Ok(document) => document,
         Err(error) => return wrong(error.to_string()),
     };
-    match read_study(&file, &document.to_string(), &[]) {
+    match read_study_with(&file, &document.to_string(), &state.structures) {
         Ok(study) => description::describe(&study, &document),
         Err(error) => description::error(&error, &Source { file, text }),
     }

@@ -1,12 +1,13 @@
 //! Runs of studies. The newest run of a page wins: it stops the older one of the same slot.
 //!
-//! An answer is a sequence of lines, each a JSON object: `begin`, `progress`, and at the end
+//! An answer is a sequence of lines, each a JSON object: `begin`, `progress`, `partial` (the
+//! results of the finished units of a run that takes long), and at the end
 //! `result`, `error`, `expect` (the study takes long and waits) or `superseded`. A client that
 //! disappears stops its run.
 
 use super::access::Refusal;
 use super::routes::State;
-use crate::study::answer::{Tables, answer};
+use crate::study::answer::{Tables, answer, partial_answer};
 use crate::study::catalog::Source;
 use crate::study::change::{Change, changed};
 use crate::study::description;
@@ -22,8 +23,9 @@ use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
-use stickslip_study::read_study;
+use std::time::{Duration, Instant};
+use stickslip_study::read_study_with;
+use stickslip_study::result_block::Block;
 use stickslip_study::run::{CheckedStudy, Context, ExpectedTime, check};
 use tokio::sync::mpsc;
 
@@ -64,13 +66,23 @@ struct RunSettings {
     patience: f64,
     /// Interval between two lines of progress. Default 100 ms.
     progress: Duration,
+    /// Least interval between two partial results. Default 300 ms; a figure that takes long to
+    /// make is sent less often.
+    partial: Duration,
     /// Memory limit of a run, bytes. Default 1 GB: several runs fit into the memory of a laptop.
     memory: u64,
 }
 
 impl Default for RunSettings {
     fn default() -> Self {
-        RunSettings { runs: 24, name: 64, patience: 2.0, progress: Duration::from_millis(100), memory: 1_000_000_000 }
+        RunSettings {
+            runs: 24,
+            name: 64,
+            patience: 2.0,
+            progress: Duration::from_millis(100),
+            partial: Duration::from_millis(300),
+            memory: 1_000_000_000,
+        }
     }
 }
 
@@ -157,8 +169,11 @@ pub(crate) fn start(state: Arc<State>, request: RunRequest) -> Result<Body, Refu
     let progress = send.clone();
     let points = Arc::new(AtomicUsize::new(0));
     let (counted, stop) = (points.clone(), run.stop.clone());
+    let unread = Arc::new(AtomicBool::new(false));
+    let read = unread.clone();
     tokio::task::spawn_blocking(move || {
-        let last = catch_unwind(AssertUnwindSafe(|| execute(&run, &request, &points, &send)));
+        let answers = Answers { send: send.clone(), unread };
+        let last = catch_unwind(AssertUnwindSafe(|| execute(&run, &request, &points, &answers)));
         let last = last.unwrap_or_else(|_| {
             json!({ "event": "error", "message": "the computation failed; this is a bug of Stickslip, please report the study" })
         });
@@ -181,31 +196,56 @@ pub(crate) fn start(state: Arc<State>, request: RunRequest) -> Result<Body, Refu
             }
         }
     });
-    let lines = stream::unfold(Some((receive, guard)), |open| async move {
-        let (mut receive, guard) = open?;
+    let lines = stream::unfold(Some((receive, guard, read)), |open| async move {
+        let (mut receive, guard, read) = open?;
         let value: Value = receive.recv().await?;
+        if value["event"] == "partial" {
+            read.store(false, Ordering::Relaxed);
+        }
         // the answer ends with its last event, even if a report of progress is still on its way
-        let goes_on = value["event"] == "begin" || value["event"] == "progress";
-        let rest = goes_on.then_some((receive, guard));
+        let goes_on = ["begin", "progress", "partial"].iter().any(|event| value["event"] == *event);
+        let rest = goes_on.then_some((receive, guard, read));
         Some((Ok::<String, Infallible>(format!("{value}\n")), rest))
     });
     Ok(Body::from_stream(lines))
 }
 
+/// The way of the events of a run to its client.
+struct Answers {
+    send: mpsc::UnboundedSender<Value>,
+    /// True while the client has not read the last partial result.
+    unread: Arc<AtomicBool>,
+}
+
+/// When partial results are sent.
+struct PartialResults {
+    due: Instant,
+    least: Duration,
+}
+
+impl PartialResults {
+    /// Sends a partial result if it is time for one and the client has read the last one.
+    fn send(&mut self, answers: &Answers, result: impl FnOnce() -> Value) {
+        let begun = Instant::now();
+        if begun < self.due || answers.unread.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        // the receiver is gone if the client is
+        let _ = answers.send.send(result());
+        // at most a tenth of the time is spent on partial results
+        self.due = Instant::now() + self.least.max(9 * begun.elapsed());
+    }
+}
+
 /// Computes the last line of an answer. `points` counts finished points, and is the largest
 /// number at the end.
-fn execute(run: &Run, request: &RunRequest, points: &Arc<AtomicUsize>, send: &mpsc::UnboundedSender<Value>) -> Value {
-    let last = compute(run, request, points, send).unwrap_or_else(|error| error);
+fn execute(run: &Run, request: &RunRequest, points: &Arc<AtomicUsize>, answers: &Answers) -> Value {
+    let last = compute(run, request, points, answers).unwrap_or_else(|error| error);
     points.store(usize::MAX, Ordering::Relaxed);
     last
 }
 
-fn compute(
-    run: &Run,
-    request: &RunRequest,
-    points: &Arc<AtomicUsize>,
-    send: &mpsc::UnboundedSender<Value>,
-) -> Result<Value, Value> {
+fn compute(run: &Run, request: &RunRequest, points: &Arc<AtomicUsize>, answers: &Answers) -> Result<Value, Value> {
     let wrong = |message: String| json!({ "event": "error", "message": message });
     let settings = run.state.runs.settings;
     let source = run.state.catalog.source(&request.study).map_err(wrong)?;
@@ -217,7 +257,8 @@ fn compute(
     show(&mut document, &view, &ViewSettings::default()).map_err(|error| wrong(error.to_string()))?;
     let Source { file, .. } = &source;
     let invalid = |error| description::error(&error, &source);
-    let study = read_study(file, &document.to_string(), &[]).map_err(invalid)?.with_memory_limit(settings.memory);
+    let study = read_study_with(file, &document.to_string(), &run.state.structures).map_err(invalid)?;
+    let study = study.with_memory_limit(settings.memory);
     let checked = check(&study).map_err(invalid)?;
     if request.wait
         && let Some(expected) = long(&checked, run, settings.patience)
@@ -226,14 +267,16 @@ fn compute(
     }
     let all = (!study.is_adaptive()).then(|| study.points());
     // the receiver is gone if the client is
-    let _ = send.send(json!({ "event": "begin", "points": all }));
+    let _ = answers.send.send(json!({ "event": "begin", "points": all }));
     let counter = points.clone();
     let context = Context {
         threads: run.state.threads,
         stop: run.stop.clone(),
         finished: Arc::new(move || _ = counter.fetch_add(1, Ordering::Relaxed)),
     };
-    let dataset = checked.run(&context).map_err(invalid)?;
+    let mut partial = PartialResults { due: Instant::now() + settings.partial, least: settings.partial };
+    let mut seen = |block: &Block| partial.send(answers, || partial_answer(&study, block));
+    let dataset = checked.run_in_parts(&context, &mut seen).map_err(invalid)?;
     if run.stop.load(Ordering::Relaxed) {
         return Ok(Value::Null);
     }

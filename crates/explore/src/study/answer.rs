@@ -2,16 +2,20 @@
 //! how far to trust them.
 
 use super::description::cases;
+use super::measured;
 use super::response_quantity::ResponseQuantity;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use stickslip_report::html;
 use stickslip_study::Study;
 use stickslip_study::dataset::{CellValues, Dataset, Table};
+use stickslip_study::result_block::Block;
 use stickslip_study::results::worst_evidence;
+use stickslip_study::run::figure_of_tables;
 
 /// Tables that every answer contains: those with few rows.
-const SMALL_TABLES: [&str; 6] = ["peaks", "optimum", "turns", "decay_summary", "modes_summary", "loops_summary"];
+const SMALL_TABLES: [&str; 7] =
+    ["peaks", "optimum", "turns", "decay_summary", "modes_summary", "loops_summary", "amplification"];
 /// Largest number of failures that an answer names.
 const NAMED_FAILURES: usize = 40;
 
@@ -27,17 +31,16 @@ pub enum Tables {
 /// Returns the results of a run.
 pub fn answer(study: &Study, dataset: &Dataset, tables: Tables, quantity: Option<ResponseQuantity>) -> Value {
     let own = quantity.and_then(|quantity| quantity.figure(study, dataset));
-    let figure = own.as_ref().unwrap_or(&dataset.figure);
-    let shown =
-        dataset.tables.iter().filter(|table| tables == Tables::All || SMALL_TABLES.contains(&table.name.as_str()));
+    let mut figure = own.unwrap_or_else(|| dataset.figure.clone());
+    measured::add(study, &mut figure);
     let evidence = worst_evidence(dataset);
     json!({
         "event": "result",
         "kind": dataset.kind,
         "title": dataset.title,
-        "plot": html::plot(figure),
+        "plot": html::plot(&figure),
         "cases": cases(study),
-        "tables": shown.map(|table| (table.name.clone(), table_json(table))).collect::<Map<_, _>>(),
+        "tables": tables_json(&dataset.tables, tables),
         "notes": dataset.notes,
         "failures": dataset.failures.iter().take(NAMED_FAILURES).collect::<Vec<_>>(),
         "failed": dataset.failures.len(),
@@ -49,6 +52,25 @@ pub fn answer(study: &Study, dataset: &Dataset, tables: Tables, quantity: Option
         "seconds": dataset.record.wall_time_s,
         "interrupted": dataset.record.interrupted,
     })
+}
+
+/// Returns the results of the units that are finished, during a run.
+pub(crate) fn partial_answer(study: &Study, block: &Block) -> Value {
+    let mut figure = figure_of_tables(study, &block.tables);
+    measured::add(study, &mut figure);
+    json!({
+        "event": "partial",
+        "kind": study.kind().name,
+        "plot": html::plot(&figure),
+        "cases": cases(study),
+        "tables": tables_json(&block.tables, Tables::Small),
+        "points": block.tally.points(),
+    })
+}
+
+fn tables_json(all: &[Table], tables: Tables) -> Map<String, Value> {
+    let shown = |table: &&Table| tables == Tables::All || SMALL_TABLES.contains(&table.name.as_str());
+    all.iter().filter(shown).map(|table| (table.name.clone(), table_json(table))).collect()
 }
 
 /// Returns a table as lists of values. A missing number is null.

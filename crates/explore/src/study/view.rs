@@ -40,6 +40,15 @@ pub enum View {
         /// The parameter.
         over: Range,
     },
+    /// The largest blade of mistuned disks, relative to the tuned disk.
+    Mistuning {
+        /// The parameter or part that differs from blade to blade.
+        of: String,
+        /// Its standard deviation, such as `1 %`.
+        deviation: String,
+        /// Number of disks.
+        disks: i64,
+    },
     /// The peak over two parameters.
     Map {
         /// The parameter of the horizontal axis.
@@ -158,6 +167,7 @@ pub fn show(document: &mut DocumentMut, view: &View, settings: &ViewSettings) ->
             study.insert("vary", Item::Value(Value::InlineTable(vary)));
             replace_study(document, study);
         }
+        View::Mistuning { of, deviation, disks } => mistuned(document, settings, of, deviation, *disks)?,
         View::Map { x, y } => {
             let mut study = search(document, "map", settings, &[x, y])?;
             let fixed = outer(document, &[x, y]);
@@ -215,6 +225,49 @@ fn set_figure(document: &mut DocumentMut, key: &str, new: Value) {
 fn replace_study(document: &mut DocumentMut, study: Table) {
     document.insert("study", Item::Table(study));
     document.remove("figure");
+}
+
+/// Turns a study of a disk into one of many disks that are mistuned at random.
+fn mistuned(
+    document: &mut DocumentMut,
+    settings: &ViewSettings,
+    of: &str,
+    deviation: &str,
+    disks: i64,
+) -> Result<(), ViewError> {
+    // a name that the study cannot have yet
+    let seed = "explorer_seed";
+    let mut study = search(document, "response", settings, &[])?;
+    // all blades, not the first one
+    let blades = study.get("peak_of").and_then(Item::as_str).map(|place| {
+        place.rsplit_once('_').filter(|(_, sector)| sector.parse::<usize>().is_ok()).map_or(place, |(name, _)| name)
+    });
+    let only = blades.map(str::to_owned);
+    if let Some(blades) = &only {
+        study.insert("peak_of", value(blades.as_str()));
+    }
+    study.insert("amplification", value(true));
+    let mut seeds = InlineTable::new();
+    seeds.insert("from", Value::from(1));
+    seeds.insert("to", Value::from(disks.clamp(2, 1000)));
+    seeds.insert("points", Value::from(disks.clamp(2, 1000)));
+    let mut vary = InlineTable::new();
+    vary.insert(seed, Value::InlineTable(seeds));
+    study.insert("vary", Item::Value(Value::InlineTable(vary)));
+    let disk = document.get_mut("disk").and_then(Item::as_table_like_mut);
+    let disk = disk.ok_or_else(|| ViewError("mistuning needs a study with [disk]".to_owned()))?;
+    let mistuning = [("of", of), ("deviation", deviation), ("seed", seed)];
+    disk.insert("mistuning", Item::Value(Value::InlineTable(mistuning.into_iter().collect())));
+    let parameters = document.entry("parameters").or_insert(Item::Table(Table::new()));
+    if let Some(parameters) = parameters.as_table_like_mut() {
+        parameters.insert(seed, value(1));
+    }
+    document.remove("sample");
+    replace_study(document, study);
+    if let Some(only) = only {
+        set_figure(document, "only", Value::from(only));
+    }
+    Ok(())
 }
 
 /// Returns `[study]` of a search for peaks: the kind, the range of frequencies and `peak_of`.
@@ -332,6 +385,23 @@ mod tests {
         assert_eq!((study.kind().name, study.varied(), study.cases()), ("performance", vec!["Ft", "kt"], 16));
         let study = shown(&View::Map { x: range("Ft", "1 N", "10 N"), y: range("kt", "1e3 N/m", "1e5 N/m") });
         assert_eq!((study.kind().name, study.varied(), study.cases()), ("map", vec!["Ft", "kt"], 16));
+    }
+
+    /// Every seed is another disk, whose largest blade is compared with the tuned disk.
+    #[test]
+    fn disks_are_mistuned_at_random() {
+        let text = templates::find("bladed-ring").unwrap().study;
+        let mut document = text.replace("points = 181", "points = 21").parse().unwrap();
+        let view = View::Mistuning { of: "k".into(), deviation: "1 %".into(), disks: 3 };
+        show(&mut document, &view, &ViewSettings::default()).unwrap();
+        let study = read_study("ring.toml", &document.to_string(), &[]).unwrap();
+        assert_eq!((study.cases(), study.varied()), (3, vec!["explorer_seed"]));
+        let found = run(&study, &Context::without_progress(2)).unwrap();
+        let table = found.tables.iter().find(|table| table.name == "amplification").unwrap();
+        let ratios = table.numbers("amplification").unwrap();
+        assert!(ratios.len() == 3 && ratios.iter().all(|ratio| *ratio > 1.0) && ratios[0] != ratios[1], "{ratios:?}");
+        let couple = templates::find("blade-couple").unwrap().study;
+        assert!(show(&mut couple.parse().unwrap(), &view, &ViewSettings::default()).is_err());
     }
 
     #[test]

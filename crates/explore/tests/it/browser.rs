@@ -10,7 +10,7 @@ use stickslip_study::run::{Context, run};
 use stickslip_study::{read_study, templates};
 
 /// Starts a server and a browser on its page; `None` without Chromium.
-fn open(start: Start) -> Option<(Server, Browser)> {
+pub(crate) fn open(start: Start) -> Option<(Server, Browser)> {
     let mut browser = Browser::start()?;
     let server = Server::start(Settings::new(start)).unwrap();
     browser.go(server.address());
@@ -22,11 +22,21 @@ fn couple() -> Start {
 }
 
 /// On a busy machine the page asks before it computes; the condition then presses the button once.
-const CURVE: &str = "document.querySelector('#response-plot')?.data?.length > 7 \
+pub(crate) const CURVE: &str = "document.querySelector('#response-plot')?.data?.length > 7 \
     || void ((button) => button && !window.pressed && (window.pressed = true, button.click())) \
     ([...document.querySelectorAll('button')].find((b) => b.textContent === 'Compute' && b.offsetParent))";
+/// Computes the performance curve, also on a busy machine, where the page asks first.
+const PERFORMANCE: &str = "document.getElementById('compute-performance').click(); \
+    setInterval(() => { if (/Press the button again/.test(document.querySelector('[aria-label=\"Peak over one parameter\"] .hint').textContent)) { document.getElementById('compute-performance').click(); } }, 300)";
 /// The highest amplitude of the curves that are drawn in front.
 const HIGHEST: &str = "Math.max(...document.querySelector('#response-plot').data.filter((t) => t.mode === 'lines' && t.hoverinfo !== 'skip' && t.legendgroup).flatMap((t) => t.y))";
+
+/// Types a value into a field.
+fn type_value(id: &str, value: &str) -> String {
+    format!(
+        "{{ const field = document.getElementById('{id}'); field.value = '{value}'; field.dispatchEvent(new Event('change')); }} true"
+    )
+}
 
 #[test]
 fn a_slider_changes_the_curve_and_undo_brings_it_back() {
@@ -38,7 +48,7 @@ fn a_slider_changes_the_curve_and_undo_brings_it_back() {
     browser.evaluate(slide);
     // F0 from 10 N to 25 N: the couple with the same limits has higher peaks
     browser.wait(&format!("{HIGHEST} > {}", 1.5 * before));
-    browser.wait("document.querySelector('.row.changed .name').textContent.startsWith('F0')");
+    browser.wait("document.querySelector('.row.changed .name')?.textContent.startsWith('F0')");
     browser.evaluate("document.getElementById('undo').click()");
     browser.wait(&format!("Math.abs({HIGHEST} / {before} - 1) < 1e-9"));
     browser.wait("document.querySelectorAll('.row.changed').length === 0");
@@ -75,12 +85,12 @@ fn the_best_slip_limit_is_found_and_the_map_moves_the_sliders() {
     let Some((_server, mut browser)) = open(couple()) else { return };
     browser.wait(CURVE);
     browser.evaluate("document.getElementById('tab-design').click()");
-    browser.evaluate("document.getElementById('compute-performance').click()");
+    browser.evaluate(PERFORMANCE);
     browser.wait_long("document.querySelector('#design-performance').data?.length > 0");
     let words = browser.text("document.querySelector('#panel-design .hint').textContent");
     let best: f64 = words.split_once("Best Ft: ").unwrap().1.split(' ').next().unwrap().parse().unwrap();
     assert!((best - 6.684).abs() < 0.01, "{words}");
-    browser.evaluate("document.getElementById('map-x-points').value = 4; document.getElementById('map-y-points').value = 3; document.getElementById('compute-map').click()");
+    browser.evaluate("document.getElementById('map-x-points').value = 4; document.getElementById('map-y-points').value = 3; document.getElementById('compute-map').click(); setInterval(() => { if (/Press the button again/.test(document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent)) { document.getElementById('compute-map').click(); } }, 300)");
     browser.wait_long("document.querySelector('#design-map').data?.some((t) => t.type === 'heatmap')");
     browser.picture("design");
     let at = "const plot = document.querySelector('#design-map'); plot.scrollIntoView({ block: 'center' }); const full = plot._fullLayout; const box = plot.getBoundingClientRect(); \
@@ -102,6 +112,92 @@ fn pins_are_compared() {
     assert!(browser.text("document.querySelector('#panel-compare tbody').textContent").contains("Ft = 2 N"));
     browser.picture("compare");
     browser.check_clean();
+}
+
+/// A pinned curve stays in the plot when the study has another number of panels.
+#[test]
+fn a_pin_survives_other_panels() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.evaluate(&type_value("q-parameters-Ft", "6"));
+    // one case instead of four: one panel
+    browser.wait("document.querySelector('#response-plot').layout.xaxis2 === undefined");
+    let dashed = "document.querySelector('#response-plot').data.filter((t) => t.owner === 'as in the file')";
+    assert_eq!(browser.number(&format!("{dashed}.length")), 12.0, "three places in four cases");
+    // the pinned peak of 2 N is inside the axis
+    let inside = format!(
+        "document.querySelector('#response-plot')._fullLayout.yaxis.range[1] > Math.max(...{dashed}.flatMap((t) => t.y))"
+    );
+    browser.wait(&inside);
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.evaluate("document.getElementById('tab-compare').click()");
+    assert!(browser.text("document.querySelector('#pin-summary').textContent").contains("−57.2 %"));
+    browser.check_clean();
+}
+
+/// Returns what the page offers to save when a button is pressed: the content of the last file.
+fn saved(browser: &mut Browser, button: &str) -> String {
+    let content = browser.awaited(&format!(
+        "new Promise((resolve) => {{ URL.createObjectURL = (blob) => {{ blob.text().then(resolve); return 'data:,'; }}; \
+         document.getElementById('{button}').click(); }})"
+    ));
+    content.as_str().unwrap().to_owned()
+}
+
+#[test]
+fn pictures_tables_and_a_program_are_saved() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.evaluate("window.makeAddress = URL.createObjectURL; true");
+    let picture = saved(&mut browser, "save-svg");
+    assert!(picture.starts_with("<svg") && picture.contains("amplitude (mm)"), "{}", &picture[..200]);
+    for name in ["blade3", "as in the file", "all joints stuck"] {
+        assert!(picture.contains(name), "the legend has no {name}");
+    }
+    // the marker of the page is not part of the figure
+    assert!(!picture.contains("#a84a00"));
+    let size = "new Promise((resolve) => { const make = window.makeAddress ?? URL.createObjectURL; URL.createObjectURL = (blob) => { if (blob.type === 'image/png') { resolve([blob.type, blob.size]); return 'data:,'; } return make(blob); }; \
+                document.getElementById('save-png').click(); })";
+    let picture = browser.awaited(size);
+    assert!(picture[0] == "image/png" && picture[1].as_f64().unwrap() > 20_000.0, "{picture}");
+    let table = saved(&mut browser, "save-csv");
+    assert!(table.starts_with("Ft_N,frequency_Hz,") && table.lines().count() == 965, "{}", &table[..80]);
+    let program = browser.awaited(
+        "new Promise((resolve) => { Object.defineProperty(navigator, 'clipboard', { value: { writeText: async (text) => resolve(text) } }); \
+         document.getElementById('save-python').click(); })",
+    );
+    let program = program.as_str().unwrap();
+    let (begin, rest) = program.split_once("from_text(\"\"\"\n").unwrap();
+    let (text, end) = rest.split_once("\"\"\", name=\"blade-couple_explored\")\n").unwrap();
+    assert!(begin.starts_with("import stickslip\n") && end.contains("study.run()"), "{program}");
+    assert_eq!(text, templates::find("blade-couple").unwrap().study);
+    browser.check_clean();
+}
+
+/// The report is one file that draws its figures without a server.
+#[test]
+fn a_report_of_the_pins_stands_alone() {
+    let Some((server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.evaluate(&type_value("q-parameters-kt", "20000"));
+    browser.wait("document.querySelectorAll('.row.changed').length === 1 && !document.querySelector('#response-plot').classList.contains('stale')");
+    browser.wait("!document.querySelector('#panel-response .state').textContent.includes('fewer')");
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.wait("document.querySelectorAll('#pin-summary tbody tr').length === 2");
+    let report = saved(&mut browser, "save-report");
+    drop(server);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("report.html");
+    std::fs::write(&file, report).unwrap();
+    browser.go(&format!("file://{}", file.display()));
+    browser.wait("document.querySelectorAll('.js-plotly-plot .scatterlayer').length >= 2");
+    let text = browser.text("document.body.innerText");
+    for part in ["kt = 20000 N/m", "as in the file", "48.93 mm", "kt = \"20000 N/m\""] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
 }
 
 /// The study that the page saves gives the numbers on the screen, bit for bit.
@@ -219,13 +315,195 @@ fn the_keyboard_reaches_everything() {
 fn the_page_continues_after_a_restart() {
     let Some((server, mut browser)) = open(couple()) else { return };
     browser.wait(CURVE);
-    let port = server.port();
+    let before = browser.number(HIGHEST);
+    let (port, token) = (server.port(), server.address().split_once("token=").unwrap().1.to_owned());
+    // the server ends while it computes
+    browser.evaluate(&type_value("q-study-frequency-points", "90000"));
     drop(server);
-    browser.evaluate("document.getElementById('q-parameters-F0').value = '11'; document.getElementById('q-parameters-F0').dispatchEvent(new Event('change')); true");
+    browser.evaluate(&type_value("q-study-frequency-points", "241"));
+    browser.evaluate(&type_value("q-parameters-F0", "20"));
     browser.wait("document.getElementById('message').textContent.includes('does not answer')");
-    let _again = Server::start(Settings { port, ..Settings::new(couple()) }).unwrap();
-    // the new server has another token: the page says what to do
+    let again = Server::start(Settings { port, token: Some(token), ..Settings::new(couple()) }).unwrap();
+    browser.wait_long(&format!("document.getElementById('message').hidden && {HIGHEST} > {}", 1.3 * before));
+    drop(again);
+    // with another token the page says what to do, and keeps the changes for the new address
+    browser.wait_long("document.getElementById('message').textContent.includes('does not answer') || (document.getElementById('q-parameters-F0').dispatchEvent(new Event('change')), false)");
+    let other = Server::start(Settings { port, ..Settings::new(couple()) }).unwrap();
     browser.wait_long("document.getElementById('message').textContent.includes('token')");
+    browser.go(other.address());
+    browser.wait("document.getElementById('q-parameters-F0')?.value === '20' && document.querySelectorAll('.row.changed').length >= 1");
+}
+
+/// A page of another server on this machine gets nothing, and a wrong token shows no study.
+#[test]
+fn other_pages_and_wrong_tokens_get_nothing() {
+    let Some((server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    let own = format!("http://127.0.0.1:{}", server.port());
+    let token = server.address().split_once("token=").unwrap().1.to_owned();
+    let elsewhere = Server::start(Settings::new(Start::Gallery)).unwrap();
+    browser.go(elsewhere.address());
+    browser.wait("document.querySelectorAll('.card').length >= 12");
+    // its own policy forbids the request; without the policy, that of the browser does
+    for ask in [
+        "fetch",
+        "((address, how) => { const frame = document.createElement('iframe'); document.body.append(frame); return frame.contentWindow.fetch(address, how); })",
+    ] {
+        let script = format!(
+            "await {ask}('{own}/api/catalog', {{ headers: {{ 'x-stickslip-token': '{token}' }} }}).then((answer) => 'answer ' + answer.status, () => 'refused')"
+        );
+        assert_eq!(browser.text(&script), "refused");
+    }
+    browser.forget_cookies();
+    browser.go(&format!("{own}/?token=00000000000000000000000000000000"));
+    browser.wait("document.body.innerText.includes('the token is missing or wrong')");
+    assert_eq!(browser.number("document.scripts.length"), 0.0);
+}
+
+/// On a narrow page a button opens the parameters below the curve.
+#[test]
+fn a_narrow_page_has_its_parameters_in_a_sheet() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.size(390, 844);
+    browser.wait(CURVE);
+    assert_eq!(browser.number("document.getElementById('parameters').offsetHeight"), 0.0);
+    browser.evaluate("document.getElementById('show-parameters').click()");
+    browser.wait("document.getElementById('parameters').offsetHeight > 200");
+    browser.wait("document.getElementById('parameters').getBoundingClientRect().bottom <= innerHeight + 1 && document.documentElement.scrollWidth <= innerWidth");
+    browser.picture("narrow_parameters");
+    browser.key("Escape");
+    browser.wait(
+        "document.getElementById('parameters').offsetHeight === 0 && document.activeElement.id === 'show-parameters'",
+    );
+    browser.check_clean();
+}
+
+/// With the key Tab alone a user reaches every control in the order of the page.
+#[test]
+fn tab_reaches_all_controls_in_order() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.querySelectorAll('details.group:not(:first-of-type)').forEach((group) => { group.open = false; }); document.activeElement.blur()");
+    let mut seen: Vec<String> = Vec::new();
+    for _ in 0..80 {
+        browser.key("Tab");
+        seen.push(
+            browser.text(
+                "document.activeElement.id || document.activeElement.className || document.activeElement.tagName",
+            ),
+        );
+    }
+    let at =
+        |id: &str| seen.iter().position(|one| one == id).unwrap_or_else(|| panic!("{id} is not reached: {seen:?}"));
+    let order = [
+        "skip",
+        "open-gallery",
+        "theme",
+        "search",
+        "q-parameters-m",
+        "q-parameters-F0-slider",
+        "tab-response",
+        "quantity",
+        "log",
+        "pin",
+    ];
+    assert!(order.map(at).is_sorted(), "{seen:?}");
+    // the focus is visible
+    browser.evaluate("document.getElementById('pin').focus()");
+    browser.key("Tab");
+    assert_eq!(browser.text("getComputedStyle(document.activeElement).outlineStyle"), "solid");
+}
+
+/// The disks of a histogram come one after the other.
+#[test]
+fn mistuned_disks_fill_a_histogram() {
+    let Some((_server, mut browser)) = open(Start::Template("bladed-ring".into())) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('tab-design').click()");
+    browser.wait("document.getElementById('mistuning-of').value === 'k'");
+    browser.evaluate(
+        "document.getElementById('mistuning-disks').value = '4'; document.getElementById('compute-mistuning').click()",
+    );
+    browser.wait_long("document.querySelector('#design-mistuning').data?.[0]?.x.length === 4");
+    browser.wait_long("document.getElementById('compute-mistuning').textContent === 'Compute'");
+    let words = browser.text("document.querySelector('[aria-label^=\"Worst blade\"] .hint').textContent");
+    assert!(
+        words.starts_with("Worst of 4 disks: seed ") && words.contains(" times the peak of the tuned disk"),
+        "{words}"
+    );
+    browser.picture("mistuning");
+    browser.check_clean();
+}
+
+/// A search of a former study ends when another study is opened.
+#[test]
+fn another_study_begins_without_searches() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('tab-design').click()");
+    // the first press may say how long it takes
+    browser.evaluate("for (const axis of ['x', 'y']) { document.getElementById(`map-${axis}-points`).value = 90; } document.getElementById('compute-map').click()");
+    browser.wait("document.getElementById('compute-map').textContent === 'Stop' || /takes/.test(document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent)");
+    browser.evaluate("document.getElementById('open-gallery').click(); document.querySelector('[data-study=\"template:symmetric-couple\"]').click()");
+    browser.wait("document.getElementById('title').textContent !== 'Studies' && document.getElementById('trust').childElementCount > 0");
+    browser.evaluate("document.getElementById('tab-design').click()");
+    browser.wait("document.getElementById('compute-map').textContent === 'Compute' && document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent.startsWith('How high')");
+    browser.check_clean();
+}
+
+/// Searches that run can be stopped.
+#[test]
+fn a_map_can_be_stopped() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('tab-design').click()");
+    browser.evaluate("for (const axis of ['x', 'y']) { document.getElementById(`map-${axis}-points`).value = 90; } document.getElementById('compute-map').click()");
+    // it takes long, and begins when the button is pressed again
+    browser.wait(
+        "document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent.includes('Press the button again')",
+    );
+    browser.evaluate("document.getElementById('compute-map').click()");
+    browser.wait(
+        "document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent.includes('% computed')",
+    );
+    assert_eq!(browser.text("document.getElementById('compute-map').textContent"), "Stop");
+    browser.evaluate("document.getElementById('compute-map').click()");
+    browser
+        .wait("document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent === 'Stopped.'");
+    // the server is free for the next request
+    browser.evaluate(PERFORMANCE);
+    browser.wait_long("document.querySelector('#design-performance').data?.length > 0");
+}
+
+/// The rules of axe-core for every tab, light and dark. `STICKSLIP_AXE` names its script, which
+/// `.ci/explorer` fetches.
+#[test]
+fn axe_finds_no_violations() {
+    let Some(script) = std::env::var_os("STICKSLIP_AXE") else {
+        eprintln!("skipped: STICKSLIP_AXE does not name the script of axe-core (.ci/explorer fetches it)");
+        return;
+    };
+    let script = std::fs::read_to_string(script).unwrap();
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.evaluate(&script);
+    for dark in [false, true] {
+        browser.dark(dark);
+        for tab in ["response", "orbit", "motion", "design", "compare"] {
+            browser.evaluate(&format!("document.getElementById('tab-{tab}').click()"));
+            if tab == "orbit" {
+                browser.wait("document.querySelector('#orbit-loops')?.data?.length > 0");
+            }
+            let found = browser.text(
+                "await axe.run(document, { resultTypes: ['violations'] }).then((all) => all.violations.map((one) => `${one.id}: ${one.help}: ${one.nodes.slice(0, 3).map((node) => node.html.slice(0, 160)).join(' | ')}`).join('\\n'))",
+            );
+            assert_eq!(found, "", "{tab}, dark: {dark}");
+        }
+    }
+    browser.evaluate("document.getElementById('open-gallery').click()");
+    let found = browser.text("await axe.run(document).then((all) => all.violations.map((one) => `${one.id}: ${one.help}: ${one.nodes[0].html.slice(0, 160)}`).join('\\n'))");
+    assert_eq!(found, "", "gallery");
 }
 
 #[test]
@@ -233,5 +511,56 @@ fn screenshots_have_a_folder() {
     // a misspelt variable would write nowhere
     if let Some(folder) = std::env::var_os(chromium::SCREENSHOTS) {
         assert!(Path::new(&folder).is_dir(), "{folder:?} is no folder");
+    }
+}
+
+/// Writes the pictures of the book to the folder that `STICKSLIP_SCREENSHOTS` names.
+#[test]
+#[ignore = "writes pictures"]
+fn pictures_of_the_book() {
+    let folder = std::env::var_os(chromium::SCREENSHOTS).expect("STICKSLIP_SCREENSHOTS must name a folder");
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.hide_scrollbars();
+    browser.size(1320, 730);
+    browser.wait(CURVE);
+    browser.wait("document.querySelector('#response-plot').clientHeight < 900");
+    browser.evaluate("document.activeElement.blur()");
+    browser.picture("explorer");
+    browser.evaluate("document.getElementById('tab-orbit').click()");
+    browser.wait("document.querySelector('#orbit-loops')?.data?.length > 0");
+    browser.evaluate("const cases = document.getElementById('orbit-case'); cases.value = '3'; cases.dispatchEvent(new Event('change')); [...document.querySelectorAll('button')].find((b) => b.textContent === 'At the peak').click()");
+    browser.wait("Math.abs(document.getElementById('orbit-frequency').value - 120.842) < 0.01 && Math.max(...document.querySelector('#orbit-loops').data[0].y) > 7.9");
+    browser.picture("explorer_orbit");
+    browser.dark(true);
+    browser.evaluate("document.getElementById('tab-motion').click()");
+    browser.wait("document.querySelector('canvas').width > 300");
+    browser.picture("explorer_motion");
+    browser.dark(false);
+    browser.evaluate("document.getElementById('tab-design').click()");
+    browser.evaluate(PERFORMANCE);
+    browser.wait_long("document.querySelector('#design-performance').data?.length > 0");
+    browser.evaluate("document.getElementById('compute-map').click(); setInterval(() => { if (/Press the button again/.test(document.querySelector('[aria-label=\"Peak over two parameters\"] .hint').textContent)) { document.getElementById('compute-map').click(); } }, 300)");
+    browser.wait_long("document.querySelector('#design-map').data?.some((t) => t.type === 'heatmap')");
+    browser.evaluate("document.getElementById('design-map').scrollIntoView({ block: 'end' }); scrollBy(0, 70)");
+    browser.picture("explorer_design");
+    browser.dark(true);
+    browser.size(390, 844);
+    browser.evaluate("document.getElementById('tab-response').click(); document.getElementById('show-parameters').click(); document.activeElement.blur(); scrollTo(0, 300)");
+    browser.picture("explorer_narrow");
+    let Some((_server, mut browser)) = open(Start::Template("bladed-ring".into())) else { return };
+    browser.hide_scrollbars();
+    browser.size(1200, 780);
+    browser.wait_long(CURVE);
+    browser.evaluate("document.getElementById('tab-design').click()");
+    browser.evaluate(
+        "document.getElementById('mistuning-disks').value = '12'; document.getElementById('compute-mistuning').click()",
+    );
+    browser.wait_long("document.querySelector('#design-mistuning').data?.[0]?.x.length === 12 && document.getElementById('compute-mistuning').textContent === 'Compute'");
+    browser.evaluate("document.getElementById('design-mistuning').scrollIntoView({ block: 'end' }); scrollBy(0, 60)");
+    browser.picture("explorer_mistuning");
+    for name in ["", "_orbit", "_motion", "_design", "_narrow", "_mistuning"] {
+        let file = Path::new(&folder).join(format!("explorer{name}.png"));
+        let bytes = std::fs::metadata(&file).unwrap().len();
+        assert!(bytes <= 150_000, "{}: {bytes} bytes", file.display());
     }
 }

@@ -2,8 +2,14 @@
 //!
 //! - `browser`: the page in Chromium;
 //! - `chromium`: drives the browser;
+//! - `latency`: times in the browser, on request;
+//! - `live`: structures that stay in memory, and searches that stop;
+//! - `load`: the server under load, on request;
 //! - `server`: requests, limits and errors.
 
 mod browser;
 mod chromium;
+mod latency;
+mod live;
+mod load;
 mod server;

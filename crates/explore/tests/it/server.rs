@@ -7,26 +7,26 @@ use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 use stickslip_explore::{Server, Settings, Start};
 
-struct Page {
+pub(crate) struct Page {
     server: Server,
     token: String,
 }
 
 /// An answer: its status, its head and its body.
-struct Answer {
-    status: u16,
-    head: String,
-    body: String,
+pub(crate) struct Answer {
+    pub status: u16,
+    pub head: String,
+    pub body: String,
 }
 
 impl Page {
-    fn start() -> Page {
+    pub(crate) fn start() -> Page {
         let server = Server::start(Settings::new(Start::Template("blade-couple".into()))).unwrap();
         let token = server.address().split_once("token=").unwrap().1.to_owned();
         Page { server, token }
     }
 
-    fn connect(&self) -> TcpStream {
+    pub(crate) fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(("127.0.0.1", self.server.port())).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
         stream
@@ -52,16 +52,16 @@ impl Page {
         stream
     }
 
-    fn ask(&self, request: &str, head: &[&str], body: &str) -> Answer {
+    pub(crate) fn ask(&self, request: &str, head: &[&str], body: &str) -> Answer {
         read(self.send(request, head, body))
     }
 
-    fn run(&self, body: &Value) -> TcpStream {
+    pub(crate) fn run(&self, body: &Value) -> TcpStream {
         self.send("POST /api/run", &["HOST", "ORIGIN", "TOKEN"], &body.to_string())
     }
 }
 
-fn read(mut stream: TcpStream) -> Answer {
+pub(crate) fn read(mut stream: TcpStream) -> Answer {
     let mut bytes = Vec::new();
     let _ = stream.read_to_end(&mut bytes);
     let text = String::from_utf8_lossy(&bytes).into_owned();
@@ -71,11 +71,11 @@ fn read(mut stream: TcpStream) -> Answer {
 }
 
 /// Returns the events of a run: the lines of its body that are objects, between the sizes of chunks.
-fn events(answer: &Answer) -> Vec<Value> {
+pub(crate) fn events(answer: &Answer) -> Vec<Value> {
     answer.body.lines().filter(|line| line.starts_with('{')).map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-fn study(client: &str, points: i64) -> Value {
+pub(crate) fn study(client: &str, points: i64) -> Value {
     json!({
         "client": client, "slot": "study", "study": "template:blade-couple",
         "changes": [{ "path": ["study", "frequency", "points"], "value": { "count": points } }],
@@ -216,6 +216,41 @@ fn malformed_and_large_requests_are_refused() {
     let mut half = page.connect();
     half.write_all(b"POST /api/run HTTP/1.1\r\nhost: ").unwrap();
     assert_eq!(events(&read(page.run(&study("a", 9)))).last().unwrap()["event"], "result");
+}
+
+/// A run that takes long sends the results of its finished units, and goes on.
+#[test]
+fn partial_results_come_before_the_end() {
+    let page = Page::start();
+    let all = events(&read(page.run(&study("a", 30_000))));
+    let partial: Vec<&Value> = all.iter().filter(|event| event["event"] == "partial").collect();
+    assert!(!partial.is_empty());
+    let counts: Vec<u64> = partial.iter().map(|event| event["points"]["converged"].as_u64().unwrap()).collect();
+    assert!(counts.is_sorted() && counts[0] > 0 && *counts.last().unwrap() <= 120_000, "{counts:?}");
+    assert!(!partial[0]["plot"]["data"].as_array().unwrap().is_empty());
+    assert_eq!(all.last().unwrap()["points"]["converged"], 120_000);
+}
+
+/// A page that stays open continues with the next server, if that has the same token.
+#[test]
+fn a_server_may_take_the_token_of_an_earlier_one() {
+    let page = Page::start();
+    let settings = Settings { token: Some(page.token.clone()), ..Settings::new(Start::Gallery) };
+    let other = Page { server: Server::start(settings).unwrap(), token: page.token.clone() };
+    assert_eq!(other.ask("GET /api/catalog", &["HOST", "TOKEN"], "").status, 200);
+    let short = Settings { token: Some("1234".into()), ..Settings::new(Start::Gallery) };
+    assert!(Server::start(short).unwrap_err().to_string().contains("32 characters"));
+}
+
+/// Clients that never read their answers do not hold their connections for ever.
+#[test]
+fn clients_that_do_not_read_are_disconnected() {
+    let page = Page::start();
+    // more than the server has connections; the answers do not fit into the buffers of the system
+    let silent: Vec<TcpStream> = (0..100).map(|_| page.send("GET /assets/plotly.js", &["HOST"], "")).collect();
+    let answer = page.ask("GET /api/catalog", &["HOST", "TOKEN"], "");
+    assert_eq!(answer.status, 200);
+    drop(silent);
 }
 
 #[test]

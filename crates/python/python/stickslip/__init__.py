@@ -12,7 +12,7 @@ of the run.
 
 from . import statistics
 from ._campaign import Campaign, campaign
-from ._core import Law, Model, Orbit, Result, Study, Table, __version__, law, laws, templates
+from ._core import Explorer, Law, Model, Orbit, Result, Study, Table, __version__, law, laws, templates
 from ._errors import MethodError, ModelError, OrbitError, ReportError, StickslipError, StudyError
 from ._folder import CampaignError
 from ._rate import rate_law
@@ -20,6 +20,7 @@ from ._rate import rate_law
 __all__ = [
     "Campaign",
     "CampaignError",
+    "Explorer",
     "Law",
     "MethodError",
     "Model",

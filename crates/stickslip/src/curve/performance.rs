@@ -14,7 +14,7 @@ use crate::method::{Method, MethodError};
 use crate::model::System;
 use crate::orbit::{Accuracy, Orbit};
 use rayon::prelude::*;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering;
 use stickslip_numerics::golden_section::golden_section;
 
 /// Specification of a performance curve.
@@ -32,6 +32,9 @@ pub struct Performance<'a, E> {
     /// The quantities to maximise over frequency, for example amplitudes, m. Their number must
     /// be constant. The one with the highest peak counts.
     pub quantities: &'a (dyn Fn(&Orbit) -> Vec<f64> + Sync),
+    /// Progress over the grid points of the values, and cancellation. After a stop the rows have
+    /// no peaks and the curve has no optimum.
+    pub watch: Watch<'a>,
 }
 
 /// The peak at one value of the parameter.
@@ -105,6 +108,11 @@ impl<E: Send> Performance<'_, E> {
     /// # Errors
     /// The system cannot be built, or the method does not support it.
     pub fn peak(&self, value: f64) -> Result<PerformanceRow, PerformanceError<E>> {
+        self.watched_peak(value, self.watch)
+    }
+
+    fn watched_peak(&self, value: f64, watch: Watch<'_>) -> Result<PerformanceRow, PerformanceError<E>> {
+        let stopped = || watch.stop.load(Ordering::Relaxed);
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
         let mut solver = branch_following::solver(self.method, &system).map_err(PerformanceError::Method)?;
         let last = self.points.max(3) - 1;
@@ -113,8 +121,6 @@ impl<E: Send> Performance<'_, E> {
         let (mut failed, mut inaccurate) = (0, 0);
         let mut points: Vec<CurvePoint> = Vec::with_capacity(omegas.len());
         let mut bidirectional = BidirectionalSweep::for_system(&system);
-        let (stop, finished) = (AtomicBool::new(false), || ());
-        let watch = Watch { finished: &finished, stop: &stop };
         solve_sequence(&mut *solver, &mut omegas.into_iter(), watch, &mut |omega, outcome| {
             let Some(outcome) = outcome else { return };
             bidirectional.iter_mut().for_each(|sweep| sweep.add(omega, outcome));
@@ -130,11 +136,16 @@ impl<E: Send> Performance<'_, E> {
             });
             drop_unused_series(&mut points);
         });
+        if stopped() {
+            let none = PerformanceRow { value, peak: None, reverse_sweep_only: false, failed, inaccurate };
+            return Ok(none);
+        }
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
         let mut peak = highest_peak(&mut *solver, &points, wanted, self.quantities);
         let mut reverse_sweep_only = false;
         if let Some(bidirectional) = bidirectional {
-            let others = bidirectional.reverse_sweep(self.method, &system, &stop).map_err(PerformanceError::Method)?;
+            let others =
+                bidirectional.reverse_sweep(self.method, &system, watch.stop).map_err(PerformanceError::Method)?;
             let others: Vec<CurvePoint> =
                 others.iter().map(|other| CurvePoint::new(&other.orbit, self.quantities)).collect();
             for points in other_intervals(&points, &others) {
@@ -157,6 +168,7 @@ impl<E: Send> Performance<'_, E> {
     /// # Example
     /// ```
     /// use stickslip::curve::performance::Performance;
+    /// use stickslip::curve::sweep::Watch;
     /// use stickslip::method::event_driven::EventDriven;
     /// use stickslip::law::Coulomb;
     /// use stickslip::model::example;
@@ -170,6 +182,7 @@ impl<E: Send> Performance<'_, E> {
     ///     range: (119.5 * std::f64::consts::TAU, 122.5 * std::f64::consts::TAU),
     ///     points: 31,
     ///     quantities: &|orbit| vec![orbit.places[0].amplitude()],
+    ///     watch: Watch::none(),
     /// }
     /// .curve(&[5.5, 6.5, 7.5])
     /// .unwrap();
@@ -192,8 +205,10 @@ impl<E: Send> Performance<'_, E> {
         // Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10,
         // and the curve is flat to second order or kinked at the optimum.
         let close = |a: f64, b: f64| b - a <= 1e-7 * (a.abs() + b.abs());
+        // the steps are not points of the curve; after a stop they end at once
+        let watch = Watch { finished: &|| (), stop: self.watch.stop };
         golden_section((low, high), close, |value| {
-            let row = self.peak(value)?;
+            let row = self.watched_peak(value, watch)?;
             if height(&row) < height(&best) {
                 best = row;
             }

@@ -27,6 +27,14 @@ pub struct Watch<'a> {
     pub stop: &'a AtomicBool,
 }
 
+impl Watch<'static> {
+    /// Returns a watch that counts nothing and never stops.
+    pub fn none() -> Watch<'static> {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Watch { finished: &|| (), stop: &NEVER }
+    }
+}
+
 /// Solves `system` at the frequencies `omega(0), …, omega(count - 1)` (rad/s). `row` converts
 /// each outcome into the stored result.
 ///

@@ -439,6 +439,14 @@ impl Component {
         })
     }
 
+    /// Returns the number of stored reductions, modal dampings and mistuned disks, which grows
+    /// with every different request. A request in progress is not counted.
+    pub fn stored_reductions(&self) -> usize {
+        let sector = |(.., sector): &(Boundary, usize, Arc<SectorCache>)| sector.stored_reductions();
+        let sectors = self.0.sectors.try_lock().map_or(0, |known| known.iter().map(sector).sum());
+        sectors + stored(&self.0.reductions) + stored(&self.0.damped)
+    }
+
     /// Returns damping with one ratio for all modes up to a frequency (rad/s), and proportional
     /// to the stiffness above. The result is stored.
     pub(crate) fn modal_damping(&self, ratio: f64, up_to: f64) -> Damped {
@@ -480,7 +488,20 @@ fn cached<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, comput
     answer
 }
 
+/// Returns the number of stored results; zero while one is computed.
+fn stored<K, V>(known: &Cache<K, V>) -> usize {
+    known.try_lock().map_or(0, |known| known.len())
+}
+
 impl SectorCache {
+    fn stored_reductions(&self) -> usize {
+        let blade = |(_, blade): &(Vec<usize>, KeptBlade)| {
+            blade.as_ref().map_or(0, |blade| stored(&blade.reductions) + stored(&blade.mistuned))
+        };
+        let blades = self.blades.try_lock().map_or(0, |known| known.iter().map(blade).sum());
+        blades + stored(&self.reductions)
+    }
+
     /// Returns the reduced sector.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
         cached(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))

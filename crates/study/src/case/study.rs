@@ -531,6 +531,18 @@ impl Study {
         StudyError::at_location(&self.sources, Problem::new(location, key, message).maybe_help(help))
     }
 
+    /// Returns the names of the tables of `[[data]]`.
+    pub fn data_names(&self) -> impl Iterator<Item = &str> {
+        self.data.iter().map(|table| table.name.as_str())
+    }
+
+    /// Returns a column of a table of `[[data]]` in SI. `role` is its use or its name.
+    ///
+    /// `None` if there is no such column, or if it has another dimension.
+    pub fn data_column(&self, table: &str, role: &str, dimension: Dimension) -> Option<Vec<f64>> {
+        self.data.iter().find(|known| known.name == table)?.values(role, dimension).ok()
+    }
+
     /// Returns a checksum of the matrices of `[structure]` and of the sector's files; `None`
     /// without matrices.
     pub fn matrices_checksum(&self) -> Option<String> {

@@ -148,11 +148,36 @@ impl CheckedStudy {
     /// cases met a model that the method refuses. Points that do not converge are not an error:
     /// the dataset lists them as failures.
     pub fn run(&self, context: &Context) -> Result<Dataset, StudyError> {
+        self.run_in_parts(context, &mut |_| ())
+    }
+
+    /// Computes the study as [`CheckedStudy::run`] does, and passes all results so far to `seen`
+    /// after every unit, so that they can be shown before the end of the run.
+    ///
+    /// # Errors
+    /// Those of [`CheckedStudy::run`].
+    ///
+    /// # Example
+    /// ```
+    /// use stickslip_study::{read_study, run::{Context, check}};
+    /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
+    /// let checked = check(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
+    /// let mut rows = Vec::new();
+    /// checked.run_in_parts(&Context::without_progress(1), &mut |block| rows.push(block.tables[0].rows())).unwrap();
+    /// assert!(rows.is_sorted() && rows.last() == Some(&964));
+    /// ```
+    pub fn run_in_parts(&self, context: &Context, seen: &mut dyn FnMut(&Block)) -> Result<Dataset, StudyError> {
         let start = Instant::now();
         if let Some(error) = self.summary.size.refusal(&self.study, self.summary.size.memory_all_tables) {
             return Err(error);
         }
-        let Block { tables, tally, .. } = self.block(0..self.units(), context)?;
+        let mut whole = Block::empty(self.study.kind(), 0);
+        self.for_each_block(0..self.units(), context, &mut |block| {
+            whole.append(block);
+            seen(&whole);
+            Ok::<(), StudyError>(())
+        })?;
+        let Block { tables, tally, .. } = whole;
         let figure = figure_of_tables(&self.study, &tables);
         Ok(self.dataset_without_results(context.threads).with_results(tables, figure, tally, start.elapsed()))
     }

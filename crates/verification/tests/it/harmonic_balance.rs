@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::curve::modes::{ModeRequest, nonlinear_mode, self_excited};
 use stickslip::curve::performance::Performance;
+use stickslip::curve::sweep::Watch;
 use stickslip::law::{Coulomb, CoulombArctan, Jenkins, SharedLaw};
 use stickslip::method::{Method, OrbitError, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Motion, Spring, System};
@@ -93,6 +94,7 @@ fn theory_10_1_and_10_2_griffin() {
         range: (0.99, 1.1),
         points: 61,
         quantities: &|orbit| vec![orbit.places[0].amplitude()],
+        watch: Watch::none(),
     };
     let free = performance(0.0);
     for (limit, peak) in [(1.0, 23.2989632), (1.2, 17.3660591), (2.0, 16.4663015), (3.0, 20.3196797)] {
@@ -223,6 +225,7 @@ fn theory_6_6_performance_of_the_couple() {
         range: (TAU * 120.0, TAU * 121.5),
         points: 31,
         quantities: &|orbit: &Orbit| vec![orbit.places[0].amplitude()],
+        watch: Watch::none(),
     };
     // (6.6) used at most five harmonics, 5 % off at 6 N by (6.3), and a grid of 0.02 Hz: it is
     // 2 % accurate away from 6 N

@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use stickslip::curve::continuation::BranchContinuation;
 use stickslip::curve::performance::Performance;
+use stickslip::curve::sweep::Watch;
 use stickslip::law::{Coulomb, Jenkins};
 use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring};
@@ -42,6 +43,7 @@ fn along_frequency_to_the_peak() {
                 range: (TAU * 119.5, TAU * 122.5),
                 points: 61,
                 quantities: &|orbit: &Orbit| vec![orbit.places[0].amplitude()],
+                watch: Watch::none(),
             };
             let peak = performance.peak(limit).unwrap().peak.unwrap();
             let highest = branch.peaks.iter().map(|p| p.1).fold(0.0, f64::max);

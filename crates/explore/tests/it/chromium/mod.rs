@@ -98,6 +98,14 @@ impl Browser {
         self.call("Page.navigate", json!({ "url": address }));
     }
 
+    pub fn hide_scrollbars(&mut self) {
+        self.call("Emulation.setScrollbarsHidden", json!({ "hidden": true }));
+    }
+
+    pub fn forget_cookies(&mut self) {
+        self.call("Network.clearBrowserCookies", json!({}));
+    }
+
     pub fn size(&mut self, width: u32, height: u32) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", size);
@@ -115,6 +123,22 @@ impl Browser {
         let result = self.call("Runtime.evaluate", parameters);
         assert!(result["exceptionDetails"].is_null(), "{script}: {}", result["exceptionDetails"]);
         result["result"]["value"].clone()
+    }
+
+    /// Returns the value of a promise that is kept within 30 s.
+    pub fn awaited(&mut self, promise: &str) -> Value {
+        self.evaluate(&format!(
+            "await Promise.race([{promise}, new Promise((_, fail) => setTimeout(() => fail(new Error('too slow')), 30000))])"
+        ))
+    }
+
+    /// Returns the memory of the page in use after its garbage was collected, bytes.
+    pub fn heap(&mut self) -> f64 {
+        self.call("HeapProfiler.collectGarbage", json!({}));
+        self.call("Performance.enable", json!({}));
+        let metrics = self.call("Performance.getMetrics", json!({}))["metrics"].clone();
+        let used = metrics.as_array().into_iter().flatten().find(|one| one["name"] == "JSHeapUsedSize");
+        used.and_then(|one| one["value"].as_f64()).unwrap()
     }
 
     pub fn number(&mut self, script: &str) -> f64 {

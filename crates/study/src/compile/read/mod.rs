@@ -9,6 +9,7 @@
 //! - `lists`: the lists of a model, and repeated entries;
 //! - `parameters`: `[parameters]`, `vary`, and overrides;
 //! - `structure`: `[structure]` and its files;
+//! - `structure_cache`: structures that stay in memory after their files were read;
 //! - `template`: the model of a template.
 
 mod data;
@@ -18,9 +19,11 @@ mod lists;
 mod parameters;
 mod reader;
 mod structure;
+mod structure_cache;
 mod template;
 mod values;
 
+pub use structure_cache::{StructureCache, StructureCacheSettings};
 pub use template::TemplateParameter;
 
 use crate::case::assembled::LastAssembled;
@@ -167,6 +170,15 @@ fn check_size(name: &str, bytes: usize) -> Result<(), StudyError> {
 /// ```
 pub fn read_study(name: &str, text: &str, overrides: &[(String, String)]) -> Result<Study, StudyError> {
     read(name, text, overrides, Reader::default())
+}
+
+/// Reads a study from its text as [`read_study`] does, and keeps the matrices of its structure
+/// with their reductions, for the next version of the study.
+///
+/// # Errors
+/// Those of [`read_study`].
+pub fn read_study_with(name: &str, text: &str, structures: &Arc<StructureCache>) -> Result<Study, StudyError> {
+    read(name, text, &[], Reader { structures: Some(structures.clone()), ..Reader::default() })
 }
 
 /// Reads the study of stored results, for names only.

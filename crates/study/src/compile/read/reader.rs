@@ -1,6 +1,7 @@
 //! The state of a reader: its texts, the problems found, the parameters, and the current
 //! repetition.
 
+use super::structure_cache::StructureCache;
 use crate::compile::repeat::{Iteration, Repetition};
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::expression::Expression;
@@ -26,6 +27,8 @@ pub(super) struct Reader {
     /// True if only the study file is read. Then only the names of a structure given by
     /// matrices are known.
     pub(super) study_file_only: bool,
+    /// Structures that were read before.
+    pub(super) structures: Option<Arc<StructureCache>>,
 }
 
 impl Reader {

@@ -5,6 +5,7 @@
 //! left out.
 
 use super::reader::Reader;
+use super::structure_cache::StructureKey;
 use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
@@ -37,13 +38,15 @@ impl Reader {
             return Some(MatrixSource { table: stated, component: None, stress_stiffening: None, constrained_rows: 0 });
         }
         let folder = Path::new(study_file).parent().unwrap_or(Path::new(""));
-        match read(&stated, folder) {
-            Ok((component, stiffened, left_out)) => Some(MatrixSource {
-                table: stated,
-                component: Some(component),
-                stress_stiffening: stiffened,
-                constrained_rows: left_out,
-            }),
+        let known = self.structures.as_ref().zip(structure_key(&stated, folder));
+        let structure = match known {
+            Some((kept, key)) => kept.get_or_read(key, || read(&stated, folder)),
+            None => read(&stated, folder),
+        };
+        match structure {
+            Ok(ReadStructure { component, stress_stiffening, constrained_rows }) => {
+                Some(MatrixSource { table: stated, component: Some(component), stress_stiffening, constrained_rows })
+            }
             Err(problem) => {
                 self.problems.push(problem);
                 None
@@ -52,10 +55,31 @@ impl Reader {
     }
 }
 
+/// The content of the files of `[structure]`.
+#[derive(Debug, Clone)]
+pub(super) struct ReadStructure {
+    pub component: Component,
+    /// The stiffness that rotation adds.
+    pub stress_stiffening: Option<StressStiffening>,
+    /// Number of constrained rows in the files, which the component does not contain.
+    pub constrained_rows: usize,
+}
+
+/// Returns what identifies the content of the files; `None` if a file cannot be found.
+fn structure_key(stated: &CompiledTable, folder: &Path) -> Option<StructureKey> {
+    let keys = ["stiffness", "mass", "damping", "stiffened", "dofs"];
+    let files: Vec<_> = keys.into_iter().filter_map(|key| Some((key, file(stated, key)?))).collect();
+    let units = match &stated.entry("units")?.value {
+        CompiledValue::Fixed(ResolvedValue::Text(text)) => text,
+        _ => return None,
+    };
+    StructureKey::new(&files, units, folder)
+}
+
 /// A matrix and its key in the table.
 type KeyedMatrix = (&'static str, formats::Matrix);
 
-fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<StressStiffening>, usize), Problem> {
+fn read(stated: &CompiledTable, folder: &Path) -> Result<ReadStructure, Problem> {
     let problem = |key: &str, message: String| Problem::new(stated.location_of(key, None), key, message);
     let one = |key: &'static str| -> Result<Option<KeyedMatrix>, Problem> {
         let Some(file) = file(stated, key) else { return Ok(None) };
@@ -163,7 +187,7 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<(Component, Option<Stre
     if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.component_at(&component, 1.0)) {
         return Err(problem("stiffened", error.to_string()));
     }
-    Ok((component, stiffened, left_out.len()))
+    Ok(ReadStructure { component, stress_stiffening: stiffened, constrained_rows: left_out.len() })
 }
 
 /// Returns message and help for an error of the file formats.
@@ -178,10 +202,10 @@ fn message_and_help(error: formats::Error, path: &Path) -> (String, String) {
 }
 
 /// A file as stated in the table.
-struct StatedFile {
-    path: PathBuf,
-    name: Option<String>,
-    format: Option<String>,
+pub(super) struct StatedFile {
+    pub path: PathBuf,
+    pub name: Option<String>,
+    pub format: Option<String>,
 }
 
 fn file(stated: &CompiledTable, key: &str) -> Option<StatedFile> {

@@ -19,6 +19,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::work::{Computed, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{ValueType, required};
 use stickslip::curve::performance::{Performance, PerformanceError};
+use stickslip::curve::sweep::Watch;
 use stickslip::dimension::Dimension;
 use stickslip::model::System;
 
@@ -75,13 +76,16 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         range: peak_search::range(work),
         points: work.points.len(),
         quantities: &|orbit| moving_amplitudes(&prepared.system, orbit, &places),
+        watch: Watch { finished: &*work.context.finished, stop: &work.context.stop },
     };
     let row = match search.peak(0.0) {
         Ok(row) => row,
         Err(PerformanceError::Method(error)) => return Err((prepared.case.index, error)),
         Err(PerformanceError::System { cause, .. }) => match cause {},
     };
-    work.points.clone().for_each(|_| (work.context.finished)());
+    if work.context.stopped() {
+        return Ok(UnitResult::not_reached(work.points.len()));
+    }
     peak_search::count(prepared, &row, &mut part);
     peak_search::write(prepared, &row, &mut rows);
     if prepared.case.index == 0 && work.study.value_counts().iter().rev().take(2).any(|(count, _)| *count < 2) {

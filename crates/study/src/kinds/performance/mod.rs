@@ -23,6 +23,7 @@ use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use stickslip::curve::performance::{Performance, PerformanceCurve, PerformanceError};
+use stickslip::curve::sweep::Watch;
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
 
@@ -71,6 +72,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     order.sort_by(|a, b| value(a).total_cmp(&value(b)));
     let values: Vec<f64> = order.iter().map(value).collect();
     let curve = curve(work, &values).map_err(|error| (work.case().case.index, error))?;
+    if work.context.stopped() {
+        return Ok(UnitResult::not_reached(work.cases.len() * work.points.len()));
+    }
     let mut listed: Vec<_> = order.iter().zip(&curve.rows).collect();
     listed.sort_by_key(|(case, _)| **case);
     let (mut rows, mut optima) = (TableBuilder::default(), TableBuilder::default());
@@ -150,10 +154,9 @@ fn curve(work: &UnitTask<'_>, values: &[f64]) -> Result<PerformanceCurve, Method
         range: peak_search::range(work),
         points: work.points.len(),
         quantities: &|orbit| moving_amplitudes(&first.system, orbit, &places),
+        watch: Watch { finished: &*work.context.finished, stop: &work.context.stop },
     };
-    let result = performance.curve(values);
-    (0..work.cases.len() * work.points.len()).for_each(|_| (work.context.finished)());
-    match result {
+    match performance.curve(values) {
         Ok(curve) => Ok(curve),
         Err(PerformanceError::Method(error)) => Err(error),
         // every case was assembled before; intermediate values belong to the same model

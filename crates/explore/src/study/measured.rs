@@ -1,0 +1,130 @@
+//! Measured curves of `[[data]]` beside the computed ones.
+//!
+//! A table with the columns `frequency` and `response`, or a column with the name of a place,
+//! belongs to the curves of a response. A table with the columns `displacement` and `force`
+//! belongs to the loops of a hysteresis study.
+
+use stickslip::dimension::Dimension;
+use stickslip_study::dataset::{Axis, Figure, Panel, Series};
+use stickslip_study::{Study, units};
+
+/// Adds the measured curves that belong to a figure of a study, as marks.
+pub(crate) fn add(study: &Study, figure: &mut Figure) {
+    for name in study.data_names() {
+        match study.kind().name {
+            "response" => add_response(study, name, figure),
+            "hysteresis" => add_loop(study, name, figure),
+            _ => {}
+        }
+    }
+}
+
+fn add_response(study: &Study, table: &str, figure: &mut Figure) {
+    let places = places(figure);
+    for (place, colour) in &places {
+        for panel in figure.panels.iter_mut().filter(|panel| shows(panel, place)) {
+            let column = |role: &str, axis: &Axis| column(study, table, role, axis);
+            let Some(frequency) = column("frequency", &panel.x) else { continue };
+            let only = || column("response", &panel.y).filter(|_| places.len() == 1);
+            if let Some(values) = column(place, &panel.y).or_else(only) {
+                panel.series.push(Series::marks(format!("measured: {table}"), frequency, values, *colour));
+            }
+        }
+    }
+}
+
+fn add_loop(study: &Study, table: &str, figure: &mut Figure) {
+    for panel in &mut figure.panels {
+        let column = |role: &str, axis: &Axis| column(study, table, role, axis);
+        if let (Some(x), Some(y)) = (column("displacement", &panel.x), column("force", &panel.y)) {
+            let colour = panel.series.len();
+            panel.series.push(Series::marks(format!("measured: {table}"), x, y, colour));
+        }
+    }
+}
+
+/// Returns a column in the unit of an axis; `None` if it has another dimension.
+fn column(study: &Study, table: &str, role: &str, axis: &Axis) -> Option<Vec<f64>> {
+    let acceleration = Dimension { kg: 0, m: 1, s: -2, rad: 0 };
+    let known = [
+        ("m", Dimension::LENGTH),
+        ("m/s", Dimension::VELOCITY),
+        ("m/s^2", acceleration),
+        ("N", Dimension::FORCE),
+        ("rad/s", Dimension::FREQUENCY),
+    ];
+    let (factor, dimension) = known.into_iter().find_map(|(si, of)| Some((units::ratio(si, &axis.unit)?, of)))?;
+    let values = study.data_column(table, role, dimension)?;
+    Some(values.into_iter().map(|value| value * factor).collect())
+}
+
+/// Returns the places of the curves of a response, with their colours. A curve is named after
+/// its place, or after its case in a panel with the name of the place.
+fn places(figure: &Figure) -> Vec<(String, usize)> {
+    let mut found: Vec<(String, usize)> = Vec::new();
+    for panel in &figure.panels {
+        for series in panel.series.iter().filter(|series| !series.label.is_empty()) {
+            let name = if series.label.contains(" = ") { &panel.title } else { &series.label };
+            let is_curve = !name.starts_with("joints ") && series.x.len() > 2;
+            if is_curve && found.iter().all(|(known, _)| known != name) {
+                found.push((name.clone(), series.colour));
+            }
+        }
+    }
+    found
+}
+
+fn shows(panel: &Panel, place: &str) -> bool {
+    panel.title == place || panel.series.iter().any(|series| series.label == place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stickslip_study::dataset::Style;
+    use stickslip_study::run::{Context, run};
+    use stickslip_study::{read_study, templates};
+
+    /// The figure of a study beside a measured file.
+    fn figure(study: &str, data: &str) -> Figure {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("rig.csv"), data).unwrap();
+        let text = format!("{study}\n[[data]]\nname = \"rig\"\nfile = \"rig.csv\"\n");
+        let name = folder.path().join("study.toml");
+        let study = read_study(name.to_str().unwrap(), &text, &[]).unwrap();
+        let mut figure = run(&study, &Context::without_progress(2)).unwrap().figure;
+        add(&study, &mut figure);
+        figure
+    }
+
+    fn marks(figure: &Figure) -> Vec<&Series> {
+        let all = figure.panels.iter().flat_map(|panel| &panel.series);
+        all.filter(|series| series.label == "measured: rig" && series.style == Style::Marks).collect()
+    }
+
+    #[test]
+    fn a_measured_response_is_drawn_in_every_panel_of_its_place() {
+        let text = templates::find("blade-couple").unwrap().study.replace("points = 241", "points = 5");
+        let figure = figure(&text, "frequency_Hz,blade1 [mm]\n120,4\n121,22\n");
+        let found = marks(&figure);
+        assert_eq!(found.len(), 4, "one for each case");
+        assert!((found[0].x[0] - 120.0).abs() < 1e-9 && found[0].x.len() == 2, "{:?}", found[0].x);
+        assert!((found[0].y[1] - 22.0).abs() < 1e-12, "{:?}", found[0].y);
+        let curve = figure.panels[0].series.iter().find(|series| series.label == "blade1").unwrap();
+        assert_eq!(found[0].colour, curve.colour);
+    }
+
+    #[test]
+    fn a_measured_loop_is_drawn_over_the_computed_ones() {
+        let text = templates::find("element").unwrap().study;
+        let figure = figure(text, "displacement_mm,force_mN\n-1,0.5\n1,1\n");
+        let found = marks(&figure);
+        assert_eq!((found.len(), &found[0].x[..]), (1, &[-1.0, 1.0][..]));
+    }
+
+    #[test]
+    fn data_of_another_kind_are_not_drawn() {
+        let text = templates::find("element").unwrap().study;
+        assert!(marks(&figure(text, "time_s,response_m\n0,1\n1,2\n")).is_empty());
+    }
+}
