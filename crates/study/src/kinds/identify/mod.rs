@@ -44,7 +44,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, UnitResult, UnitSize, UnitTask};
 use crate::syntax::error::StudyError;
 use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
-use problem::Problem;
+use problem::FitProblem;
 pub use residuals::Residuals;
 use search::{SearchSettings, search};
 use stickslip::dimension::Dimension;
@@ -243,7 +243,7 @@ struct Identification {
     statistics: statistics::Statistics,
     fitted: Vec<targets::Fitted>,
     profiles: Vec<profile::Profile>,
-    problem: Problem,
+    problem: FitProblem,
 }
 
 fn compute(work: &UnitTask<'_>) -> Computed {
@@ -251,7 +251,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let case = &prepared.case;
     let mut part = UnitResult { tables: (0..5).map(|_| TableBuilder::default()).collect(), ..UnitResult::default() };
     let found = targets::build(work.study, case).map_err(|error| error.message).and_then(|targets| {
-        let problem = Problem::new(work.study, case, targets, &work.context.stop);
+        let problem = FitProblem::new(work.study, case, targets, &work.context.stop);
         let settings = SearchSettings::of(&case.values);
         let found = search(&problem, &settings)?;
         let statistics = statistics::Statistics::new(&problem, &found, settings.loss);
@@ -277,7 +277,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             part.tables = tables::write(
                 work,
                 &problem,
-                &tables::Outcome { found: &found, statistics: &statistics, fitted: &fitted, profiles: &profiles },
+                &tables::FitOutcome { found: &found, statistics: &statistics, fitted: &fitted, profiles: &profiles },
             );
             part.count(|| case.label(), CONVERGED, None);
         }

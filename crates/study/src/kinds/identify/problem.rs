@@ -1,7 +1,7 @@
 //! The least-squares problem: weighted residuals over scaled parameters, and their derivatives.
 //!
 //! A scaled parameter runs from 0 to 1 over its range, by differences or by ratios. Derivatives
-//! are central differences of a fraction [`Problem::DIFFERENCE`] of the range; the orbits at both
+//! are central differences of a fraction [`FitProblem::DIFFERENCE`] of the range; the orbits at both
 //! ends begin from the orbit between them.
 
 use super::targets::{Fitted, RowStates, Target};
@@ -21,7 +21,7 @@ pub(super) enum DerivativesOf {
 
 /// The residuals of a case.
 #[derive(Debug)]
-pub(super) struct Problem {
+pub(super) struct FitProblem {
     study: Study,
     case: Case,
     pub targets: Vec<Box<dyn Target>>,
@@ -34,7 +34,7 @@ pub(super) struct Problem {
     states: Mutex<Vec<RowStates>>,
 }
 
-impl Problem {
+impl FitProblem {
     /// Fraction of a range by which derivatives change a parameter. The error of a central
     /// difference is of the order of its square, 1e-8; orbits and motions in time, whose steps are
     /// adapted, differ by up to 1e-9 in addition.
@@ -43,7 +43,7 @@ impl Problem {
     /// The residuals of a case; `stop` ends all computations.
     pub fn new(study: &Study, case: &Case, targets: Vec<Box<dyn Target>>, stop: &Arc<AtomicBool>) -> Self {
         let states = vec![RowStates::new(); targets.len()];
-        Problem {
+        FitProblem {
             study: study.clone(),
             case: case.clone(),
             targets,

@@ -6,7 +6,7 @@
 //! parameter that is bounded on one side only.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), section 5.2.
 
-use super::problem::Problem;
+use super::problem::FitProblem;
 use super::search::{Fixed, Found, SearchSettings, minimize};
 use super::statistics::Statistics;
 
@@ -51,7 +51,7 @@ pub(super) struct Profile {
 
 /// Computes the profiles of all parameters.
 pub(super) fn profiles(
-    problem: &Problem,
+    problem: &FitProblem,
     search: &SearchSettings,
     found: &Found,
     statistics: &Statistics,

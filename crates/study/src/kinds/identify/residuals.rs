@@ -1,6 +1,6 @@
 //! Residuals of an identification and their derivatives, for solvers and samplers of other programs.
 
-use super::problem::Problem;
+use super::problem::FitProblem;
 use super::targets;
 use crate::case::study::Study;
 use crate::syntax::error::StudyError;
@@ -44,7 +44,7 @@ use std::sync::atomic::AtomicBool;
 /// ```
 #[derive(Debug)]
 pub struct Residuals {
-    problem: Problem,
+    problem: FitProblem,
 }
 
 impl Residuals {
@@ -59,7 +59,7 @@ impl Residuals {
         }
         let case = study.case(case)?;
         let targets = targets::build(study, &case).map_err(|error| refuse(error.message))?;
-        Ok(Residuals { problem: Problem::new(study, &case, targets, &Arc::new(AtomicBool::new(false))) })
+        Ok(Residuals { problem: FitProblem::new(study, &case, targets, &Arc::new(AtomicBool::new(false))) })
     }
 
     /// Returns the names of the fitted parameters.

@@ -3,7 +3,7 @@
 //!
 //! Source: M. A. Branch, T. F. Coleman, Y. Li (1999), by the crate `basin`.
 
-use super::problem::Problem;
+use super::problem::FitProblem;
 use super::statistics::Loss;
 use crate::case::sample::Design;
 use crate::case::values::Values;
@@ -73,7 +73,7 @@ const SAME_COST: f64 = 1e-4;
 ///
 /// # Errors
 /// The model has no residuals at any start, or no minimization converged.
-pub(super) fn search(problem: &Problem, settings: &SearchSettings) -> Result<Found, String> {
+pub(super) fn search(problem: &FitProblem, settings: &SearchSettings) -> Result<Found, String> {
     let stated = problem.stated();
     let dimensions = stated.len();
     let sobol = |index: usize| -> Vec<f64> {
@@ -119,14 +119,14 @@ pub(super) struct Fixed(pub usize);
 
 /// Minimizes from one start. Returns loss and scaled parameters.
 pub(super) fn minimize(
-    problem: &Problem,
+    problem: &FitProblem,
     settings: &SearchSettings,
     start: Vec<f64>,
     fixed: Option<Fixed>,
 ) -> Option<(f64, Vec<f64>)> {
     fn run<L: LossFunction<f64>>(
         loss: L,
-        problem: &Problem,
+        problem: &FitProblem,
         settings: &SearchSettings,
         start: Vec<f64>,
         fixed: Option<Fixed>,
@@ -156,7 +156,7 @@ pub(super) fn minimize(
 
 /// The problem in the form of the solver.
 struct Bounded<'p> {
-    problem: &'p Problem,
+    problem: &'p FitProblem,
     lower: Vec<f64>,
     upper: Vec<f64>,
     /// All parameters; those that are not free keep these values.

@@ -7,7 +7,7 @@
 //! without structure and a model that is nearly linear within them.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
 
-use super::problem::Problem;
+use super::problem::FitProblem;
 use super::search::Found;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -148,7 +148,7 @@ const LARGEST_STEP: f64 = 0.5;
 const EXACT: f64 = 1e-5;
 
 impl Statistics {
-    pub fn new(problem: &Problem, found: &Found, loss: Loss) -> Self {
+    pub fn new(problem: &FitProblem, found: &Found, loss: Loss) -> Self {
         let (x, p) = (&found.x, found.x.len());
         let residuals = problem.residuals(x);
         let jacobian = problem.jacobian(x, &problem.all());
@@ -282,7 +282,7 @@ impl Statistics {
     }
 
     /// Returns what a reader must know of the estimates, as sentences.
-    pub fn warnings(&self, problem: &Problem) -> Vec<String> {
+    pub fn warnings(&self, problem: &FitProblem) -> Vec<String> {
         let mut warnings = Vec::new();
         for (range, parameter) in problem.ranges.iter().zip(&self.parameters) {
             if parameter.estimate == Estimate::AtBound {
@@ -314,7 +314,7 @@ impl Statistics {
 
 impl Undetermined {
     /// Describes the direction in words.
-    fn text(&self, problem: &Problem) -> String {
+    fn text(&self, problem: &FitProblem) -> String {
         let direction = &self.change;
         let name = |k: &usize| format!("`{}`", problem.ranges[*k].name);
         match self.parameters.as_slice() {
@@ -350,7 +350,7 @@ impl Undetermined {
 }
 
 /// Returns the correlation of residuals in neighbouring rows of the same group.
-fn autocorrelation(problem: &Problem, residuals: &[f64]) -> f64 {
+fn autocorrelation(problem: &FitProblem, residuals: &[f64]) -> f64 {
     let (mut products, mut squares, mut at) = (0.0, 0.0, 0);
     for target in problem.targets.iter().filter(|target| !target.is_predicted()) {
         let (measured, per_row) = (target.measured(), target.quantities().len());

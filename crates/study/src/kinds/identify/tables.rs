@@ -1,6 +1,6 @@
 //! Tables of an identification.
 
-use super::problem::{DerivativesOf, Problem};
+use super::problem::{DerivativesOf, FitProblem};
 use super::profile::Profile;
 use super::search::Found;
 use super::statistics::Statistics;
@@ -25,7 +25,7 @@ pub(super) const CORRELATIONS: &str = "correlations";
 pub(super) const PROFILE: &str = "profile";
 
 /// The result of a case.
-pub(super) struct Outcome<'a> {
+pub(super) struct FitOutcome<'a> {
     pub found: &'a Found,
     pub statistics: &'a Statistics,
     pub fitted: &'a [Fitted],
@@ -34,7 +34,7 @@ pub(super) struct Outcome<'a> {
 }
 
 /// Writes the rows of all tables of a case.
-pub(super) fn write(work: &UnitTask<'_>, problem: &Problem, outcome: &Outcome<'_>) -> Vec<TableBuilder> {
+pub(super) fn write(work: &UnitTask<'_>, problem: &FitProblem, outcome: &FitOutcome<'_>) -> Vec<TableBuilder> {
     let case = &work.case().case;
     let statistics = outcome.statistics;
     let (mut parameters, mut fit) = (TableBuilder::default(), TableBuilder::default());
@@ -180,7 +180,7 @@ fn shown_values(
 
 /// Returns sentences about the targets that were predicted: the largest value and its place, group
 /// by group, and the typical deviation.
-pub(super) fn predictions(problem: &Problem, fitted: &[Fitted]) -> Vec<String> {
+pub(super) fn predictions(problem: &FitProblem, fitted: &[Fitted]) -> Vec<String> {
     let mut sentences = Vec::new();
     for (target, fitted) in problem.targets.iter().zip(fitted).filter(|(target, _)| target.is_predicted()) {
         let per_row = target.quantities().len();
