@@ -213,9 +213,11 @@ mod tests {
         assert!((power / 4.5 - 1.0).abs() < 1e-6, "{power}");
         let highest = (0..density.len()).max_by(|a, b| density[*a].total_cmp(&density[*b])).expect("a line");
         assert!((highest as f64 * width - 50.0).abs() < width);
-        // eight half-overlapping segments have 15.2 degrees of freedom: 0.55 to 2.43
+        // eight half-overlapping segments have 15.258 degrees of freedom; the quotients with the
+        // quantiles of the chi-squared distribution are 0.54807 and 2.37381 by SciPy
         let [low, high] = segments.confidence();
-        assert!(segments.count == SEGMENTS && (low - 0.55).abs() < 0.01 && (high - 2.43).abs() < 0.03, "{low} {high}");
+        assert_eq!(segments.count, SEGMENTS);
+        assert!((low / 0.54807 - 1.0).abs() < 1e-3 && (high / 2.37381 - 1.0).abs() < 4e-3, "{low} {high}");
     }
 
     /// A sine on a resonant oscillator: `|y| = a sqrt(1 + 4ζ²)/(2ζ)`; a soft one hardly moves, and a
