@@ -338,9 +338,7 @@ pub enum ObservedMotion {
     /// A body drifts away, period by period.
     Drifts {
         /// The place with the largest drift.
-        place: String,
-        /// Its drift, m.
-        drift: f64,
+        place: Box<str>,
         /// Number of periods of this drift.
         periods: usize,
         /// Its mean speed, m/s.
@@ -349,7 +347,7 @@ pub enum ObservedMotion {
         /// of the mass that moves, times the squared frequency.
         spring: f64,
         /// The joint that is separated for the largest fraction of the last period.
-        joint: String,
+        joint: Box<str>,
         /// This fraction; zero if no faces separate.
         open_fraction: f64,
     },
@@ -387,11 +385,10 @@ impl std::fmt::Display for ObservedMotion {
             ObservedMotion::Repeats { periods } => {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
-            ObservedMotion::Drifts { place, drift, periods, speed, spring, joint, open_fraction } => write!(
+            ObservedMotion::Drifts { place, periods, speed, spring, joint, open_fraction } => write!(
                 f,
-                "drifts: `{place}` moves by {drift:.2e} m in {periods} periods, at {:.3} mm/s{}; hold it by a weak spring \
-                 along this direction ({spring:.1e} N/m hardly changes the vibration), increase the normal loads, or add \
-                 damping",
+                "drifts: `{place}` moves at {:.3} mm/s over {periods} periods{}; hold it by a weak spring along this \
+                 direction ({spring:.1e} N/m hardly changes the vibration), increase the normal loads, or add damping",
                 1e3 * speed,
                 apart(joint, *open_fraction)
             ),

@@ -8,17 +8,25 @@ use stickslip::model::{Model, ModelError, System};
 
 /// Keeps the last model with its system. Copies share it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct LastAssembled(Arc<Mutex<Option<Arc<(Model, System)>>>>);
+pub(crate) struct LastAssembled(Arc<Mutex<Option<Arc<Assembled>>>>);
+
+/// A model with its system.
+#[derive(Debug)]
+struct Assembled {
+    model: Model,
+    system: System,
+}
 
 impl LastAssembled {
     /// Returns the system of a model, which is assembled unless it was the last one.
     pub(crate) fn system(&self, model: &Model) -> Result<System, ModelError> {
         let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some(last) = last.filter(|last| last.0 == *model) {
-            return Ok(last.1.clone());
+        if let Some(last) = last.filter(|last| last.model == *model) {
+            return Ok(last.system.clone());
         }
         let system = model.assemble()?;
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new((model.clone(), system.clone())));
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(Arc::new(Assembled { model: model.clone(), system: system.clone() }));
         Ok(system)
     }
 }

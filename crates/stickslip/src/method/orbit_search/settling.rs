@@ -169,12 +169,11 @@ fn classified(
         let mass = axis.rows().iter().map(|(row, weight)| weight * weight * system.structure().diagonal_mass(*row));
         let mass = mass.sum::<f64>() / (squares * squares);
         return ObservedMotion::Drifts {
-            place: place.clone(),
-            drift,
+            place: place.as_str().into(),
             periods: last,
             speed: drift * omega / (last as f64 * TAU),
             spring: 0.01 * mass * omega * omega,
-            joint,
+            joint: joint.into(),
             open_fraction: share,
         };
     }
@@ -215,14 +214,10 @@ mod tests {
         assert_eq!(classify_motion(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
             let (course, ..) = classify_motion(&block(load), OMEGA, Vec::new()).unwrap();
-            let ObservedMotion::Drifts { ref place, drift, periods, speed: measured, spring, open_fraction, .. } =
-                course
-            else {
+            let ObservedMotion::Drifts { ref place, speed: measured, spring, open_fraction, .. } = course else {
                 panic!("{course}")
             };
-            assert_eq!(place, along);
-            let expected = speed * periods as f64 * TAU / OMEGA;
-            assert!((drift / expected - 1.0).abs() < 1e-3, "{drift} {expected}");
+            assert_eq!(&**place, along);
             assert!((measured / speed - 1.0).abs() < 1e-3, "{measured} {speed}");
             // the block has 1 kg
             assert_eq!(spring, 0.01 * OMEGA * OMEGA);

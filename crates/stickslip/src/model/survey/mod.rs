@@ -132,7 +132,7 @@ impl Model {
                 *carried = Some(force);
             }
         }
-        let unpressed = if loose.is_empty() { None } else { preload::unpressed(&system, &joints, &at_rest) };
+        let unpressed = if loose.is_empty() { None } else { preload::unpressed(system, &joints, &at_rest) };
         if system.dofs() > MAX_DOFS {
             let unresolved = system.dofs();
             let unknown = || LinearStructure {
