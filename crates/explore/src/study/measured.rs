@@ -5,7 +5,7 @@
 //! belongs to the loops of a hysteresis study.
 
 use stickslip::dimension::Dimension;
-use stickslip_study::dataset::{Axis, Figure, Panel, Series};
+use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Series};
 use stickslip_study::{Study, units};
 
 /// Adds the measured curves that belong to a figure of a study, as marks.
@@ -65,7 +65,8 @@ fn places(figure: &Figure) -> Vec<(String, usize)> {
     for panel in &figure.panels {
         for series in panel.series.iter().filter(|series| !series.label.is_empty()) {
             let name = if series.label.contains(" = ") { &panel.title } else { &series.label };
-            let is_curve = !name.starts_with("joints ") && series.x.len() > 2;
+            let is_reference = matches!(series.emphasis, Emphasis::Reference | Emphasis::OwnReference);
+            let is_curve = !is_reference && series.x.len() > 2;
             if is_curve && found.iter().all(|(known, _)| known != name) {
                 found.push((name.clone(), series.colour));
             }
@@ -112,6 +113,22 @@ mod tests {
         assert!((found[0].y[1] - 22.0).abs() < 1e-12, "{:?}", found[0].y);
         let curve = figure.panels[0].series.iter().find(|series| series.label == "blade1").unwrap();
         assert_eq!(found[0].colour, curve.colour);
+    }
+
+    /// The linear references are not places, so that `response` belongs to the only mass.
+    #[test]
+    fn a_response_belongs_to_the_only_place() {
+        let text = "schema = 1\n[[mass]]\nname = \"body\"\nmass = \"1 kg\"\n\
+            [[spring]]\nbetween = [\"body\", \"ground\"]\nstiffness = \"10 N/mm\"\ndamping = \"2 N s/m\"\n\
+            [[joint]]\nname = \"foot\"\nbetween = [\"body\", \"ground\"]\n\
+            law = { kind = \"jenkins\", stiffness = \"2 N/mm\", limit = \"1 N\" }\n\
+            [[force]]\non = \"body\"\namplitude = \"2 N\"\n\
+            [study]\nkind = \"response\"\nfrequency = { from = \"14 Hz\", to = \"19 Hz\", points = 11 }\n\
+            [figure]\nreferences = true\n";
+        let figure = figure(text, "frequency_Hz,response_mm\n15,1\n16,2\n");
+        assert!(figure.panels[0].series.iter().any(|series| series.emphasis == Emphasis::Reference));
+        let found = marks(&figure);
+        assert_eq!((found.len(), &found[0].y[..]), (1, &[1.0, 2.0][..]));
     }
 
     #[test]
