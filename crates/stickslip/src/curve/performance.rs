@@ -112,7 +112,6 @@ impl<E: Send> Performance<'_, E> {
     }
 
     fn watched_peak(&self, value: f64, watch: Watch<'_>) -> Result<PerformanceRow, PerformanceError<E>> {
-        let stopped = || watch.stop.load(Ordering::Relaxed);
         let system = (self.system)(value).map_err(|cause| PerformanceError::System { value, cause })?;
         let mut solver = branch_following::solver(self.method, &system).map_err(PerformanceError::Method)?;
         let last = self.points.max(3) - 1;
@@ -136,9 +135,8 @@ impl<E: Send> Performance<'_, E> {
             });
             drop_unused_series(&mut points);
         });
-        if stopped() {
-            let none = PerformanceRow { value, peak: None, reverse_sweep_only: false, failed, inaccurate };
-            return Ok(none);
+        if watch.stop.load(Ordering::Relaxed) {
+            return Ok(PerformanceRow { value, peak: None, reverse_sweep_only: false, failed, inaccurate });
         }
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
         let mut peak = highest_peak(&mut *solver, &points, wanted, self.quantities);

@@ -193,7 +193,7 @@ fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
     let highest = to * f64::from(*harmonics.last()?);
     let below = |modes: &LinearModes| modes.elastic.iter().filter(|mode| mode.omega <= highest).count();
     let most = below(one.survey.free()).max(below(one.survey.stuck()));
-    let Ok(Some(waves)) = one.case.model.wave_modes_of(one.survey.system(), most) else { return narrowest(one) };
+    let Some(waves) = one.case.model.wave_modes_of(one.survey.system(), most) else { return narrowest(one) };
     let met = |harmonic: u32| {
         let turns = CyclicSymmetry { sectors, order }.diameter(harmonic as usize);
         waves.iter().find(|wave| wave.diameter == turns.min(sectors - turns))

@@ -28,7 +28,7 @@
 //! - `dynamics/`: receptances of the linear part;
 //! - `linear_solve/`: the linear system of a Newton step;
 //! - `newton`, `line_search`: Newton's method with line search;
-//! - `globalization/`: these searches.
+//! - `globalization/`: the fallbacks if Newton's method fails, in one table.
 //!
 //! Results:
 //! - `accuracy/`: number of harmonics, truncation error, sampling error;

@@ -218,24 +218,21 @@ impl Model {
     /// assert!((waves[3].free_shapes[0][0].re - (1.0f64 / 6.0).sqrt()).abs() < 1e-12);
     /// ```
     pub fn wave_modes(&self, lowest: usize) -> Result<Option<Vec<WaveModes>>, ModelError> {
-        match self.ring {
-            Some(ring) if ring.equal => self.wave_modes_of(&self.assemble()?, lowest),
-            _ => Ok(None),
+        if !self.ring.is_some_and(|ring| ring.equal) {
+            return Ok(None);
         }
+        Ok(self.wave_modes_of(&self.assemble()?, lowest))
     }
 
-    /// Returns the result of [`Model::wave_modes`] for the assembled model.
-    ///
-    /// # Errors
-    /// As for [`Model::wave_modes`].
-    pub fn wave_modes_of(&self, system: &System, lowest: usize) -> Result<Option<Vec<WaveModes>>, ModelError> {
-        let Some(ring) = self.ring.filter(|ring| ring.equal) else { return Ok(None) };
+    /// Returns the modes of [`Model::wave_modes`] for the assembled model.
+    pub fn wave_modes_of(&self, system: &System, lowest: usize) -> Option<Vec<WaveModes>> {
+        let ring = self.ring.filter(|ring| ring.equal)?;
         let (sectors, n) = (ring.sectors, system.dofs() / ring.sectors);
         if self.substructure.is_some() || self.moves_bodies() {
-            return Ok(of_matrices(system, sectors, lowest, &self.sector_axes(system)));
+            return of_matrices(system, sectors, lowest, &self.sector_axes(system));
         }
         if n == 0 || 2 * n > MAX_DOFS {
-            return Ok(None);
+            return None;
         }
         let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
         let ends = |between: &[String; 2]| -> Row {
@@ -279,7 +276,7 @@ impl Model {
                 once(LinearStructure::new(&mass, &springs.iter().chain(&held).collect::<Vec<_>>(), &rigid));
             turned.modes(free_ones, stuck_ones, &places)
         };
-        Ok(Some((0..=sectors / 2).map(wave).collect()))
+        Some((0..=sectors / 2).map(wave).collect())
     }
 
     /// Returns the places of the first sector of a disk, with their names in the ring. Empty if

@@ -133,11 +133,7 @@ const TOO_LARGE: &str = "the sectors are too large to compute all their modes, o
 /// # Errors
 /// Returns a text if the sectors are too large or the modes are not found.
 pub(super) fn waves(model: &Model, system: &System, most: usize) -> Result<Vec<WaveModes>, String> {
-    match model.wave_modes_of(system, most) {
-        Ok(Some(waves)) => Ok(waves),
-        Ok(None) => Err(TOO_LARGE.to_owned()),
-        Err(error) => Err(error.to_string()),
-    }
+    model.wave_modes_of(system, most).ok_or_else(|| TOO_LARGE.to_owned())
 }
 
 fn compute(work: &UnitTask<'_>) -> Computed {

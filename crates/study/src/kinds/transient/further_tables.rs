@@ -10,6 +10,7 @@ use crate::run::work::PreparedCase;
 use std::f64::consts::TAU;
 use stickslip::orbit::Sample;
 use stickslip_numerics::fourier::FourierPlan;
+use stickslip_numerics::random::normal_quantile;
 
 /// Work done on every joint over time.
 pub(super) const JOINT_WORK: &str = "joint_work";
@@ -193,7 +194,7 @@ impl Segments {
             let part = 2.0 / (9.0 * freedom);
             freedom * (1.0 - part + z * part.sqrt()).powi(3)
         };
-        [freedom / quantile(1.959_963_985), freedom / quantile(-1.959_963_985)]
+        [0.975, 0.025].map(|share| freedom / quantile(normal_quantile(share)))
     }
 }
 
