@@ -201,8 +201,8 @@ const POINTS: Key =
 /// Keys of a range of frequencies.
 pub const FREQUENCY_RANGE: &[Key] = &[FROM, TO, POINTS];
 
-/// Keys of the range of a parameter of a map.
-pub const MAP_RANGE: &[Key] = &[
+/// Keys of the range of a varied parameter.
+pub const PARAMETER_RANGE: &[Key] = &[
     FROM,
     TO,
     POINTS,

@@ -16,7 +16,7 @@ use stickslip::dimension::Dimension;
 use stickslip::{law, method};
 
 pub use crate::syntax::key::{
-    ADAPTIVE_RANGE, Bounds, END_POINTS_RANGE, FREQUENCY_RANGE, Key, MAP_RANGE, MAX_CASES, MAX_MASSES, MAX_POINTS,
+    ADAPTIVE_RANGE, Bounds, END_POINTS_RANGE, FREQUENCY_RANGE, Key, MAX_CASES, MAX_MASSES, MAX_POINTS, PARAMETER_RANGE,
     Presence, VERSION, ValueType, default, optional, required, unsupported,
 };
 
@@ -677,7 +677,7 @@ pub const STUDY: &[Key] = &[
     optional(
         "vary",
         ValueType::Vary,
-        "runs the study for every combination of these parameter values: one value, a list, or `{ from, to, points }`",
+        "runs the study for every combination of these parameter values: one value, a list, or `{ from, to, points }`, also with `scale = \"log\"`",
         "{ Ft = [\"2 N\", \"4 N\"] }",
     ),
 ];
@@ -767,7 +767,10 @@ pub fn describe_value(takes: &ValueType) -> String {
             format!("one of {}", crate::syntax::suggest::alternatives(words().iter().map(|word| word.0)))
         }
         ValueType::Parameters => "a table of quantities by name".to_owned(),
-        ValueType::Vary => "a table from parameters to a value, a list of values, or { from, to, points }".to_owned(),
+        ValueType::Vary => {
+            "a table from parameters to a value, a list of values, or { from, to, points }, also with scale = \"log\""
+                .to_owned()
+        }
         ValueType::Over => {
             "a table from two parameters to ranges { from, to, points }, each also with scale = \"log\"".to_owned()
         }
@@ -906,11 +909,11 @@ fn takes_schema(takes: &ValueType) -> Value {
         ValueType::Vary => json!({
             "type": "object",
             "additionalProperties": {
-                "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(FREQUENCY_RANGE)],
+                "anyOf": [quantity(), { "type": "array", "items": quantity(), "minItems": 1 }, object(PARAMETER_RANGE)],
             },
         }),
         ValueType::Over => json!({
-            "type": "object", "additionalProperties": object(MAP_RANGE), "minProperties": 2, "maxProperties": 2,
+            "type": "object", "additionalProperties": object(PARAMETER_RANGE), "minProperties": 2, "maxProperties": 2,
         }),
         ValueType::Sample => object(SAMPLE),
         ValueType::Distributions => {

@@ -100,6 +100,20 @@ fn cells_are_the_peaks_of_performance_curves() {
     }
 }
 
+/// A range of `vary` may have equal ratios. The peaks are those of the same list.
+#[test]
+fn varied_ranges_may_be_logarithmic() {
+    let performance = |values: &str| dataset(&format!("kind = \"performance\"\n{RANGE}\nvary = {{ c = {values} }}"));
+    let range = performance("{ from = \"0.05 kg/s\", to = \"0.2 kg/s\", points = 3, scale = \"log\" }");
+    let list = performance("[\"0.05 kg/s\", \"0.1 kg/s\", \"0.2 kg/s\"]");
+    for name in ["c_kg_per_s", "amplitude_m"] {
+        let (range, list) = (column(&range, "performance", name), column(&list, "performance", name));
+        assert!(range.iter().zip(list).all(|(a, b)| (a / b - 1.0).abs() < 1e-9), "{range:?} {list:?}");
+    }
+    assert_eq!(range.figure.panels[0].x.scale, Scale::Log);
+    assert_eq!(list.figure.panels[0].x.scale, Scale::Linear);
+}
+
 /// Tiles fill the panel without gaps; on a logarithmic axis their borders are geometric means.
 #[test]
 fn tiles_fill_the_panel() {

@@ -137,7 +137,7 @@ impl Reader {
                     self.quantities(&entry.key, list, &entry.node.location).map(ParameterValues::List)
                 }
                 TomlValue::Table(table) => {
-                    self.range(table, schema::FREQUENCY_RANGE, &entry.key).map(ParameterValues::from)
+                    self.range(table, schema::PARAMETER_RANGE, &entry.key).map(ParameterValues::from)
                 }
                 _ => self.quantity(&entry.key, &entry.node).map(|quantity| ParameterValues::List(vec![quantity])),
             };
@@ -202,7 +202,7 @@ impl Reader {
                 self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message));
                 continue;
             }
-            let Some(range) = self.range(range, schema::MAP_RANGE, &entry.key) else { continue };
+            let Some(range) = self.range(range, schema::PARAMETER_RANGE, &entry.key) else { continue };
             let own = &parameters[index].quantity;
             if self.template != Some(own.location.source) {
                 self.problems.extend(bare_number_problem(&entry.key, [own, &range.from, &range.to]));

@@ -2,6 +2,7 @@
 
 use super::tables;
 use crate::case::study::varied_text;
+use crate::compile::compiled::RangeScale;
 use crate::results::columns::AMPLITUDE;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
@@ -24,13 +25,10 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         let parameter = varied.as_ref().and(cases.get(curve))?.varied.first();
         parameter.map(|parameter| parameter.in_file_unit().0)
     };
-    let panel = |title: String, series| Panel {
-        title,
-        x: Axis::new(&inner.name, inner.in_axis_unit().1),
-        y: y_axis.clone(),
-        series,
-        ..Panel::default()
-    };
+    let spacing = drawing.study.value_counts().last().and_then(|(_, scale)| *scale);
+    let x = Axis::new(&inner.name, inner.in_axis_unit().1);
+    let x = if spacing == Some(RangeScale::Log) { x.log() } else { x };
+    let panel = |title: String, series| Panel { title, x: x.clone(), y: y_axis.clone(), series, ..Panel::default() };
     if drawing.study.draws().is_some() {
         // each entry holds all parameters but the last; its first case represents it
         let groups = drawing.group_draws(&cases);
