@@ -220,8 +220,22 @@ fn may_succeed_elsewhere(error: &OrbitError) -> bool {
             | OrbitError::Breakdown { .. }
             | OrbitError::Evidence { .. }
             | OrbitError::Truncation { .. }
-            | OrbitError::NoOrbit { observed: ObservedMotion::Settles | ObservedMotion::Settling { .. }, .. }
+            | OrbitError::NoOrbit {
+                observed: ObservedMotion::Settles | ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. },
+                ..
+            }
     )
+}
+
+/// Returns the first orbit, or the second if there is no first. If there are both, their largest
+/// relative difference in amplitude is the spread over histories.
+fn with_history_spread(first: Option<Orbit>, second: Option<Orbit>) -> Option<Orbit> {
+    let (Some(mut orbit), Some(other)) = (first.clone(), second.clone()) else { return first.or(second) };
+    let size = orbit.places.iter().map(|place| place.amplitude()).fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = orbit.places.iter().zip(&other.places);
+    let apart = pairs.map(|(a, b)| (a.amplitude() - b.amplitude()).abs() / size).fold(0.0, f64::max);
+    orbit.evidence.history_spread = Some(apart);
+    Some(orbit)
 }
 
 impl Solver for WithFallback<'_> {
@@ -239,7 +253,15 @@ impl Solver for WithFallback<'_> {
         let Some((name, second)) = self.second() else { return Err(error) };
         let candidate = error.candidate().map(|state| Seed::from_state(request.omega, state.to_vec()));
         let near = Request { seed: by_second.or(candidate.as_ref()), ..*request };
-        let mut orbit = second.solve(&near, budget).map_err(|_| error.with_failed_alternative(name))?;
+        let found = second.solve(&near, budget).ok();
+        let mut orbit = match found {
+            Some(orbit) if orbit.evidence.history_dependent.is_empty() || by_second.is_some() => orbit,
+            // the candidate and the static equilibrium are two histories of the stuck joints
+            found => {
+                let from_equilibrium = second.solve(&Request { seed: None, ..*request }, budget).ok();
+                with_history_spread(found, from_equilibrium).ok_or_else(|| error.with_failed_alternative(name))?
+            }
+        };
         orbit.evidence.fallback_from = Some(chosen);
         Ok(orbit)
     }

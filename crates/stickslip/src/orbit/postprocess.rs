@@ -156,8 +156,9 @@ pub(crate) fn results<S: PathSignals>(
         let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
         let ContactSummary { shares, switches, sticks_throughout } = signals.faces(j);
         // A law without a slip limit never slips, and a smooth law always creeps. Neither counts
-        // as stuck, because their orbits are unique.
-        if sticks_throughout && joint.law().force_scale().is_finite() && joint.law().rate().is_none() {
+        // as stuck, because their orbits are unique. The limit of a contact follows its pressure.
+        let slips = joint.law().force_scale().is_finite() || joint.law().normal().is_some();
+        if sticks_throughout && slips && joint.law().rate().is_none() {
             stuck.push(joint.name().to_owned());
         }
         joints.push(JointMotion {

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
 use stickslip::method::harmonic_balance::HarmonicBalance;
-use stickslip::orbit::Seed;
+use stickslip::orbit::{Orbit, Seed};
 use stickslip_verification::loose_dampers::{LooseDamper, Settings, loose_damper, roof_damper};
 
 /// Default number of random dampers.
@@ -161,4 +161,28 @@ fn a_roof_damper_has_its_orbits_at_all_speeds() {
         }
     }
     assert!(missed.is_empty(), "{missed:#?}");
+}
+
+/// Orbits that Newton's method with few harmonics does not reach: one that needs the motion of a
+/// time integration and 63 harmonics, and one on stuck contacts whose traction at rest is beyond
+/// the slip limit.
+#[test]
+fn orbits_are_found_from_a_time_integration_and_by_the_second_method() {
+    let orbit_of = |damper: &LooseDamper, hertz: f64| {
+        let away = |omega: &&f64| (*omega / TAU - hertz).abs();
+        let omega = *damper.frequencies.iter().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap();
+        (omega, Auto.solver(&damper.system()).unwrap().orbit(omega).unwrap())
+    };
+    let amplitudes = |orbit: &Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
+    let damper = loose_damper(66);
+    let (omega, orbit) = orbit_of(&damper, 174.747);
+    assert_eq!(orbit.evidence.found_by, "time-integration");
+    let reference = damper.settled(omega, COURSES[2]).unwrap();
+    let distance = apart(&damper, &amplitudes(&orbit), &reference);
+    assert!(distance < NEAR, "{distance:.1e}");
+    let damper = loose_damper(40);
+    let (omega, orbit) = orbit_of(&damper, 80.819);
+    assert_eq!(orbit.evidence.fallback_from, Some("harmonic-balance"));
+    let distance = apart(&damper, &amplitudes(&orbit), &damper.stuck(omega).unwrap());
+    assert!(distance < 1e-4, "{distance:.1e}");
 }

@@ -395,8 +395,13 @@ impl HarmonicBalanceSolver {
         // without a series, a time integration begins at the seed's state
         let warm = series.or_else(|| self.guess_from_state(&request.seed?.state, omega));
         let mut found = match self.converge(self.first, omega, warm) {
-            Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
-                self.solve_or_classify(omega).unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error))
+            Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => self
+                .solve_or_classify(self.first, omega)
+                .unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error)),
+            // a longer series was not reached from the shorter one
+            Err(error @ OrbitError::Truncation { harmonics, needed: None, .. }) => {
+                let longer = self.harmonic_set.doubled(harmonics * self.periods);
+                self.solve_or_classify(longer, omega).and_then(Result::ok).ok_or(error)
             }
             found => found,
         };

@@ -104,14 +104,15 @@ impl HarmonicBalanceSolver {
         Some(motion)
     }
 
-    /// Integrates in time if only contacts support a body and no orbit was found.
+    /// Integrates in time if only contacts support a body and no orbit with harmonics up to
+    /// `top` was found.
     ///
     /// The search continues from the settled motion. If that fails, the error describes the
     /// motion. Returns `None` if the motion is not integrated.
-    pub(crate) fn solve_or_classify(&mut self, omega: f64) -> Option<Result<Orbit, OrbitError>> {
-        let top = self.method.harmonics.unwrap_or(self.first);
+    pub(crate) fn solve_or_classify(&mut self, top: usize, omega: f64) -> Option<Result<Orbit, OrbitError>> {
+        let top = self.method.harmonics.unwrap_or(top);
         let vibrates = self.system.harmonics_of_excitation(|z| z != Complex64::ZERO).iter().any(|h| *h > 0);
-        if self.periods > 1 || !vibrates || !self.discretizations.get(&top)?.is_held_by_contacts() {
+        if self.periods > 1 || !vibrates || !self.discretization(top, omega).ok()?.is_held_by_contacts() {
             return None;
         }
         let excitation = self.excitation_frequency;
