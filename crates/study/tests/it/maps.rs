@@ -100,6 +100,25 @@ fn cells_are_the_peaks_of_performance_curves() {
     }
 }
 
+/// A slip limit of 0.5 N does not hold a body without a spring against a constant force of 0.7 N.
+/// The figures show the values without a peak.
+#[test]
+fn figures_show_values_without_a_peak() {
+    let loose = |study: &str| {
+        let load = "[[force]]\non = \"m\"\namplitude = \"0.7 N\"\nharmonic = 0\n[study]";
+        let text = oscillator(study).replace("stiffness = \"1 N/m\"\n", "").replace("\"1 N\"", "\"0.1 N\"");
+        read(&text.replace("[study]", load)).unwrap()
+    };
+    let data = loose(&format!("kind = \"performance\"\n{RANGE}\nvary = {{ Ft = [\"0.5 N\", \"1.5 N\"] }}"));
+    let crosses: Vec<_> = data.figure.panels[0].series.iter().filter(|s| s.style == Style::Missing).collect();
+    assert_eq!(crosses.len(), 1, "{:?}", data.figure.panels[0].series);
+    assert_eq!((crosses[0].label.as_str(), &crosses[0].x[..]), ("1 point without a peak", &[0.5][..]));
+    let over = "over = { Ft = { from = \"0.5 N\", to = \"1.5 N\", points = 2 }, \
+                kt = { from = \"0.5 N/m\", to = \"0.6 N/m\", points = 2 } }";
+    let data = loose(&format!("kind = \"map\"\n{RANGE}\n{over}"));
+    assert!(data.figure.panels[0].title.contains("2 empty tiles without a peak"), "{}", data.figure.panels[0].title);
+}
+
 /// A range of `vary` may have equal ratios. The peaks are those of the same list.
 #[test]
 fn varied_ranges_may_be_logarithmic() {

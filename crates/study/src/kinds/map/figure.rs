@@ -7,6 +7,7 @@ use crate::compile::compiled::RangeScale;
 use crate::results::columns::AMPLITUDE;
 use crate::results::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Table};
 use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, evenly_chosen, join_title, largest, numbers};
+use crate::syntax::format::plural_suffix;
 
 pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let counts = drawing.study.value_counts();
@@ -91,6 +92,10 @@ fn panel(grid: &Grid, [x, y]: [Axis; 2], label: String, unit: &str) -> Panel {
             series.push(Series { emphasis: Emphasis::Contour, ..Series::line("", x, y, 0) });
         }
         title = join_title([title, format!("contours every {} {unit}", levels.step)]);
+    }
+    let failed = grid.values.iter().flatten().filter(|peak| peak.is_nan()).count();
+    if failed > 0 {
+        title = join_title([title, format!("{failed} empty tile{} without a peak", plural_suffix(failed))]);
     }
     let cells =
         grid.values.iter().zip(&grid.y).flat_map(|(row, y)| row.iter().zip(&grid.x).map(move |(v, x)| (v, x, y)));

@@ -7,6 +7,7 @@ use crate::results::columns::AMPLITUDE;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
 use crate::results::percentiles::percentiles;
+use crate::syntax::format::plural_suffix;
 
 pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(table), outer) = (drawing.table(tables::PERFORMANCE), drawing.study.varied().len().saturating_sub(1))
@@ -46,6 +47,8 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         return Figure { panels: vec![panel(draws, bands.collect())], ..Figure::default() };
     }
     let mut series = Vec::new();
+    let failed =
+        cases.iter().flat_map(|case_rows| height(table, case_rows.rows.clone())).filter(|y| y.is_nan()).count();
     for (colour, case_rows) in cases.iter().enumerate() {
         let label = varied_text(&case_rows.varied[..outer]);
         let label = if label.is_empty() { "peak".to_owned() } else { label };
@@ -60,8 +63,13 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
                 points.insert(index, best);
             }
         }
+        let without: Vec<f64> = points.iter().filter(|point| point.1.is_nan()).map(|point| point.0).collect();
         let (x, y) = points.into_iter().unzip();
         series.push(Series { value: value(colour), ..Series::line(label, x, y, colour) });
+        if !without.is_empty() {
+            let label = format!("{failed} point{} without a peak", plural_suffix(failed));
+            series.push(Series::missing(label, without, colour + 1, colour));
+        }
     }
     if let Some(optima) = drawing.table(tables::OPTIMUM) {
         // one row per curve
