@@ -344,7 +344,7 @@ impl Mechanics {
             }
         }
         let (parts, shares) = gathered.finish();
-        let positive = system.structure().mass().clone().cholesky().is_some();
+        let positive = system.structure().has_definite_mass();
         let inverse_mass = system
             .structure()
             .mass()

@@ -93,8 +93,8 @@ impl Assembly {
         if let Some(i) = (0..n).find(|&i| structure.diagonal_mass(i) <= 0.0) {
             return Err(MethodError::needs_mass(method, system, i));
         }
-        let inverse_mass =
-            structure.mass().clone().try_inverse().ok_or_else(|| MethodError::mass_not_positive(method))?;
+        let inverse_mass = structure.mass().clone().try_inverse().filter(|_| structure.has_definite_mass());
+        let inverse_mass = inverse_mass.ok_or_else(|| MethodError::mass_not_positive(method))?;
         let (mut joints, mut first_axis, mut internal) = (Vec::new(), 0, 0);
         for joint in system.joints() {
             let (law, count, state_scale) =

@@ -111,7 +111,7 @@ impl<'a> ModeEquations<'a> {
         if let Some(massless) = (0..system.dofs()).find(|&i| system.structure().diagonal_mass(i) == 0.0) {
             return Err(MethodError::needs_mass(crate::method::harmonic_balance::NAME, system, massless));
         }
-        if system.structure().mass().clone().cholesky().is_none() {
+        if !system.structure().has_definite_mass() {
             return Err(MethodError::mass_not_positive(crate::method::harmonic_balance::NAME));
         }
         let (mut elastic, mut contacts): (Vec<PlacedPort>, Vec<PlacedPort>) = (Vec::new(), Vec::new());
