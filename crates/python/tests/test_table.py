@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from conftest import couple
+from test_model import wedge
 
 import stickslip
 
@@ -130,6 +131,7 @@ def models():
     model.force("tip.x", 5.0)
     model.motion("root", 1e-4)
     yield "matrices", model
+    yield "bodies", wedge()
 
 
 @pytest.mark.parametrize("model", [pytest.param(model, id=name) for name, model in models()])
