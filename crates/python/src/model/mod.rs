@@ -19,7 +19,7 @@ use crate::law::PyLaw;
 use crate::progress::{bar, close};
 use crate::result::PyResultSet;
 use crate::study::PyStudy;
-use crate::supervision::{Supervision, run_here, run_on_new_thread, run_supervised};
+use crate::supervision::{Supervision, WorkThread, run_on, run_on_new_thread, run_supervised};
 use crate::{error, quantity};
 use many_orbits::{OrbitRequest, along_frequencies, along_parameters, describe};
 use numpy::{PyArray1, PyArrayMethods};
@@ -104,6 +104,13 @@ impl PyModel {
         PyModel { study: Some((study.clone(), case)), ..PyModel::from_model(model) }
     }
 
+    /// Returns the thread for work whose steps take the time of a few dense factorizations.
+    fn thread(&self) -> WorkThread {
+        let Model { masses, bodies, substructure, .. } = &self.model;
+        let dofs = masses.len() + bodies.len() + substructure.as_ref().map_or(0, |own| own.component.dofs());
+        if dofs < 100 { WorkThread::Caller } else { WorkThread::New }
+    }
+
     /// Returns a copy without the stored solver.
     fn copied(&self) -> PyModel {
         PyModel { around: self.around.clone(), study: self.study.clone(), ..PyModel::from_model(self.model.clone()) }
@@ -121,7 +128,8 @@ impl PyModel {
                            but this model is one sector: use model.disk(24) for a disk of 24 sectors";
             return Err(error::model(py, message));
         }
-        run_here(py, || self.model.assemble())?.map_err(|cause| model_error(py, &cause, &self.model))
+        let model = self.model.clone();
+        run_on(py, self.thread(), move || model.assemble())?.map_err(|cause| model_error(py, &cause, &self.model))
     }
 
     fn request(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<OrbitRequest> {
@@ -149,12 +157,13 @@ impl PyModel {
             let key = (method.to_owned(), options);
             if cached.as_ref().is_none_or(|cached| cached.key != key) {
                 let system = Arc::new(self.system(py)?);
-                let solver =
-                    run_here(py, || owned_solver(&*made, &system))?.map_err(|cause| error::method(py, cause))?;
+                let borrowed = system.clone();
+                let solver = run_on(py, self.thread(), move || owned_solver(&*made, &borrowed))?
+                    .map_err(|cause| error::method(py, cause))?;
                 *cached = Some(CachedSolver { key, model: Arc::new(self.copied()), solver, system });
             }
         }
-        let Some(found) = cached.as_mut() else { unreachable!("a solver was made above") };
+        let Some(mut found) = cached.take() else { unreachable!("a solver was made above") };
         let n = 2 * found.system.dofs();
         if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
             return Err(error::model(
@@ -163,15 +172,12 @@ impl PyModel {
             ));
         }
         let seed = start.clone().map(|state| Seed::from_state(omega, state));
-        let outcome = run_here(py, || found.solver.orbit_near(omega, seed.as_ref()));
-        let outcome = match outcome {
-            Ok(outcome) => outcome,
-            Err(ended) => {
-                // An interrupted solver is in an undefined state.
-                *cached = None;
-                return Err(ended);
-            }
-        };
+        // An interrupted solver is in an undefined state and is not kept.
+        let (found, outcome) = run_on(py, self.thread(), move || {
+            let outcome = found.solver.orbit_near(omega, seed.as_ref());
+            (found, outcome)
+        })?;
+        let found = cached.insert(found);
         let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
         if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.initial_state.len()) {
             let message = format!(
@@ -631,19 +637,22 @@ impl PyModel {
         method: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let request = self.request(py, method, options)?;
-        let prepared = run_here(py, || {
-            solver_with_alternatives(&*request.method, &request.system).map(|_| request.method.choice(&request.system))
+        let OrbitRequest { system, method } = self.request(py, method, options)?;
+        let prepared = system.clone();
+        let choice = run_on(py, self.thread(), move || {
+            solver_with_alternatives(&*method, &prepared).map(|_| method.choice(&prepared).to_string())
         })?;
-        let choice = prepared.map_err(|cause| error::method(py, cause))?;
+        let choice = choice.map_err(|cause| error::method(py, cause))?;
         let out = PyDict::new(py);
-        out.set_item("places", request.system.places())?;
+        out.set_item("places", system.places())?;
         out.set_item("joints", self.joints())?;
-        out.set_item("method", choice.to_string())?;
+        out.set_item("method", choice)?;
         // Largest number of degrees of freedom for which all natural frequencies are computed:
         // one second.
-        if request.system.dofs() <= 600 {
-            let survey = run_here(py, || self.model.survey())?.map_err(|cause| model_error(py, &cause, &self.model))?;
+        if system.dofs() <= 600 {
+            let model = self.model.clone();
+            let survey = run_on(py, self.thread(), move || model.survey())?
+                .map_err(|cause| model_error(py, &cause, &self.model))?;
             let hertz = |modes: &stickslip::model::LinearModes| {
                 modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>()
             };
@@ -714,16 +723,17 @@ impl PyModel {
             progress: bar.as_ref().map(|bar| bar.clone().unbind()),
             total: Some(omegas.len() as u64),
         };
-        let outcome = run_supervised(py, &supervision, |context| {
+        let model = self.model.clone();
+        let outcome = run_supervised(py, &supervision, move |context| {
             let rows = if varied.is_empty() {
                 along_frequencies(&request, &omegas, context)
             } else {
-                along_parameters(&self.model, &request, &omegas, &varied, context)
+                along_parameters(&model, &request, &omegas, &varied, context)
             };
-            (rows, context.threads)
+            (rows, context.threads, request, omegas, varied)
         });
         close(bar)?;
-        let (rows, threads) = outcome?;
+        let (rows, threads, request, omegas, varied) = outcome?;
         let rows = rows.map_err(|refusal| refusal.raised(py))?;
         let at = |index: usize| {
             let values = varied.iter().map(|(name, values)| format!("{name} = {}", values[index]));
