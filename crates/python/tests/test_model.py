@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse
+import scipy.sparse.linalg
 from conftest import CONTACT, DAMPING, FORCE, LIMIT, MASS, STIFFNESS, couple
 
 import stickslip
@@ -188,6 +189,20 @@ def test_a_large_structure_is_reduced_to_what_is_looked_at():
     np.testing.assert_allclose(list(orbit.amplitude.values()), expected[[n - 1, n // 2]], rtol=2e-4)
     sampled = orbit.sample(points=4096)["displacement_m"]
     np.testing.assert_allclose(abs(sampled).max(axis=0), expected[[n - 1, n // 2]], rtol=2e-4)
+
+
+def test_weakly_coupled_equal_oscillators_are_reduced():
+    n = 500  # all frequencies lie between 159.2 and 159.5 Hz
+    stiffness = 1e5 * scipy.sparse.diags([-1e-3 * np.ones(n - 1), 1.002 * np.ones(n), -1e-3 * np.ones(n - 1)], [-1, 0, 1]).tocsr()
+    mass, damping = 0.1 * scipy.sparse.eye(n), 1e-5 * stiffness
+    model = stickslip.Model.from_matrices(mass, stiffness, damping, places={"tip": 0}, reduce=170.0)
+    model.force("tip", 1.0)
+    found = model.response([150.0, 159.3])["curve"]
+    for frequency, amplitude in zip(found["frequency_Hz"], found["tip_amplitude_m"]):
+        omega = 2 * np.pi * frequency
+        dynamic = (stiffness - omega**2 * mass + 1j * omega * damping).tocsc()
+        expected = abs(scipy.sparse.linalg.spsolve(dynamic, np.eye(n)[0])[0])
+        assert amplitude == pytest.approx(expected, rel=1e-3)
 
 
 def test_modes_begin_stuck_and_end_free():
