@@ -4,6 +4,8 @@ import ast
 import doctest
 import inspect
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -60,6 +62,12 @@ def test_the_package_holds_the_strictest_types(tmp_path):
     package = shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "stickslip", ignore=shutil.ignore_patterns("*.so", "*.pyd"))
     out, errors, status = api.run(["--strict", "--no-incremental", str(package)])
     assert status == 0, out + errors
+
+
+def test_the_stubs_are_those_of_the_built_package(tmp_path):
+    pytest.importorskip("mypy")
+    found = subprocess.run([sys.executable, "-m", "mypy.stubtest", "stickslip"], cwd=tmp_path, capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout + found.stderr
 
 
 def test_the_types_hold(tmp_path):

@@ -192,6 +192,10 @@ def test_wrong_derivatives_are_found_by_one_call():
         wrong.check_derivatives()
     with pytest.raises(ValueError, match="rate 0 by v"):
         wrong.check_derivatives(u=[0.0], v=[1.0], z=[[0.5]])
+    # points at rest have derivatives too
+    assert dahl.check_derivatives(u=0.0, v=[1.0, 2.0], z=[[0.5, 0.0]]) < 1e-8
+    with pytest.raises(ValueError, match=r"`v` must have the shape \(1, 3\) or \(3,\), found \(2,\)"):
+        dahl.check_derivatives(u=[0.0, 1e-3, 2e-3], v=[1.0, 2.0])
     with pytest.raises(TypeError, match="built-in"):
         stickslip.law("dahl", stiffness=K, limit=LIMIT).check_derivatives()
 

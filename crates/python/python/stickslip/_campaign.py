@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
     from ._core import Result, Study
 
-    Progress = bool | Callable[[int, int], object] | None
-    Percent = float | Sequence[float] | NDArray[np.float64]
+    _Progress = bool | Callable[[int, int], object] | None
+    _Percent = float | Sequence[float] | NDArray[np.float64]
 
 #: Target duration of a batch in s: a Dask task costs a few milliseconds, and a killed worker
 #: loses one batch.
@@ -64,7 +64,7 @@ def campaign(
     client: Any = None,
     processes: SupportsIndex | None = None,
     seconds: float = BATCH_SECONDS,
-    progress: Progress = None,
+    progress: _Progress = None,
     retry: bool = True,
 ) -> Campaign:
     """Computes the units of ``study`` that are missing in ``out``. Returns the :class:`Campaign`.
@@ -130,7 +130,7 @@ def _must_not_be_a_worker() -> None:
         raise CampaignError(GUARD)
 
 
-def _run(begun: Campaign, workers: _Workers, seconds: float, progress: Progress) -> None:
+def _run(begun: Campaign, workers: _Workers, seconds: float, progress: _Progress) -> None:
     todo = begun._missing()
     total, done = begun.units, begun.units - sum(stop - start for start, stop in todo)
     report = _progress(progress, begun.name)
@@ -144,7 +144,7 @@ def _run(begun: Campaign, workers: _Workers, seconds: float, progress: Progress)
             report._stickslip_close()
 
 
-def _progress(progress: Progress, name: str) -> Callable[[int, int], object] | None:
+def _progress(progress: _Progress, name: str) -> Callable[[int, int], object] | None:
     if callable(progress):
         return progress
     if progress:
@@ -569,14 +569,14 @@ class Campaign:
         return np.asarray(read[column].to_numpy(), float)
 
     @overload
-    def percentiles(self, column: str, percent: Percent = ..., *, by: None = None, table: str | None = None) -> Any: ...
+    def percentiles(self, column: str, percent: _Percent = ..., *, by: None = None, table: str | None = None) -> Any: ...
 
     @overload
     def percentiles(
-        self, column: str, percent: Percent = ..., *, by: str, table: str | None = None
+        self, column: str, percent: _Percent = ..., *, by: str, table: str | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
-    def percentiles(self, column: str, percent: Percent = (5, 50, 95), *, by: str | None = None, table: str | None = None) -> Any:
+    def percentiles(self, column: str, percent: _Percent = (5, 50, 95), *, by: str | None = None, table: str | None = None) -> Any:
         """Returns percentiles of a column over all points with a value.
 
         With ``by``, the percentiles are computed for each value of another column. Returns an array
