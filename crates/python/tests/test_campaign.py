@@ -133,6 +133,21 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         stickslip.Campaign(tmp_path)
 
 
+def test_a_lost_description_of_the_campaign_is_written_again(study, whole, tmp_path):
+    first = stickslip.campaign(study, out=tmp_path, processes=1)
+    stamps = {file: file.stat().st_mtime_ns for file in first.files("curve")}
+    (tmp_path / "campaign.json").unlink()
+    again = stickslip.campaign(study, out=tmp_path, processes=1)
+    assert {file: file.stat().st_mtime_ns for file in again.files("curve")} == stamps
+    same_bits(again.result(), whole)
+    # parts of another study are computed again
+    (tmp_path / "campaign.json").unlink()
+    other = stickslip.Study.from_text(CASES.replace("4 N", "5 N"), name="many")
+    with pytest.warns(UserWarning, match="belong to another campaign"):
+        changed = stickslip.campaign(other, out=tmp_path, processes=1)
+    same_bits(changed.result(), other.run())
+
+
 def test_matrices_that_change_are_refused(tmp_path):
     def matrix(name, value):
         (tmp_path / name).write_text(f"%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 {value}\n")

@@ -5,6 +5,7 @@ No unit is computed twice. `_folder.py` describes the folder of a campaign.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import io
 import itertools
@@ -443,12 +444,12 @@ class Campaign:
         except FileNotFoundError:
             raise CampaignError(f"{self.folder} contains no campaign: campaign.json is missing") from None
         except ValueError as error:
-            raise CampaignError(f"{self.folder / 'campaign.json'} cannot be read: {error}") from None
+            raise CampaignError(f"{self.folder / 'campaign.json'} cannot be read: {error}; remove this file and start the campaign again, which keeps its parts") from None
         if not isinstance(head, dict) or head.get("format") != FORMAT:
             found = head.get("format") if isinstance(head, dict) else None
             raise CampaignError(f"{self.folder} has the format {found}, but this version reads {FORMAT}")
         self._head: dict[str, Any] = head
-        self._done, self._useless = _folder.read(self.folder, self.units)
+        self._done, self._useless = _folder.read(self.folder, self._identity, self.units)
 
     @classmethod
     def _begin(cls, study: Study, out: Path, *, retry: bool = False) -> Campaign:
@@ -467,15 +468,14 @@ class Campaign:
             (out / folder).mkdir(parents=True, exist_ok=True)
         if not (out / "campaign.json").exists():
             _folder.write(out / "campaign.json", json.dumps(head, indent=1).encode())
-            return cls(out)
         there = cls(out)
         if lies := _difference(there._head, head):
             raise CampaignError(f"{out} contains the campaign of {lies}; choose another folder, or remove that campaign")
         _folder.clear(out)
-        batches, useless = _folder.read(out, there.units, checksums=True)
+        batches, useless = _folder.read(out, there._identity, there.units, checksums=True)
         if useless:
             count = there.units - sum(batch.stop - batch.start for batch in batches)
-            message = f"{len(useless)} batches in {out} have damaged or missing parts: their units are computed again; {count} units remain"
+            message = f"{len(useless)} batches in {out} have damaged or missing parts or belong to another campaign: their units are computed again; {count} units remain"
             warnings.warn(message, stacklevel=3)
         failed = [batch for batch in batches if retry and batch.told.get("failed")]
         for file in [*useless, *(out / "done" / f"{batch.stem}.json" for batch in failed)]:
@@ -486,7 +486,14 @@ class Campaign:
         return list(_folder.missing(self._done, self.units))
 
     def _keep(self, start: int, stop: int, answer: dict[str, Any]) -> None:
-        _folder.keep(self.folder, start, stop, answer, answer.pop("tables"))
+        tables = answer.pop("tables")
+        _folder.keep(self.folder, start, stop, {"campaign": self._identity, **answer}, tables)
+
+    @property
+    def _identity(self) -> str:
+        """Checksum of all that determines the rows: records of another campaign are not used."""
+        determining = [self._head["version"], self._head["study"][1:], self._head["matrices"]]
+        return hashlib.sha256(json.dumps(determining).encode()).hexdigest()
 
     @property
     def name(self) -> str:
