@@ -355,10 +355,10 @@ impl PyStudy {
         outcome?.map(PyResultSet::new).map_err(|cause| error::study(py, &cause))
     }
 
-    /// Identification of the matrices in its files; ``None`` without such files.
+    /// Checksum of the matrices and the data in its files; ``None`` without files.
     #[getter]
-    fn _matrices(&self) -> Option<String> {
-        self.study.matrices_checksum()
+    fn _files(&self) -> Option<String> {
+        self.study.files_checksum()
     }
 
     /// Computes the units from `start` to `stop` (exclusive) on one thread.

@@ -202,6 +202,23 @@ def test_a_second_campaign_in_a_folder_is_refused_while_the_first_one_writes(stu
     same_bits(again.result(), whole)
 
 
+def test_measured_data_that_change_are_refused(tmp_path):
+    file = tmp_path / "shock.toml"
+    file.write_text(
+        """schema = 1
+        data = [{ name = "record", file = "record.csv" }]
+        mass = [{ name = "m", mass = "1 kg" }]
+        spring = [{ between = ["m", "ground"], stiffness = "1 kN/m", damping = "1 kg/s" }]
+        force = [{ on = "m", data = "record" }]
+        study = { kind = "transient", duration = "0.1 s", time_step = "10 ms" }"""
+    )
+    (tmp_path / "record.csv").write_text("time_s,force_N\n0,1\n0.05,2\n0.1,1\n")
+    stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c", processes=1)
+    (tmp_path / "record.csv").write_text("time_s,force_N\n0,1\n0.05,3\n0.1,1\n")
+    with pytest.raises(stickslip.CampaignError, match="other matrices or data"):
+        stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c", processes=1)
+
+
 @pytest.mark.parametrize("damage", ["missing", "cut", "flipped", "record", "records", "folder"])
 def test_parts_that_are_missing_or_damaged_are_computed_again(study, whole, tmp_path, damage):
     done = stickslip.campaign(study, out=tmp_path, processes=1, seconds=0.05)

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 import stickslip
-from stickslip import _campaign, _core, _dual, _folder, _rate, _tables, _toml, statistics
+from stickslip import _campaign, _core, _dual, _folder, _identify, _rate, _tables, _toml, statistics
 
 
 def everything():
-    for module in (stickslip, _toml, statistics, _rate, _dual, _campaign, _folder, _tables):
+    for module in (stickslip, _toml, statistics, _rate, _dual, _campaign, _folder, _identify, _tables):
         yield module.__name__, module
     for name in stickslip.__all__:
         value = getattr(stickslip, name)

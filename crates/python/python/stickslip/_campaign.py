@@ -261,15 +261,15 @@ _MOST_STUDIES = 4
 
 
 def _pickled(study: Study) -> bytes:
-    """Pickled study for a worker, with an identification of the matrix files that it reads."""
-    return pickle.dumps((study, study._matrices))
+    """Pickled study for a worker, with a checksum of the files that it reads."""
+    return pickle.dumps((study, study._files))
 
 
 def _unpickled(pickled: bytes) -> Study:
     """Returns the checked study on a worker."""
-    study, matrices = pickle.loads(pickled)
-    if study._matrices != matrices:
-        raise CampaignError("the files of [structure] contain other matrices than at the start of the campaign")
+    study, files = pickle.loads(pickled)
+    if study._files != files:
+        raise CampaignError("the files of [structure] or [[data]] contain other matrices or data than at the start of the campaign")
     return study  # type: ignore[no-any-return]
 
 
@@ -461,7 +461,7 @@ class Campaign:
             "kind": study.kind,
             "units": study.units,
             "study": list(study.__reduce__()[1]),
-            "matrices": study._matrices,
+            "files": study._files,
         }
         head = json.loads(json.dumps(head))
         for folder in ("parts", "done"):
@@ -492,7 +492,7 @@ class Campaign:
     @property
     def _identity(self) -> str:
         """Checksum of all that determines the rows: records of another campaign are not used."""
-        determining = [self._head["version"], self._head["study"][1:], self._head["matrices"]]
+        determining = [self._head["version"], self._head["study"][1:], self._head["files"]]
         return hashlib.sha256(json.dumps(determining).encode()).hexdigest()
 
     @property
@@ -676,8 +676,8 @@ def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str | Non
         return f"the same study with other values of parameters ({words})"
     if method != our_method:
         return f"the same study with another method ({method or 'its own'})"
-    if theirs.get("matrices") != ours["matrices"]:
-        return "a study with other matrices: the files of [structure] have changed"
+    if theirs["files"] != ours["files"]:
+        return "a study with other matrices or data: the files of [structure] or [[data]] have changed"
     return None
 
 
