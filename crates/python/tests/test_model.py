@@ -281,6 +281,16 @@ def test_complex_matrices_are_refused():
             stickslip.Model.from_matrices(np.eye(2), wrap(stiffness), places=["a", "b"])
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [np.ma.array([[2.0, -1.0], [-1.0, 2.0]], mask=[[0, 1], [1, 0]]), np.array([["2", "-1"], ["-1", "2"]]), np.eye(2, dtype=bool), (row for row in np.eye(2))],
+    ids=["masked", "texts", "flags", "generator"],
+)
+def test_matrices_without_real_numbers_are_refused(wrong):
+    with pytest.raises(stickslip.ModelError, match="stiffness matrix must be an array of real numbers or a sparse matrix, found"):
+        stickslip.Model.from_matrices(np.eye(2), wrong, places=["a", "b"])
+
+
 def test_a_damping_ratio_asks_for_a_reduction():
     with pytest.raises(stickslip.StickslipError, match="requires `reduce`"):
         stickslip.Model.from_matrices(np.eye(2), 2 * np.eye(2), places=["a", "b"], damping_ratio=0.01)
@@ -558,6 +568,9 @@ def test_numbers_of_numpy_and_lists_are_taken_wherever_numbers_are():
     again = model.orbit(10.0, start=list(orbit.start))
     assert again.amplitude["m"] == pytest.approx(orbit.amplitude["m"], rel=1e-9)
     assert orbit.sample([0.0, 0.01])["time_s"].tolist() == [0.0, 0.01]
+    assert orbit.sample(np.float32(0.5))["time_s"].tolist() == [0.5]
+    with pytest.raises(stickslip.ModelError, match="`times` must be one number or a list of numbers in SI units, found str"):
+        orbit.sample("0.01 s")
     assert orbit.sample(points=np.int64(4))["time_s"].shape == (4,)
     model.joint("j", "m", "ground", stickslip.law("cubic", stiffness=np.float64(1e9)))
     assert len(model.modes(np.array([1e-4, 1e-3]), points=np.int64(3), harmonics=3, samples=64)["modes"]) >= 3
