@@ -374,6 +374,7 @@ def test_what_a_campaign_cannot_begin_with(tmp_path):
         ({"study": "couple.toml"}, TypeError, "stickslip.Study"),
         ({"processes": 0}, ValueError, "from 1"),
         ({"seconds": -1.0}, ValueError, "more than zero"),
+        ({"seconds": "5 s"}, ValueError, "found '5 s'"),
         ({"out": file}, NotADirectoryError, "is a file"),
     ]:
         given = {"study": study, "out": tmp_path / "out", **wrong}

@@ -93,7 +93,7 @@ def campaign(
         raise TypeError(f'`study` must be a stickslip.Study, such as Study.from_file("couple.toml") gives, found {study!r}')
     if processes is not None and _count(processes) < 1:
         raise ValueError(f"`processes` must be a whole number from 1, found {processes!r}")
-    if not seconds > 0:
+    if isinstance(seconds, str) or not seconds > 0:
         raise ValueError(f"`seconds`, the duration of a batch, must be more than zero, found {seconds!r}")
     folder = Path(out)
     if folder.exists() and not folder.is_dir():

@@ -194,7 +194,7 @@ impl PyModel {
             options: found.key.1.clone(),
             start,
         };
-        Ok(PyOrbit { orbit, system: found.system.clone(), input })
+        Ok(PyOrbit { orbit: Arc::new(orbit), system: found.system.clone(), input })
     }
 
     fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, record: RunRecord) -> PyResultSet {
@@ -768,7 +768,7 @@ impl PyModel {
         let (start, points) = (Instant::now(), instants(py, points)?);
         let found = self.orbit(py, frequency, method, None, options)?;
         let (tables, figure) = figures::loops(&found, points);
-        let row = Row::new(&found.system, found.orbit.omega, Ok(&found.orbit));
+        let row = Row::new(&found.system, found.orbit.omega, Ok(&*found.orbit));
         let record = RunRecord::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
         Ok(self.result("hysteresis", "Hysteresis", tables, figure, record))
     }
