@@ -74,13 +74,15 @@ def test_the_types_hold(tmp_path):
     api = pytest.importorskip("mypy.api")
     use = tmp_path / "use.py"
     use.write_text(
-        "import stickslip\n"
+        "import stickslip; import numpy as np\n"
         "model = stickslip.Model()\n"
         "model.mass('a', '1 kg')\n"
         "orbit = model.orbit('10 Hz', method='event-driven')\n"
         "amplitude: float = orbit.amplitude['a']\n"
         "wrong: str = orbit.amplitude['a']\n"
         "model.mass('b')\n"
+        "from collections.abc import Mapping\n"
+        "table: Mapping[str, object] = model.response(np.array([10, 11]), vary={'a.mass': [np.float32(1.0), '2 kg']})['curve']\n"
     )
     # a copy, because mypy does not check installed packages of its environment
     package = shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "stickslip", ignore=shutil.ignore_patterns("*.so", "*.pyd"))
