@@ -8,6 +8,7 @@ mod lock;
 mod model;
 mod progress;
 mod quantity;
+mod residuals;
 mod result;
 mod study;
 mod supervision;
@@ -32,6 +33,8 @@ mod _core {
     use crate::model::orbit::PyOrbit;
     #[pymodule_export]
     use crate::model::{_model, _orbit, PyModel};
+    #[pymodule_export]
+    use crate::residuals::PyResiduals;
     #[pymodule_export]
     use crate::result::{_result, _table, PyResultSet, Table};
     #[pymodule_export]

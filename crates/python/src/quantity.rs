@@ -76,16 +76,24 @@ pub fn many(value: &Bound<'_, PyAny>, dimension: Option<Dimension>, what: &str) 
     value.try_iter()?.map(|item| one(&item?)).collect()
 }
 
-/// Returns numbers without a unit from an array or a sequence.
+/// Returns numbers without a unit from one number, an array or a sequence.
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
+    let no_numbers = || {
+        error::model(
+            value.py(),
+            format!("{what} must be one number or a list of numbers in SI units, found {}", kind(value)),
+        )
+    };
+    if let Some(number) = number(value)? {
+        return Ok(vec![number]);
+    }
     if let Some(numbers) = array(value, what)? {
         return Ok(numbers);
     }
     if value.cast::<PyString>().is_ok() || !is_sequence(value)? {
-        return Err(no_sequence(value, what));
+        return Err(no_numbers());
     }
-    let plain = |item: Bound<'_, PyAny>| number(&item)?.ok_or_else(|| no_sequence(value, what));
-    value.try_iter()?.map(|item| plain(item?)).collect()
+    value.try_iter()?.map(|item| number(&item?)?.ok_or_else(no_numbers)).collect()
 }
 
 /// Returns the number that a user would give for an SI value: Hz for frequencies, otherwise SI.
@@ -158,12 +166,12 @@ fn array(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Option<Vec<f64>>> {
 
 /// Returns `true` for integer and real types, and `false` for flags, complex numbers, texts or
 /// times.
-fn is_real(dtype: &Bound<'_, PyAny>) -> bool {
+pub fn is_real(dtype: &Bound<'_, PyAny>) -> bool {
     let kind = dtype.getattr("kind").and_then(|kind| kind.extract::<String>());
     kind.is_ok_and(|kind| matches!(kind.as_str(), "f" | "i" | "u"))
 }
 
-fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+pub fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
     value.is_instance(&value.py().import("numpy.ma")?.getattr("MaskedArray")?)
 }
 
@@ -204,7 +212,7 @@ pub fn dictionary<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<
 }
 
 /// Returns the type name of an object for messages.
-fn kind(value: &Bound<'_, PyAny>) -> String {
+pub fn kind(value: &Bound<'_, PyAny>) -> String {
     let name = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
     match value.getattr("dtype").and_then(|dtype| dtype.str().map(|text| text.to_string())) {
         Ok(dtype) if dtype != name => format!("{name} of {dtype}"),

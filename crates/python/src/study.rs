@@ -4,7 +4,7 @@ use crate::explorer::PyExplorer;
 use crate::model::PyModel;
 use crate::progress::{bar, close};
 use crate::result::{PyResultSet, Table};
-use crate::supervision::{Supervision, run_here, run_on_new_thread, run_supervised};
+use crate::supervision::{Supervision, run_on_new_thread, run_supervised};
 use crate::{error, quantity};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
@@ -59,7 +59,8 @@ impl PyStudy {
 
     /// Returns the model of a case.
     pub fn model_of(&self, py: Python<'_>, index: usize) -> PyResult<Model> {
-        let case = run_here(py, || self.study.case(index))?;
+        let study = self.study.clone();
+        let case = run_on_new_thread(py, move || study.case(index))?;
         Ok(case.map_err(|cause| error::study(py, &cause))?.model)
     }
 
@@ -349,15 +350,15 @@ impl PyStudy {
         let total = (!study.is_adaptive()).then_some(study.points() as u64);
         let bar = bar(py, progress, study.name())?;
         let supervision = Supervision { threads, progress: bar.as_ref().map(|bar| bar.clone().unbind()), total };
-        let outcome = run_supervised(py, &supervision, |context| check(&study)?.run(context));
+        let outcome = run_supervised(py, &supervision, move |context| check(&study)?.run(context));
         close(bar)?;
         outcome?.map(PyResultSet::new).map_err(|cause| error::study(py, &cause))
     }
 
-    /// Identification of the matrices in its files; ``None`` without such files.
+    /// Checksum of the matrices and the data in its files; ``None`` without files.
     #[getter]
-    fn _matrices(&self) -> Option<String> {
-        self.study.matrices_checksum()
+    fn _files(&self) -> Option<String> {
+        self.study.files_checksum()
     }
 
     /// Computes the units from `start` to `stop` (exclusive) on one thread.
@@ -366,7 +367,7 @@ impl PyStudy {
     fn _batch<'py>(&self, py: Python<'py>, start: usize, stop: usize) -> PyResult<Bound<'py, PyDict>> {
         let checked = self.checked(py)?;
         let supervision = Supervision { threads: Some(1), progress: None, total: None };
-        let batch = run_supervised(py, &supervision, |context| checked.block(start..stop, context))?;
+        let batch = run_supervised(py, &supervision, move |context| checked.block(start..stop, context))?;
         let Block { tables, tally, .. } = batch.map_err(|cause| error::study(py, &cause))?;
         let out = PyDict::new(py);
         out.set_item("told", serde_json::to_string(&tally).map_err(|cause| error::report(py, cause))?)?;

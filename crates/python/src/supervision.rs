@@ -47,23 +47,74 @@ pub fn run_here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
     outcome.map_err(|panic| ended(panic, raised.lock().unwrap_or_else(PoisonError::into_inner).take()))
 }
 
-/// Runs long `work` on a new thread, which Ctrl-C abandons if it cannot end at once.
+/// The thread of some work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorkThread {
+    /// For short work: a new thread costs as much as an orbit of a small model.
+    Caller,
+    /// For work whose steps, such as a factorization of dense matrices, may take seconds.
+    New,
+}
+
+/// Runs `work` on this thread or on a new one.
+pub fn run_on<T: Send + 'static>(
+    py: Python<'_>,
+    thread: WorkThread,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    match thread {
+        WorkThread::Caller => run_here(py, work),
+        WorkThread::New => run_on_new_thread(py, work),
+    }
+}
+
+/// Runs long `work` on a new thread, which Ctrl-C abandons if it does not end soon.
 pub fn run_on_new_thread<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
     let stop = StopFlag::new();
-    let (send, receive) = mpsc::channel();
     let stop_flag = stop.clone();
+    let receive = begin(py, move || catch_unwind(AssertUnwindSafe(|| stop_flag.watch(work))))?;
+    outcome(py, receive, || py.check_signals(), || stop.set())
+}
+
+/// Starts `work` on a new thread.
+fn begin<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<mpsc::Receiver<T>> {
+    let (send, receive) = mpsc::channel();
     let spawned = std::thread::Builder::new().spawn(move || {
         // The result of an abandoned thread has no receiver.
-        let _ = send.send(catch_unwind(AssertUnwindSafe(|| stop_flag.watch(work))));
+        let _ = send.send(work());
     });
     spawned.map_err(|cause| error::exception(py, "StickslipError", format!("cannot create a thread: {cause}")))?;
+    Ok(receive)
+}
+
+/// Waits for the outcome of work on another thread, and calls `poll` in every interval.
+///
+/// If `poll` fails, asks the work to `stop`, and abandons the work if it does not end soon.
+fn outcome<T: Send>(
+    py: Python<'_>,
+    receive: mpsc::Receiver<std::thread::Result<T>>,
+    mut poll: impl FnMut() -> PyResult<()>,
+    stop: impl Fn(),
+) -> PyResult<T> {
     let receive = Mutex::new(receive);
+    let mut raised: Option<(PyErr, Instant)> = None;
     loop {
         let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL_INTERVAL));
-        match next {
-            Ok(outcome) => return outcome.map_err(|panic| ended(panic, None)),
-            Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
-            Err(mpsc::RecvTimeoutError::Timeout) => py.check_signals().inspect_err(|_| stop.set())?,
+        match (next, raised.take()) {
+            (Ok(outcome), None) => return outcome.map_err(|panic| ended(panic, None)),
+            (Ok(_), Some((error, _))) => return Err(error),
+            (Err(mpsc::RecvTimeoutError::Disconnected), _) => unreachable!("work always sends its outcome"),
+            (Err(mpsc::RecvTimeoutError::Timeout), None) => {
+                if let Err(error) = poll() {
+                    stop();
+                    raised = Some((error, Instant::now()));
+                }
+            }
+            // A factorization of a large matrix cannot be interrupted.
+            (Err(mpsc::RecvTimeoutError::Timeout), Some((error, since))) if since.elapsed().as_millis() > 500 => {
+                return Err(error);
+            }
+            (Err(mpsc::RecvTimeoutError::Timeout), still) => raised = still,
         }
     }
 }
@@ -137,13 +188,12 @@ fn lease_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<PoolLease> {
 }
 
 /// Runs `work` on the threads of a pool, reports progress, and lets Ctrl-C end the work.
-pub fn run_supervised<T: Send>(
+pub fn run_supervised<T: Send + 'static>(
     py: Python<'_>,
     supervision: &Supervision,
-    work: impl FnOnce(&Context) -> T + Send,
+    work: impl FnOnce(&Context) -> T + Send + 'static,
 ) -> PyResult<T> {
     let lease = lease_pool(py, supervision.threads)?;
-    let pool = lease.pool();
     let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
     let counter = done.clone();
     let count = move || {
@@ -152,43 +202,20 @@ pub fn run_supervised<T: Send>(
     let context = Context {
         stop: stop.clone(),
         finished: Arc::new(count),
-        ..Context::without_progress(pool.current_num_threads())
+        ..Context::without_progress(lease.pool().current_num_threads())
     };
-    let (send, receive) = mpsc::channel();
-    let receive = Mutex::new(receive);
-    std::thread::scope(|scope| {
-        scope.spawn(|| {
-            let outcome = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&context))));
-            // The caller waits for the result in every case.
-            let _ = send.send(outcome);
-        });
-        let mut wrong: Option<PyErr> = None;
-        let mut reported = None;
-        let outcome = loop {
-            let next = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL_INTERVAL));
-            match next {
-                Ok(outcome) => break outcome,
-                Err(mpsc::RecvTimeoutError::Disconnected) => unreachable!("work always sends its outcome"),
-                Err(mpsc::RecvTimeoutError::Timeout) if wrong.is_some() => {}
-                Err(mpsc::RecvTimeoutError::Timeout) => {
-                    let checked =
-                        py.check_signals().and_then(|()| report_progress(py, supervision, &done, &mut reported));
-                    if let Err(error) = checked {
-                        stop.store(true, Ordering::Relaxed);
-                        lease.stop.set();
-                        wrong = Some(error);
-                    }
-                }
-            }
-        };
-        if let Some(error) = wrong {
-            return Err(error);
-        }
-        let outcome = outcome.map_err(|panic| ended(panic, None))?;
-        py.check_signals()?;
-        report_progress(py, supervision, &done, &mut reported)?;
-        Ok(outcome)
-    })
+    let stop_flag = lease.stop.clone();
+    let receive = begin(py, move || catch_unwind(AssertUnwindSafe(|| lease.pool().install(|| work(&context)))))?;
+    let mut reported = None;
+    let poll = || py.check_signals().and_then(|()| report_progress(py, supervision, &done, &mut reported));
+    let end = || {
+        stop.store(true, Ordering::Relaxed);
+        stop_flag.set();
+    };
+    let found = outcome(py, receive, poll, end)?;
+    py.check_signals()?;
+    report_progress(py, supervision, &done, &mut reported)?;
+    Ok(found)
 }
 
 fn report_progress(

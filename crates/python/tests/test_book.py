@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from conftest import ROOT
+from test_identify import COLUMNS, STUDY
 
 import stickslip
 
@@ -16,10 +17,12 @@ def test_the_blocks_of_the_book_run(tmp_path, monkeypatch):
         pytest.importorskip(needed)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "couple.toml").write_text(stickslip.Study.from_template("blade-couple-massless").text)
+    (tmp_path / "rig.toml").write_text(STUDY)
     blocks = BLOCK.findall((ROOT / "docs" / "src" / "python.md").read_text())
     assert len(blocks) >= 6
     stiffness = np.array([[3e4, 0, -1e4], [0, 2e4, 0], [-1e4, 0, 5e4]])
     names = {"mass": np.eye(3), "stiffness": stiffness, "damping": 1e-4 * stiffness}
+    names |= dict(zip("uf", COLUMNS["rig.csv"].values()))
     for block in blocks:
         # this cluster does not exist; test_campaign.py starts one
         if "tcp://" in block:

@@ -133,6 +133,21 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         stickslip.Campaign(tmp_path)
 
 
+def test_a_lost_description_of_the_campaign_is_written_again(study, whole, tmp_path):
+    first = stickslip.campaign(study, out=tmp_path, processes=1)
+    stamps = {file: file.stat().st_mtime_ns for file in first.files("curve")}
+    (tmp_path / "campaign.json").unlink()
+    again = stickslip.campaign(study, out=tmp_path, processes=1)
+    assert {file: file.stat().st_mtime_ns for file in again.files("curve")} == stamps
+    same_bits(again.result(), whole)
+    # parts of another study are computed again
+    (tmp_path / "campaign.json").unlink()
+    other = stickslip.Study.from_text(CASES.replace("4 N", "5 N"), name="many")
+    with pytest.warns(UserWarning, match="belong to another campaign"):
+        changed = stickslip.campaign(other, out=tmp_path, processes=1)
+    same_bits(changed.result(), other.run())
+
+
 def test_matrices_that_change_are_refused(tmp_path):
     def matrix(name, value):
         (tmp_path / name).write_text(f"%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 {value}\n")
@@ -185,6 +200,23 @@ def test_a_second_campaign_in_a_folder_is_refused_while_the_first_one_writes(stu
     again = stickslip.campaign(study, out=tmp_path / "c", processes=1)
     assert again.is_complete and sum(again.points.values()) == study.points
     same_bits(again.result(), whole)
+
+
+def test_measured_data_that_change_are_refused(tmp_path):
+    file = tmp_path / "shock.toml"
+    file.write_text(
+        """schema = 1
+        data = [{ name = "record", file = "record.csv" }]
+        mass = [{ name = "m", mass = "1 kg" }]
+        spring = [{ between = ["m", "ground"], stiffness = "1 kN/m", damping = "1 kg/s" }]
+        force = [{ on = "m", data = "record" }]
+        study = { kind = "transient", duration = "0.1 s", time_step = "10 ms" }"""
+    )
+    (tmp_path / "record.csv").write_text("time_s,force_N\n0,1\n0.05,2\n0.1,1\n")
+    stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c", processes=1)
+    (tmp_path / "record.csv").write_text("time_s,force_N\n0,1\n0.05,3\n0.1,1\n")
+    with pytest.raises(stickslip.CampaignError, match="other matrices or data"):
+        stickslip.campaign(stickslip.Study.from_file(file), out=tmp_path / "c", processes=1)
 
 
 @pytest.mark.parametrize("damage", ["missing", "cut", "flipped", "record", "records", "folder"])
@@ -342,6 +374,7 @@ def test_what_a_campaign_cannot_begin_with(tmp_path):
         ({"study": "couple.toml"}, TypeError, "stickslip.Study"),
         ({"processes": 0}, ValueError, "from 1"),
         ({"seconds": -1.0}, ValueError, "more than zero"),
+        ({"seconds": "5 s"}, ValueError, "found '5 s'"),
         ({"out": file}, NotADirectoryError, "is a file"),
     ]:
         given = {"study": study, "out": tmp_path / "out", **wrong}

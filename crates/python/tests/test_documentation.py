@@ -4,16 +4,18 @@ import ast
 import doctest
 import inspect
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 import stickslip
-from stickslip import _campaign, _core, _dual, _folder, _rate, _tables, _toml, statistics
+from stickslip import _campaign, _core, _dual, _folder, _identify, _rate, _tables, _toml, statistics
 
 
 def everything():
-    for module in (stickslip, _toml, statistics, _rate, _dual, _campaign, _folder, _tables):
+    for module in (stickslip, _toml, statistics, _rate, _dual, _campaign, _folder, _identify, _tables):
         yield module.__name__, module
     for name in stickslip.__all__:
         value = getattr(stickslip, name)
@@ -62,17 +64,25 @@ def test_the_package_holds_the_strictest_types(tmp_path):
     assert status == 0, out + errors
 
 
+def test_the_stubs_are_those_of_the_built_package(tmp_path):
+    pytest.importorskip("mypy")
+    found = subprocess.run([sys.executable, "-m", "mypy.stubtest", "stickslip"], cwd=tmp_path, capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout + found.stderr
+
+
 def test_the_types_hold(tmp_path):
     api = pytest.importorskip("mypy.api")
     use = tmp_path / "use.py"
     use.write_text(
-        "import stickslip\n"
+        "import stickslip; import numpy as np\n"
         "model = stickslip.Model()\n"
         "model.mass('a', '1 kg')\n"
         "orbit = model.orbit('10 Hz', method='event-driven')\n"
         "amplitude: float = orbit.amplitude['a']\n"
         "wrong: str = orbit.amplitude['a']\n"
         "model.mass('b')\n"
+        "from collections.abc import Mapping\n"
+        "table: Mapping[str, object] = model.response(np.array([10, 11]), vary={'a.mass': [np.float32(1.0), '2 kg']})['curve']\n"
     )
     # a copy, because mypy does not check installed packages of its environment
     package = shutil.copytree(Path(stickslip.__file__).parent, tmp_path / "stickslip", ignore=shutil.ignore_patterns("*.so", "*.pyd"))

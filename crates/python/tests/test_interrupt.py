@@ -88,6 +88,24 @@ def test_an_orbit_that_never_ends_is_ended_by_ctrl_c(ctrl_c):
         assert time.monotonic() - pressed < 1.0, call
 
 
+def test_ctrl_c_ends_calls_on_large_dense_matrices(ctrl_c):
+    n = 1500  # one factorization takes about a second
+    random = np.random.default_rng(1).standard_normal((n, n))
+    model = stickslip.Model.from_matrices(np.eye(n), random @ random.T + n * np.eye(n), places=[f"p{i}" for i in range(n)])
+    model.joint("j", "p0", "p1", stickslip.law("dahl", stiffness=100.0, limit=1.0))
+    model.force("p0", 1.0)
+    for call in (
+        lambda: model.orbit(5.0, method="harmonic-balance"),
+        lambda: model.check(),
+        lambda: model.response(np.linspace(1.0, 10.0, 50), threads=2),
+    ):
+        pressed = ctrl_c(0.5)
+        with pytest.raises(KeyboardInterrupt):
+            while True:
+                call()
+        assert time.monotonic() - pressed < 1.0
+
+
 def test_an_interrupted_model_gives_the_same_bits_afterwards(ctrl_c):
     model, fresh = couple(stickslip.law("dahl", stiffness=1e4, limit=2.0)), couple(stickslip.law("dahl", stiffness=1e4, limit=2.0))
     ctrl_c(0.3)

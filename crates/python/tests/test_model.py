@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse
+import scipy.sparse.linalg
 from conftest import CONTACT, DAMPING, FORCE, LIMIT, MASS, STIFFNESS, couple
 
 import stickslip
@@ -190,6 +191,20 @@ def test_a_large_structure_is_reduced_to_what_is_looked_at():
     np.testing.assert_allclose(abs(sampled).max(axis=0), expected[[n - 1, n // 2]], rtol=2e-4)
 
 
+def test_weakly_coupled_equal_oscillators_are_reduced():
+    n = 500  # all frequencies lie between 159.2 and 159.5 Hz
+    stiffness = 1e5 * scipy.sparse.diags([-1e-3 * np.ones(n - 1), 1.002 * np.ones(n), -1e-3 * np.ones(n - 1)], [-1, 0, 1]).tocsr()
+    mass, damping = 0.1 * scipy.sparse.eye(n), 1e-5 * stiffness
+    model = stickslip.Model.from_matrices(mass, stiffness, damping, places={"tip": 0}, reduce=170.0)
+    model.force("tip", 1.0)
+    found = model.response([150.0, 159.3])["curve"]
+    for frequency, amplitude in zip(found["frequency_Hz"], found["tip_amplitude_m"]):
+        omega = 2 * np.pi * frequency
+        dynamic = (stiffness - omega**2 * mass + 1j * omega * damping).tocsc()
+        expected = abs(scipy.sparse.linalg.spsolve(dynamic, np.eye(n)[0])[0])
+        assert amplitude == pytest.approx(expected, rel=1e-3)
+
+
 def test_modes_begin_stuck_and_end_free():
     result = couple().modes((1e-6, 1.0), points=21)
     table = result["modes"]
@@ -264,6 +279,16 @@ def test_complex_matrices_are_refused():
     for wrap in (np.asarray, scipy.sparse.csr_matrix):
         with pytest.raises(stickslip.StickslipError, match="stiffness matrix is complex"):
             stickslip.Model.from_matrices(np.eye(2), wrap(stiffness), places=["a", "b"])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [np.ma.array([[2.0, -1.0], [-1.0, 2.0]], mask=[[0, 1], [1, 0]]), np.array([["2", "-1"], ["-1", "2"]]), np.eye(2, dtype=bool), (row for row in np.eye(2))],
+    ids=["masked", "texts", "flags", "generator"],
+)
+def test_matrices_without_real_numbers_are_refused(wrong):
+    with pytest.raises(stickslip.ModelError, match="stiffness matrix must be an array of real numbers or a sparse matrix, found"):
+        stickslip.Model.from_matrices(np.eye(2), wrong, places=["a", "b"])
 
 
 def test_a_damping_ratio_asks_for_a_reduction():
@@ -370,6 +395,93 @@ def test_a_measured_pattern_and_wrong_disks():
             call()
 
 
+def test_a_bar_on_two_springs_heaves_and_pitches():
+    mass, length, stiffness = 3.0, 0.8, 1e4
+    model = stickslip.Model()
+    model.body("bar", mass, mass * length**2 / 12, directions=["x", "z"])
+    for name, x in (("left", -length / 2), ("right", length / 2)):
+        model.place(name, "bar", offset=[x, 0, 0])
+        model.spring(f"{name}.z", "ground", stiffness=stiffness)
+    model.spring("bar.x", "ground", stiffness=stiffness)
+    expected = np.sqrt(np.array([1, 2, 6]) * stiffness / mass) / (2 * np.pi)
+    np.testing.assert_allclose(model.check()["free_Hz"], expected, rtol=1e-12)
+    # a moment turns the bar: theta = M / (k L^2 / 2 - J omega^2)
+    model.force("bar.ry", "3 N m")
+    omega = 2 * np.pi * 5.0
+    turn = 3.0 / (stiffness * length**2 / 2 - mass * length**2 / 12 * omega**2)
+    found = model.response(5.0)["curve"]
+    assert found["bar_ry_amplitude_rad"][0] == pytest.approx(abs(turn), rel=1e-9)
+    assert found["right_z_amplitude_m"][0] == pytest.approx(abs(turn) * length / 2, rel=1e-9)
+    # parameters of the body and of its springs have their own dimensions
+    model.spring("bar.ry", "ground", stiffness="100 N m/rad", damping="0.1 N m s/rad")
+    model.set({"bar.mass": "4 kg", "bar.ry-ground.stiffness": "200 N m/rad", "bar.ry.force": "2 N m"})
+    for value in ({"bar.ry-ground.stiffness": "200 N/m"}, {"bar.ry.force": "2 N"}):
+        with pytest.raises(stickslip.ModelError, match="expected"):
+            model.set(value)
+
+
+WEDGE = """
+schema = 1
+body = [{ name = "wedge", mass = "50 g", inertia = "2000 g mm^2", directions = ["x", "z"] }]
+place = [
+    { name = "left", of = "wedge", offset = ["-6 mm", 0, "3 mm"], normal = [-1, 0, 1] },
+    { name = "right", of = "wedge", offset = ["6 mm", 0, "3 mm"], normal = [1, 0, 1] },
+]
+joint = [
+    { name = "l", between = ["left", "ground"], law = { kind = "jenkins-2d", stiffness = "1e5 N/m", limit = "1 N" } },
+    { name = "r", between = ["right", "ground"], law = { kind = "jenkins-2d", stiffness = "2e5 N/m", limit = "2 N" } },
+]
+spring = [
+    { between = ["wedge.x", "ground"], stiffness = "1e4 N/m", damping = "1 kg/s" },
+    { between = ["wedge.z", "ground"], stiffness = "1e4 N/m", damping = "1 kg/s" },
+    { between = ["wedge.ry", "ground"], stiffness = "1 N m/rad", damping = "1e-3 N m s/rad" },
+]
+force = [{ on = "wedge.x", amplitude = "3 N" }]
+study = { kind = "response", frequency = ["90 Hz"] }
+method = { kind = "harmonic-balance", harmonics = 5 }
+"""
+
+
+def wedge():
+    model = stickslip.Model()
+    model.body("wedge", "50 g", "2000 g mm^2", directions=["x", "z"])
+    model.place("left", "wedge", offset=["-6 mm", 0, "3 mm"], normal=[-1, 0, 1])
+    model.place("right", "wedge", offset=np.array([6e-3, 0, 3e-3]), normal=np.array([1, 0, 1]))
+    for name, on, stiffness, limit in (("l", "left", 1e5, 1.0), ("r", "right", 2e5, 2.0)):
+        model.joint(name, on, "ground", stickslip.law("jenkins-2d", stiffness=stiffness, limit=limit))
+    for along in "xz":
+        model.spring(f"wedge.{along}", "ground", stiffness=1e4, damping=1.0)
+    model.spring("wedge.ry", "ground", stiffness=1.0, damping=1e-3)
+    model.force("wedge.x", 3.0)
+    return model
+
+
+def test_a_wedge_by_calls_is_the_wedge_of_a_study():
+    study = stickslip.Study.from_text(WEDGE)
+    one = wedge().response(90.0, method="harmonic-balance", harmonics=5)["curve"]
+    other = study.run()["curve"]
+    for column in ("wedge_x_amplitude_m", "wedge_ry_amplitude_rad", "left_n_amplitude_m", "l_dissipation_J"):
+        assert one[column][0] == pytest.approx(other[column][0], rel=1e-9) and one[column][0] > 0
+
+
+def test_wrong_bodies_are_refused_with_words():
+    model = wedge()
+    for match, call in [
+        ("2 moments of inertia for the rotations ry", lambda: model.body("b", 1, [1, 2], directions=["x", "z"])),
+        ("inertia of `b`.*expected moment of inertia", lambda: model.body("b", 1, "3 kg", directions=["x", "z"])),
+        ("no body `b`", lambda: model.place("p", "b", offset=[0, 0, 0])),
+        ("needs `offset`, `normal` or both", lambda: model.place("p", "wedge")),
+        ("three components, found 2", lambda: model.place("p", "wedge", offset=[0, 0])),
+        ("does not move along y", lambda: model.place("p", "wedge", normal=[0, 1, 0])),
+        ("`offset` of `p`", lambda: model.place("p", "wedge", offset=["1 N", 0, 0])),
+    ]:
+        with pytest.raises(stickslip.ModelError, match=match):
+            call()
+    model.body("b", 1, 0, directions=["x", "z"])
+    with pytest.raises(stickslip.ModelError, match="body `b`, `inertia`"):
+        model.orbit(90)
+
+
 def test_errors_name_the_part():
     model = stickslip.Model()
     model.mass("a", 1)
@@ -456,6 +568,9 @@ def test_numbers_of_numpy_and_lists_are_taken_wherever_numbers_are():
     again = model.orbit(10.0, start=list(orbit.start))
     assert again.amplitude["m"] == pytest.approx(orbit.amplitude["m"], rel=1e-9)
     assert orbit.sample([0.0, 0.01])["time_s"].tolist() == [0.0, 0.01]
+    assert orbit.sample(np.float32(0.5))["time_s"].tolist() == [0.5]
+    with pytest.raises(stickslip.ModelError, match="`times` must be one number or a list of numbers in SI units, found str"):
+        orbit.sample("0.01 s")
     assert orbit.sample(points=np.int64(4))["time_s"].shape == (4,)
     model.joint("j", "m", "ground", stickslip.law("cubic", stiffness=np.float64(1e9)))
     assert len(model.modes(np.array([1e-4, 1e-3]), points=np.int64(3), harmonics=3, samples=64)["modes"]) >= 3

@@ -45,6 +45,23 @@ def test_many_orbits_of_a_law_in_python_run_on_all_threads():
     np.testing.assert_allclose(own["curve"]["blade1_amplitude_m"], rust["curve"]["blade1_amplitude_m"], rtol=1e-9)
 
 
+def test_a_law_gets_whole_arrays_of_instants():
+    sizes = []
+
+    @stickslip.rate_law(states=1, scale=LIMIT, odd=True)
+    def counted(u, v, z):
+        sizes.append(len(v))
+        return LIMIT * z[0], K / LIMIT * (v - abs(v) * z)
+
+    couple(counted).orbit(118.0, method="harmonic-balance", harmonics=9)
+    # the initial guess by describing functions, and one period by integration, are part of the orbit
+    assert sum(size >= 256 for size in sizes) > 20 and len(sizes) < 1000
+    # without states, a call has all instants of a period
+    sizes.clear()
+    couple(stickslip.rate_law(lambda u, v, z: sizes.append(len(u)) or 1e9 * u**3, odd=True)).orbit(118.0, method="harmonic-balance")
+    assert max(sizes) >= 1024 and len(sizes) < 1000
+
+
 def test_own_derivatives_do_as_well():
     def slopes(u, v, z):
         by = np.zeros((2, 3, u.size))
@@ -175,6 +192,10 @@ def test_wrong_derivatives_are_found_by_one_call():
         wrong.check_derivatives()
     with pytest.raises(ValueError, match="rate 0 by v"):
         wrong.check_derivatives(u=[0.0], v=[1.0], z=[[0.5]])
+    # points at rest have derivatives too
+    assert dahl.check_derivatives(u=0.0, v=[1.0, 2.0], z=[[0.5, 0.0]]) < 1e-8
+    with pytest.raises(ValueError, match=r"`v` must have the shape \(1, 3\) or \(3,\), found \(2,\)"):
+        dahl.check_derivatives(u=[0.0, 1e-3, 2e-3], v=[1.0, 2.0])
     with pytest.raises(TypeError, match="built-in"):
         stickslip.law("dahl", stiffness=K, limit=LIMIT).check_derivatives()
 

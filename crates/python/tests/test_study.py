@@ -16,7 +16,7 @@ ELEMENT = stickslip.Study.from_template("element")
 
 def test_a_study_gives_the_files_of_the_command(command, tmp_path):
     file = tmp_path / "couple.toml"
-    file.write_text(command("new", "blade-couple-massless").stdout)
+    file.write_text(command("new", "blade-couple-massless", "-").stdout)
     command("run", file, "--out", tmp_path / "command", "--only", "csv,svg", "--set", "Ft=3 N")
     result = stickslip.Study.from_file(file, Ft="3 N").run(threads=1)
     written = result.save(tmp_path / "python", only=["csv", "svg"])
@@ -78,7 +78,7 @@ def test_frequencies_among_parameters_are_in_hertz():
 
 def test_errors_have_the_text_of_the_command(command, tmp_path):
     file = tmp_path / "wrong.toml"
-    file.write_text(command("new", "element").stdout.replace("kt", "kx", 1).replace("law", "lwa"))
+    file.write_text(command("new", "element", "-").stdout.replace("kt", "kx", 1).replace("law", "lwa"))
     shown = command("run", file, check=False)
     with pytest.raises(stickslip.StudyError) as caught:
         stickslip.Study.from_file(file)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from conftest import couple
+from test_model import wedge
 
 import stickslip
 
@@ -33,7 +34,10 @@ def test_a_table_is_a_mapping_of_its_columns(table):
     assert list(table) == list(table.keys()) == table.columns
     assert [name for name, _ in table.items()] == table.columns and len(table.values()) == len(table.columns)
     assert "frequency_Hz" in table and "frequency" not in table and 3 not in table
-    assert table.get("nothing") is None and table.get("nothing", 5) == 5
+    assert table.get("nothing") is None and table.get("nothing", 5) == 5 and table.get(0) is None
+    for wrong in ("nothing", 0):
+        with pytest.raises(KeyError, match="the columns are"):
+            table[wrong]
     assert dict(table)["frequency_Hz"].tolist() == {**table}["frequency_Hz"].tolist() == [2.0, 3.0, 4.0]
     assert table.row(-1)["frequency_Hz"] == table.row(len(table) - 1)["frequency_Hz"] == 4.0
     with pytest.raises(IndexError):
@@ -93,7 +97,8 @@ def test_saving_writes_what_the_command_writes(command, tmp_path):
     names = {path.name for path in written}
     assert names == {path.name for path in (tmp_path / "command" / "element").iterdir()}
     assert {path.suffix for path in written} == {".csv", ".json", ".svg", ".png", ".html"}
-    assert [path.suffix for path in ELEMENT.run().save(tmp_path / "other", only=("parquet",))].count(".parquet") == 2
+    for number, only in enumerate([("parquet",), "parquet", "csv, parquet"]):
+        assert [path.suffix for path in ELEMENT.run().save(tmp_path / str(number), only=only)].count(".parquet") == 2
 
 
 MODULE_LAW = stickslip.rate_law(lambda u, v, z: 1e9 * u**3, name="lambda")
@@ -130,6 +135,7 @@ def models():
     model.force("tip.x", 5.0)
     model.motion("root", 1e-4)
     yield "matrices", model
+    yield "bodies", wedge()
 
 
 @pytest.mark.parametrize("model", [pytest.param(model, id=name) for name, model in models()])

@@ -12,15 +12,17 @@ of the run.
 
 from . import statistics
 from ._campaign import Campaign, campaign
-from ._core import Explorer, Law, Model, Orbit, Result, Study, Table, __version__, law, laws, templates
+from ._core import Explorer, Law, Model, Orbit, Residuals, Result, Study, Table, __version__, law, laws, templates
 from ._errors import MethodError, ModelError, OrbitError, ReportError, StickslipError, StudyError
 from ._folder import CampaignError
+from ._identify import Identification, identify
 from ._rate import rate_law
 
 __all__ = [
     "Campaign",
     "CampaignError",
     "Explorer",
+    "Identification",
     "Law",
     "MethodError",
     "Model",
@@ -28,6 +30,7 @@ __all__ = [
     "Orbit",
     "OrbitError",
     "ReportError",
+    "Residuals",
     "Result",
     "StickslipError",
     "Study",
@@ -35,6 +38,7 @@ __all__ = [
     "Table",
     "__version__",
     "campaign",
+    "identify",
     "law",
     "laws",
     "rate_law",

@@ -5,6 +5,7 @@ No unit is computed twice. `_folder.py` describes the folder of a campaign.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import io
 import itertools
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
 
     from ._core import Result, Study
 
-    Progress = bool | Callable[[int, int], object] | None
-    Percent = float | Sequence[float] | NDArray[np.float64]
+    _Progress = bool | Callable[[int, int], object] | None
+    _Percent = float | Sequence[float] | NDArray[np.float64]
 
 #: Target duration of a batch in s: a Dask task costs a few milliseconds, and a killed worker
 #: loses one batch.
@@ -64,7 +65,7 @@ def campaign(
     client: Any = None,
     processes: SupportsIndex | None = None,
     seconds: float = BATCH_SECONDS,
-    progress: Progress = None,
+    progress: _Progress = None,
     retry: bool = True,
 ) -> Campaign:
     """Computes the units of ``study`` that are missing in ``out``. Returns the :class:`Campaign`.
@@ -92,7 +93,7 @@ def campaign(
         raise TypeError(f'`study` must be a stickslip.Study, such as Study.from_file("couple.toml") gives, found {study!r}')
     if processes is not None and _count(processes) < 1:
         raise ValueError(f"`processes` must be a whole number from 1, found {processes!r}")
-    if not seconds > 0:
+    if isinstance(seconds, str) or not seconds > 0:
         raise ValueError(f"`seconds`, the duration of a batch, must be more than zero, found {seconds!r}")
     folder = Path(out)
     if folder.exists() and not folder.is_dir():
@@ -130,7 +131,7 @@ def _must_not_be_a_worker() -> None:
         raise CampaignError(GUARD)
 
 
-def _run(begun: Campaign, workers: _Workers, seconds: float, progress: Progress) -> None:
+def _run(begun: Campaign, workers: _Workers, seconds: float, progress: _Progress) -> None:
     todo = begun._missing()
     total, done = begun.units, begun.units - sum(stop - start for start, stop in todo)
     report = _progress(progress, begun.name)
@@ -144,7 +145,7 @@ def _run(begun: Campaign, workers: _Workers, seconds: float, progress: Progress)
             report._stickslip_close()
 
 
-def _progress(progress: Progress, name: str) -> Callable[[int, int], object] | None:
+def _progress(progress: _Progress, name: str) -> Callable[[int, int], object] | None:
     if callable(progress):
         return progress
     if progress:
@@ -260,15 +261,15 @@ _MOST_STUDIES = 4
 
 
 def _pickled(study: Study) -> bytes:
-    """Pickled study for a worker, with an identification of the matrix files that it reads."""
-    return pickle.dumps((study, study._matrices))
+    """Pickled study for a worker, with a checksum of the files that it reads."""
+    return pickle.dumps((study, study._files))
 
 
 def _unpickled(pickled: bytes) -> Study:
     """Returns the checked study on a worker."""
-    study, matrices = pickle.loads(pickled)
-    if study._matrices != matrices:
-        raise CampaignError("the files of [structure] contain other matrices than at the start of the campaign")
+    study, files = pickle.loads(pickled)
+    if study._files != files:
+        raise CampaignError("the files of [structure] or [[data]] contain other matrices or data than at the start of the campaign")
     return study  # type: ignore[no-any-return]
 
 
@@ -443,12 +444,12 @@ class Campaign:
         except FileNotFoundError:
             raise CampaignError(f"{self.folder} contains no campaign: campaign.json is missing") from None
         except ValueError as error:
-            raise CampaignError(f"{self.folder / 'campaign.json'} cannot be read: {error}") from None
+            raise CampaignError(f"{self.folder / 'campaign.json'} cannot be read: {error}; remove this file and start the campaign again, which keeps its parts") from None
         if not isinstance(head, dict) or head.get("format") != FORMAT:
             found = head.get("format") if isinstance(head, dict) else None
             raise CampaignError(f"{self.folder} has the format {found}, but this version reads {FORMAT}")
         self._head: dict[str, Any] = head
-        self._done, self._useless = _folder.read(self.folder, self.units)
+        self._done, self._useless = _folder.read(self.folder, self._identity, self.units)
 
     @classmethod
     def _begin(cls, study: Study, out: Path, *, retry: bool = False) -> Campaign:
@@ -460,22 +461,21 @@ class Campaign:
             "kind": study.kind,
             "units": study.units,
             "study": list(study.__reduce__()[1]),
-            "matrices": study._matrices,
+            "files": study._files,
         }
         head = json.loads(json.dumps(head))
         for folder in ("parts", "done"):
             (out / folder).mkdir(parents=True, exist_ok=True)
         if not (out / "campaign.json").exists():
             _folder.write(out / "campaign.json", json.dumps(head, indent=1).encode())
-            return cls(out)
         there = cls(out)
         if lies := _difference(there._head, head):
             raise CampaignError(f"{out} contains the campaign of {lies}; choose another folder, or remove that campaign")
         _folder.clear(out)
-        batches, useless = _folder.read(out, there.units, checksums=True)
+        batches, useless = _folder.read(out, there._identity, there.units, checksums=True)
         if useless:
             count = there.units - sum(batch.stop - batch.start for batch in batches)
-            message = f"{len(useless)} batches in {out} have damaged or missing parts: their units are computed again; {count} units remain"
+            message = f"{len(useless)} batches in {out} have damaged or missing parts or belong to another campaign: their units are computed again; {count} units remain"
             warnings.warn(message, stacklevel=3)
         failed = [batch for batch in batches if retry and batch.told.get("failed")]
         for file in [*useless, *(out / "done" / f"{batch.stem}.json" for batch in failed)]:
@@ -486,7 +486,14 @@ class Campaign:
         return list(_folder.missing(self._done, self.units))
 
     def _keep(self, start: int, stop: int, answer: dict[str, Any]) -> None:
-        _folder.keep(self.folder, start, stop, answer, answer.pop("tables"))
+        tables = answer.pop("tables")
+        _folder.keep(self.folder, start, stop, {"campaign": self._identity, **answer}, tables)
+
+    @property
+    def _identity(self) -> str:
+        """Checksum of all that determines the rows: records of another campaign are not used."""
+        determining = [self._head["version"], self._head["study"][1:], self._head["files"]]
+        return hashlib.sha256(json.dumps(determining).encode()).hexdigest()
 
     @property
     def name(self) -> str:
@@ -569,14 +576,14 @@ class Campaign:
         return np.asarray(read[column].to_numpy(), float)
 
     @overload
-    def percentiles(self, column: str, percent: Percent = ..., *, by: None = None, table: str | None = None) -> Any: ...
+    def percentiles(self, column: str, percent: _Percent = ..., *, by: None = None, table: str | None = None) -> Any: ...
 
     @overload
     def percentiles(
-        self, column: str, percent: Percent = ..., *, by: str, table: str | None = None
+        self, column: str, percent: _Percent = ..., *, by: str, table: str | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
-    def percentiles(self, column: str, percent: Percent = (5, 50, 95), *, by: str | None = None, table: str | None = None) -> Any:
+    def percentiles(self, column: str, percent: _Percent = (5, 50, 95), *, by: str | None = None, table: str | None = None) -> Any:
         """Returns percentiles of a column over all points with a value.
 
         With ``by``, the percentiles are computed for each value of another column. Returns an array
@@ -669,8 +676,8 @@ def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str | Non
         return f"the same study with other values of parameters ({words})"
     if method != our_method:
         return f"the same study with another method ({method or 'its own'})"
-    if theirs.get("matrices") != ours["matrices"]:
-        return "a study with other matrices: the files of [structure] have changed"
+    if theirs["files"] != ours["files"]:
+        return "a study with other matrices or data: the files of [structure] or [[data]] have changed"
     return None
 
 

@@ -2,8 +2,9 @@
 
 - ``campaign.json`` contains the study.
 - ``parts/`` contains one Parquet file per batch of units and table.
-- ``done/`` contains one record per batch, with the sizes and checksums of its parts. The record is
-  written last; a batch without a record counts as not computed.
+- ``done/`` contains one record per batch, with the identity of the campaign, and the sizes and
+  checksums of its parts. The record is written last; a batch without a record counts as not
+  computed.
 - ``lock`` is locked by the campaign that writes.
 """
 
@@ -19,7 +20,7 @@ from typing import Any, NamedTuple
 from ._errors import StickslipError
 
 #: Version of the folder layout.
-FORMAT = 2
+FORMAT = 3
 
 
 class CampaignError(StickslipError):
@@ -75,18 +76,20 @@ def keep(out: Path, start: int, stop: int, told: Mapping[str, Any], tables: Mapp
     write(out / "done" / f"{stem(start, stop)}.json", json.dumps({**told, "parts": parts}).encode())
 
 
-def read(out: Path, units: int, *, checksums: bool = False) -> tuple[list[Batch], list[Path]]:
+def read(out: Path, identity: str, units: int, *, checksums: bool = False) -> tuple[list[Batch], list[Path]]:
     """Returns the complete batches by ascending units, and the invalid files in ``done/``.
 
-    A batch is complete if its parts have the recorded sizes, and with ``checksums`` the recorded
-    contents. If two batches contain the same unit, the first one counts.
+    A batch is complete if it belongs to the campaign with this identity and its parts have the
+    recorded sizes, and with ``checksums`` the recorded contents. If two batches contain the same
+    unit, the first one counts.
     """
     batches: list[Batch] = []
     useless: list[Path] = []
     at = 0
     for file in sorted((out / "done").glob("*.json")):
         batch = _batch(file)
-        if batch is None or batch.start < at or batch.stop > units or not _is_whole(out, batch, checksums):
+        own = batch is not None and batch.told.get("campaign") == identity
+        if batch is None or not own or batch.start < at or batch.stop > units or not _is_whole(out, batch, checksums):
             useless.append(file)
         else:
             batches.append(batch)

@@ -15,9 +15,9 @@ from ._dual import Dual
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from ._core import Law, Quantity
+    from ._core import Law, _Quantity
 
-    Array = NDArray[np.float64]
+    _Array = NDArray[np.float64]
 
 #: Relative step of central differences: the cube root of machine epsilon, where they are most
 #: accurate.
@@ -30,7 +30,7 @@ def rate_law(
     *,
     states: int = ...,
     directions: int = ...,
-    parameters: Mapping[str, Quantity] | None = ...,
+    parameters: Mapping[str, _Quantity] | None = ...,
     derivatives: Callable[..., Any] | None = ...,
     scale: float | str = ...,
     state_scale: float | str = ...,
@@ -46,7 +46,7 @@ def rate_law(
     *,
     states: int = ...,
     directions: int = ...,
-    parameters: Mapping[str, Quantity] | None = ...,
+    parameters: Mapping[str, _Quantity] | None = ...,
     derivatives: Callable[..., Any] | None = ...,
     scale: float | str = ...,
     state_scale: float | str = ...,
@@ -61,7 +61,7 @@ def rate_law(
     *,
     states: int = 0,
     directions: int = 1,
-    parameters: Mapping[str, Quantity] | None = None,
+    parameters: Mapping[str, _Quantity] | None = None,
     derivatives: Callable[..., Any] | None = None,
     scale: float | str = math.inf,
     state_scale: float | str = 1.0,
@@ -216,14 +216,14 @@ class _Kernel:
         if not np.allclose(back, -there, rtol=1e-9, atol=1e-12 * np.nanmax(np.abs(there), initial=0.0), equal_nan=True):
             raise ValueError(f"`{self.name}` is not odd: its value at -u, -v, -z is not the negative value; remove odd=True")
 
-    def value(self, u: Array, v: Array, z: Array, values: Sequence[float]) -> tuple[Array]:
+    def value(self, u: _Array, v: _Array, z: _Array, values: Sequence[float]) -> tuple[_Array]:
         rows = self._call(u, v, z, values)
         out = np.empty((len(rows), u.shape[1]))
         for into, row in zip(out, rows):
             into[...] = row.value if isinstance(row, Dual) else row
         return (out,)
 
-    def linearise(self, u: Array, v: Array, z: Array, values: Sequence[float]) -> tuple[Array, Array]:
+    def linearise(self, u: _Array, v: _Array, z: _Array, values: Sequence[float]) -> tuple[_Array, _Array]:
         n, d = u.shape[1], self._directions
         arguments, rows = 2 * d + self._states, d + self._states
         if self._derivatives is not None:
@@ -241,11 +241,13 @@ class _Kernel:
 
     def check_derivatives(self, law: Law, u: ArrayLike | None, v: ArrayLike | None, z: ArrayLike | None, tolerance: float) -> float:
         """Returns the largest error of a derivative; see `Law.check_derivatives`."""
-        instants = self._instants(law, u, v, z)
-        n, d, m = instants.shape[1], self._directions, self._states
+        d, m = self._directions, self._states
+        sizes = np.repeat([1e-3, 1.0, 0.9 * law._state_scale], [d, d, m])
+        instants = self._instants(sizes, u, v, z)
+        n = instants.shape[1]
         values = tuple(law.parameters.values())
 
-        def split(arguments: Array) -> tuple[Array, Array, Array]:
+        def split(arguments: _Array) -> tuple[_Array, _Array, _Array]:
             return arguments[:d], arguments[d : 2 * d], arguments[2 * d :]
 
         out, slopes = self.linearise(*split(instants), values)
@@ -253,7 +255,7 @@ class _Kernel:
         worst = (0.0, "")
         for argument in range(2 * d + m):
             step = np.zeros_like(instants)
-            step[argument] = DIFFERENCE * np.max(np.abs(instants[argument]))
+            step[argument] = DIFFERENCE * (np.max(np.abs(instants[argument])) or sizes[argument])
             width = (instants + step)[argument] - (instants - step)[argument]
             ahead, behind = self.value(*split(instants + step), values)[0], self.value(*split(instants - step), values)[0]
             quotient = (ahead - behind) / width
@@ -270,17 +272,21 @@ class _Kernel:
             raise ValueError(f"the derivative of `{self.name}` is wrong: {worst[1]}")
         return worst[0]
 
-    def _instants(self, law: Law, u: ArrayLike | None, v: ArrayLike | None, z: ArrayLike | None) -> Array:
-        """Returns arguments (rows, n): the given ones, and random values for the others."""
-        n = max([1] + [np.asarray(given).shape[-1] for given in (u, v, z) if given is not None and np.ndim(given)])
+    def _instants(self, sizes: _Array, *given: ArrayLike | None) -> _Array:
+        """Returns arguments (rows, n): the given ones, and random values up to ``sizes`` for the others."""
+        n = max([1] + [np.shape(one)[-1] for one in given if one is not None and np.ndim(one)])
         n = n if n > 1 else 64
         random = np.random.default_rng(1)
-        sizes = ((u, self._directions, 1e-3), (v, self._directions, 1.0), (z, self._states, 0.9 * law._state_scale))
-        rows = []
-        for given, count, size in sizes:
-            drawn = size * random.uniform(0.1, 1.0, (count, n)) * random.choice([-1.0, 1.0], (count, n))
-            rows.append(drawn if given is None else np.broadcast_to(np.asarray(given, float), (count, n)))
-        return np.concatenate(rows)
+        instants: _Array = sizes[:, None] * random.uniform(0.1, 1.0, (len(sizes), n)) * random.choice([-1.0, 1.0], (len(sizes), n))
+        counts = (self._directions, self._directions, self._states)
+        for name, one, count, end in zip("uvz", given, counts, np.cumsum(counts)):
+            if one is None:
+                continue
+            try:
+                instants[end - count : end] = np.asarray(one, float)
+            except ValueError:
+                raise ValueError(f"`{name}` must have the shape ({count}, {n}) or ({n},), found {np.shape(one)}") from None
+        return instants
 
     def _row_name(self, row: int) -> str:
         if row >= self._directions:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     #: Range of an input: lowest and highest value, or a function from (0, 1) to values.
-    Bound = Sequence[float] | NDArray[Any] | Callable[[NDArray[np.float64]], ArrayLike]
+    _Bound = Sequence[float] | NDArray[Any] | Callable[[NDArray[np.float64]], ArrayLike]
 
 #: Maximum number of groups in `first_order`: fewer groups have more accurate means, more groups
 #: follow the curve better.
@@ -64,7 +64,7 @@ def first_order(values: ArrayLike, output: ArrayLike, *, groups: int | None = No
 
 
 def sobol(
-    function: Callable[[NDArray[np.float64]], ArrayLike], bounds: Sequence[Bound], *, count: int = 1024, seed: int = 0
+    function: Callable[[NDArray[np.float64]], ArrayLike], bounds: Sequence[_Bound], *, count: int = 1024, seed: int = 0
 ) -> dict[str, NDArray[np.float64]]:
     """Returns first-order and total Sobol indices of ``function`` over independent uniform inputs.
 

@@ -113,13 +113,11 @@ pub fn ring(
                        [disk] in a study file or in Study.from_dict";
         return Err(error::model(py, message));
     }
-    let most = MAX_MASSES / sector.masses.len().max(1);
+    let masses = sector.masses.len() + sector.bodies.len();
+    let most = MAX_MASSES / masses.max(1);
     if disk.sectors > most {
-        let message = format!(
-            "{} sectors with {} masses each exceed the limit of {MAX_MASSES} masses",
-            disk.sectors,
-            sector.masses.len()
-        );
+        let message =
+            format!("{} sectors with {masses} masses each exceed the limit of {MAX_MASSES} masses", disk.sectors);
         return Err(error::model(py, message));
     }
     let mistuned = given.map(|given| mistuning(given, sector, disk.sectors)).transpose()?;

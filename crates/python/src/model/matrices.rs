@@ -1,7 +1,7 @@
 //! Mass, damping and stiffness matrices from NumPy and SciPy.
 
-use crate::error;
 use crate::supervision::run_on_new_thread;
+use crate::{error, quantity};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -48,7 +48,18 @@ fn entries(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Entries> 
             .map(|((i, k), value)| (*i as usize, *k as usize, *value))
             .collect());
     }
-    let array = py.import("numpy")?.call_method1("asarray", (value, "float64"))?;
+    let no_matrix = || {
+        let found = quantity::kind(value);
+        error::model(
+            py,
+            format!("the {what} matrix must be an array of real numbers or a sparse matrix, found {found}"),
+        )
+    };
+    let array = py.import("numpy")?.call_method1("asarray", (value,)).map_err(|_| no_matrix())?;
+    if quantity::is_masked(value)? || !quantity::is_real(&array.getattr("dtype")?) {
+        return Err(no_matrix());
+    }
+    let array = array.call_method1("astype", ("float64",))?;
     let Ok(array) = array.extract::<PyReadonlyArray2<'_, f64>>() else {
         return Err(error::model(py, format!("the {what} matrix must have two dimensions")));
     };

@@ -19,7 +19,7 @@ use crate::law::PyLaw;
 use crate::progress::{bar, close};
 use crate::result::PyResultSet;
 use crate::study::PyStudy;
-use crate::supervision::{Supervision, run_here, run_on_new_thread, run_supervised};
+use crate::supervision::{Supervision, WorkThread, run_on, run_on_new_thread, run_supervised};
 use crate::{error, quantity};
 use many_orbits::{OrbitRequest, along_frequencies, along_parameters, describe};
 use numpy::{PyArray1, PyArrayMethods};
@@ -37,8 +37,8 @@ use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
 use stickslip::dimension::Dimension;
 use stickslip::method::{self, Method, Options, Seed, Solver, solver_with_alternatives};
 use stickslip::model::{
-    Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure, SubstructureDamping,
-    System,
+    Body, Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure,
+    SubstructureDamping, System, View, inertia_matrix, with_rotations,
 };
 use stickslip::structure::Reduction;
 use stickslip_study::dataset::{Column, Dataset, Failure, Figure, Record, Table};
@@ -104,6 +104,13 @@ impl PyModel {
         PyModel { study: Some((study.clone(), case)), ..PyModel::from_model(model) }
     }
 
+    /// Returns the thread for work whose steps take the time of a few dense factorizations.
+    fn thread(&self) -> WorkThread {
+        let Model { masses, bodies, substructure, .. } = &self.model;
+        let dofs = masses.len() + bodies.len() + substructure.as_ref().map_or(0, |own| own.component.dofs());
+        if dofs < 100 { WorkThread::Caller } else { WorkThread::New }
+    }
+
     /// Returns a copy without the stored solver.
     fn copied(&self) -> PyModel {
         PyModel { around: self.around.clone(), study: self.study.clone(), ..PyModel::from_model(self.model.clone()) }
@@ -121,7 +128,8 @@ impl PyModel {
                            but this model is one sector: use model.disk(24) for a disk of 24 sectors";
             return Err(error::model(py, message));
         }
-        run_here(py, || self.model.assemble())?.map_err(|cause| model_error(py, &cause, &self.model))
+        let model = self.model.clone();
+        run_on(py, self.thread(), move || model.assemble())?.map_err(|cause| model_error(py, &cause, &self.model))
     }
 
     fn request(&self, py: Python<'_>, name: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<OrbitRequest> {
@@ -149,12 +157,13 @@ impl PyModel {
             let key = (method.to_owned(), options);
             if cached.as_ref().is_none_or(|cached| cached.key != key) {
                 let system = Arc::new(self.system(py)?);
-                let solver =
-                    run_here(py, || owned_solver(&*made, &system))?.map_err(|cause| error::method(py, cause))?;
+                let borrowed = system.clone();
+                let solver = run_on(py, self.thread(), move || owned_solver(&*made, &borrowed))?
+                    .map_err(|cause| error::method(py, cause))?;
                 *cached = Some(CachedSolver { key, model: Arc::new(self.copied()), solver, system });
             }
         }
-        let Some(found) = cached.as_mut() else { unreachable!("a solver was made above") };
+        let Some(mut found) = cached.take() else { unreachable!("a solver was made above") };
         let n = 2 * found.system.dofs();
         if let Some(start) = start.as_ref().filter(|start| start.len() < n) {
             return Err(error::model(
@@ -163,15 +172,12 @@ impl PyModel {
             ));
         }
         let seed = start.clone().map(|state| Seed::from_state(omega, state));
-        let outcome = run_here(py, || found.solver.orbit_near(omega, seed.as_ref()));
-        let outcome = match outcome {
-            Ok(outcome) => outcome,
-            Err(ended) => {
-                // An interrupted solver is in an undefined state.
-                *cached = None;
-                return Err(ended);
-            }
-        };
+        // An interrupted solver is in an undefined state and is not kept.
+        let (found, outcome) = run_on(py, self.thread(), move || {
+            let outcome = found.solver.orbit_near(omega, seed.as_ref());
+            (found, outcome)
+        })?;
+        let found = cached.insert(found);
         let orbit = outcome.map_err(|cause| error::orbit(py, cause))?;
         if let Some(start) = start.as_ref().filter(|start| start.len() != orbit.initial_state.len()) {
             let message = format!(
@@ -188,7 +194,7 @@ impl PyModel {
             options: found.key.1.clone(),
             start,
         };
-        Ok(PyOrbit { orbit, system: found.system.clone(), input })
+        Ok(PyOrbit { orbit: Arc::new(orbit), system: found.system.clone(), input })
     }
 
     fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, record: RunRecord) -> PyResultSet {
@@ -359,7 +365,86 @@ impl PyModel {
         Ok(())
     }
 
+    /// Adds a rigid body (kg) with small rotations.
+    ///
+    /// Its places are the displacements of its centre of mass and its rotations, as in
+    /// ``"damper.x"`` (m) and ``"damper.ry"`` (rad). :meth:`place` adds its points and faces.
+    ///
+    /// - ``inertia`` (kg m²): about the centre of mass, one moment for each rotation, or in space
+    ///   the six entries xx, yy, zz, xy, yz, zx.
+    /// - ``directions``: two of x, y, z in a plane, or all three. The rotations follow, unless
+    ///   they are named, as in ``["z", "ry"]``.
+    ///
+    /// >>> import stickslip
+    /// >>> model = stickslip.Model()
+    /// >>> model.body("wedge", "20 g", "300 g mm^2", directions=["x", "z"])
+    /// >>> model.place("left", "wedge", offset=["-4 mm", 0, "2 mm"], normal=[-1, 0, 1])
+    /// >>> model.places
+    /// ['wedge.x', 'wedge.z', 'wedge.ry', 'left.t', 'left.n']
+    #[pyo3(signature = (name, mass, inertia, *, directions))]
+    fn body(
+        &mut self,
+        py: Python<'_>,
+        name: String,
+        mass: &Bound<'_, PyAny>,
+        inertia: &Bound<'_, PyAny>,
+        directions: Vec<String>,
+    ) -> PyResult<()> {
+        let mass = quantity::to_si(mass, Dimension::MASS, &format!("mass of `{name}`"))?;
+        let moments = quantity::many(inertia, Some(Dimension::INERTIA), &format!("inertia of `{name}`"))?;
+        let directions = with_rotations(&directions.iter().map(String::as_str).collect::<Vec<_>>());
+        let inertia = inertia_matrix(&directions, &moments)
+            .map_err(|fault| error::model(py, format!("body `{name}`, {fault}")))?;
+        self.model.bodies.push(Body { name, mass, inertia, directions });
+        self.changed();
+        Ok(())
+    }
+
+    /// Adds a point or a face of a body, or a face of a mass with directions.
+    ///
+    /// - ``of``: the body or the mass, which must exist.
+    /// - ``offset`` (m): position relative to the centre of mass of a body.
+    /// - ``normal``: the normal of a face, of any length. The directions are then ``t`` and ``n``
+    ///   in a plane, ``t1``, ``t2`` and ``n`` in space.
+    /// - ``tangent``: the direction of ``t1``.
+    /// - ``directions``: other names for the directions of a face, or selected directions of a
+    ///   point.
+    #[pyo3(signature = (name, of, *, offset=None, normal=None, tangent=None, directions=None))]
+    #[allow(clippy::too_many_arguments)] // one argument per keyword
+    fn place(
+        &mut self,
+        py: Python<'_>,
+        name: String,
+        of: String,
+        offset: Option<&Bound<'_, PyAny>>,
+        normal: Option<&Bound<'_, PyAny>>,
+        tangent: Option<&Bound<'_, PyAny>>,
+        directions: Option<Vec<String>>,
+    ) -> PyResult<()> {
+        let vector = |given: Option<&Bound<'_, PyAny>>, dimension, key: &str| {
+            let Some(given) = given else { return Ok(None) };
+            let what = format!("`{key}` of `{name}`");
+            let numbers = quantity::many(given, Some(dimension), &what)?;
+            let found = numbers.len();
+            let vector = <[f64; 3]>::try_from(numbers);
+            vector.map(Some).map_err(|_| error::model(py, format!("{what} must have three components, found {found}")))
+        };
+        let view = View {
+            offset: vector(offset, Dimension::LENGTH, "offset")?,
+            normal: vector(normal, Dimension::NONE, "normal")?,
+            tangent: vector(tangent, Dimension::NONE, "tangent")?,
+            directions,
+            ..View::new(name.as_str(), of)
+        };
+        let place = self.model.view(&view).map_err(|fault| error::model(py, format!("place `{name}`, {fault}")))?;
+        self.model.places.push(place);
+        self.changed();
+        Ok(())
+    }
+
     /// Adds a spring (N/m) with a viscous damper (kg/s) in parallel between two places.
+    ///
+    /// Between rotations, the units are N m/rad and N m s/rad.
     #[pyo3(signature = (a, b, *, stiffness=None, damping=None))]
     fn spring(
         &mut self,
@@ -371,8 +456,9 @@ impl PyModel {
         let value = |given: Option<&Bound<'_, PyAny>>, dimension, what: &str| {
             given.map_or(Ok(0.0), |given| quantity::to_si(given, dimension, &format!("{what} between `{a}` and `{b}`")))
         };
-        let stiffness = value(stiffness, Dimension::STIFFNESS, "stiffness")?;
-        let damping = value(damping, Dimension::DAMPING, "damping")?;
+        let [stiffness_dimension, damping_dimension] = parameters::spring_dimensions(&self.model, [&a, &b]);
+        let stiffness = value(stiffness, stiffness_dimension, "stiffness")?;
+        let damping = value(damping, damping_dimension, "damping")?;
         self.model.springs.push(Spring { between: [a, b], stiffness, damping });
         self.changed();
         Ok(())
@@ -388,6 +474,7 @@ impl PyModel {
 
     /// Adds a force ``amplitude cos(harmonic Ω t + phase)`` in N, with the phase in rad.
     ///
+    /// On a rotation it is a moment in N m.
     /// ``harmonic=0`` makes it constant. On a sector of a disk, the force is a travelling wave
     /// with ``engine_order``, a standing wave with ``nodal_diameter``, or acts on one
     /// ``sector``.
@@ -405,7 +492,8 @@ impl PyModel {
         sector: Option<usize>,
     ) -> PyResult<()> {
         let around = disk::around(py, engine_order, nodal_diameter, sector)?;
-        let amplitude = quantity::to_si(amplitude, Dimension::FORCE, &format!("force on `{on}`"))?;
+        let dimension = if self.model.is_rotation(&on) { Dimension::ENERGY } else { Dimension::FORCE };
+        let amplitude = quantity::to_si(amplitude, dimension, &format!("force on `{on}`"))?;
         let phase = phase.map_or(Ok(0.0), |phase| quantity::to_si(phase, Dimension::ANGLE, "phase"))?;
         self.model.forces.push(Force { on, amplitude, phase, harmonic });
         self.around[0].resize(self.model.forces.len() - 1, None);
@@ -414,7 +502,8 @@ impl PyModel {
         Ok(())
     }
 
-    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place, in m and rad.
+    /// Adds an imposed motion ``amplitude cos(harmonic Ω t + phase)`` of a place, in m, or in rad
+    /// of a rotation. The phase is in rad.
     ///
     /// The keywords for a disk are those of :meth:`force`.
     #[pyo3(signature = (on, amplitude, *, phase=None, harmonic=1, engine_order=None, nodal_diameter=None, sector=None))]
@@ -431,7 +520,8 @@ impl PyModel {
         sector: Option<usize>,
     ) -> PyResult<()> {
         let around = disk::around(py, engine_order, nodal_diameter, sector)?;
-        let amplitude = quantity::to_si(amplitude, Dimension::LENGTH, &format!("motion of `{on}`"))?;
+        let dimension = if self.model.is_rotation(&on) { Dimension::ANGLE } else { Dimension::LENGTH };
+        let amplitude = quantity::to_si(amplitude, dimension, &format!("motion of `{on}`"))?;
         let phase = phase.map_or(Ok(0.0), |phase| quantity::to_si(phase, Dimension::ANGLE, "phase"))?;
         self.model.motions.push(Motion { on, amplitude, phase, harmonic });
         self.around[1].resize(self.model.motions.len() - 1, None);
@@ -547,19 +637,22 @@ impl PyModel {
         method: &str,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let request = self.request(py, method, options)?;
-        let prepared = run_here(py, || {
-            solver_with_alternatives(&*request.method, &request.system).map(|_| request.method.choice(&request.system))
+        let OrbitRequest { system, method } = self.request(py, method, options)?;
+        let prepared = system.clone();
+        let choice = run_on(py, self.thread(), move || {
+            solver_with_alternatives(&*method, &prepared).map(|_| method.choice(&prepared).to_string())
         })?;
-        let choice = prepared.map_err(|cause| error::method(py, cause))?;
+        let choice = choice.map_err(|cause| error::method(py, cause))?;
         let out = PyDict::new(py);
-        out.set_item("places", request.system.places())?;
+        out.set_item("places", system.places())?;
         out.set_item("joints", self.joints())?;
-        out.set_item("method", choice.to_string())?;
+        out.set_item("method", choice)?;
         // Largest number of degrees of freedom for which all natural frequencies are computed:
         // one second.
-        if request.system.dofs() <= 600 {
-            let survey = run_here(py, || self.model.survey())?.map_err(|cause| model_error(py, &cause, &self.model))?;
+        if system.dofs() <= 600 {
+            let model = self.model.clone();
+            let survey = run_on(py, self.thread(), move || model.survey())?
+                .map_err(|cause| model_error(py, &cause, &self.model))?;
             let hertz = |modes: &stickslip::model::LinearModes| {
                 modes.elastic.iter().map(|mode| mode.omega / TAU).collect::<Vec<_>>()
             };
@@ -630,16 +723,17 @@ impl PyModel {
             progress: bar.as_ref().map(|bar| bar.clone().unbind()),
             total: Some(omegas.len() as u64),
         };
-        let outcome = run_supervised(py, &supervision, |context| {
+        let model = self.model.clone();
+        let outcome = run_supervised(py, &supervision, move |context| {
             let rows = if varied.is_empty() {
                 along_frequencies(&request, &omegas, context)
             } else {
-                along_parameters(&self.model, &request, &omegas, &varied, context)
+                along_parameters(&model, &request, &omegas, &varied, context)
             };
-            (rows, context.threads)
+            (rows, context.threads, request, omegas, varied)
         });
         close(bar)?;
-        let (rows, threads) = outcome?;
+        let (rows, threads, request, omegas, varied) = outcome?;
         let rows = rows.map_err(|refusal| refusal.raised(py))?;
         let at = |index: usize| {
             let values = varied.iter().map(|(name, values)| format!("{name} = {}", values[index]));
@@ -674,7 +768,7 @@ impl PyModel {
         let (start, points) = (Instant::now(), instants(py, points)?);
         let found = self.orbit(py, frequency, method, None, options)?;
         let (tables, figure) = figures::loops(&found, points);
-        let row = Row::new(&found.system, found.orbit.omega, Ok(&found.orbit));
+        let row = Row::new(&found.system, found.orbit.omega, Ok(&*found.orbit));
         let record = RunRecord::of(&[row], &|_| String::new(), vec![found.orbit.method.to_owned()], 1, start);
         Ok(self.result("hysteresis", "Hysteresis", tables, figure, record))
     }
@@ -750,8 +844,9 @@ impl PyModel {
         let model = &self.model;
         let own = model.substructure.as_ref().map(|own| format!(", matrices of {} rows", own.component.dofs()));
         format!(
-            "<stickslip.Model: {} masses, {} springs, {} joints, {} forces, {} motions{}>",
+            "<stickslip.Model: {} masses, {} bodies, {} springs, {} joints, {} forces, {} motions{}>",
             model.masses.len(),
+            model.bodies.len(),
             model.springs.len(),
             model.joints.len(),
             model.forces.len(),
@@ -777,7 +872,11 @@ pub fn _model(
     let (mut model, around) = pickle::model(bytes, laws).map_err(|cause| error::model(py, cause))?;
     if let Some((study, case)) = &study {
         let of_study = study.model_of(py, *case)?;
-        (model.substructure, model.places) = (of_study.substructure, of_study.places);
+        let added = std::mem::replace(&mut model.places, of_study.places);
+        let added = added.into_iter().filter(|view| model.places.iter().all(|place| place.name != view.name));
+        let added: Vec<_> = added.collect();
+        model.places.extend(added);
+        model.substructure = of_study.substructure;
     }
     Ok(PyModel { around, study, ..PyModel::from_model(model) })
 }

@@ -1,7 +1,7 @@
 //! Orbits in Python; their values are computed on demand.
 
 use super::{PyModel, SearchInput};
-use crate::supervision::run_here;
+use crate::supervision::{run_here, run_on};
 use crate::{error, quantity};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray};
 use pyo3::exceptions::PyKeyError;
@@ -28,9 +28,22 @@ use stickslip_study::hertz;
 /// (True, True)
 #[pyclass(frozen, module = "stickslip", name = "Orbit")]
 pub struct PyOrbit {
-    pub orbit: Orbit,
+    pub orbit: Arc<Orbit>,
     pub system: Arc<System>,
     pub input: SearchInput,
+}
+
+impl PyOrbit {
+    /// Computes what follows from the orbit and may take long, such as the multipliers of a large
+    /// model.
+    fn computed<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        compute: impl FnOnce(&Orbit) -> T + Send + 'static,
+    ) -> PyResult<T> {
+        let orbit = self.orbit.clone();
+        run_on(py, self.input.model.thread(), move || compute(&orbit))
+    }
 }
 
 fn dict<'py, V: IntoPyObject<'py>>(
@@ -129,7 +142,7 @@ impl PyOrbit {
         evidence.set_item("residual", found.residual)?;
         evidence.set_item("energy_gap", found.energy_gap)?;
         evidence.set_item("truncation", found.error_estimate)?;
-        evidence.set_item("return_defect", run_here(py, || self.orbit.return_defect())?)?;
+        evidence.set_item("return_defect", self.computed(py, Orbit::return_defect)?)?;
         evidence.set_item("status", found.accuracy.status())?;
         evidence.set_item("found_by", found.found_by)?;
         evidence.set_item("iterations", found.iterations)?;
@@ -142,14 +155,14 @@ impl PyOrbit {
     /// ``True`` if no small disturbance grows; ``None`` if this is unknown.
     #[getter]
     fn stable(&self, py: Python<'_>) -> PyResult<Option<bool>> {
-        run_here(py, || self.orbit.is_stable())
+        self.computed(py, Orbit::is_stable)
     }
 
     /// Floquet multipliers of a period in descending order of modulus; ``None`` without a
     /// return map.
     #[getter]
     fn multipliers<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<numpy::Complex64>>>> {
-        let Some(multipliers) = run_here(py, || self.orbit.multipliers())? else { return Ok(None) };
+        let Some(multipliers) = self.computed(py, Orbit::multipliers)? else { return Ok(None) };
         let multipliers: Vec<numpy::Complex64> =
             multipliers.into_iter().map(|value| numpy::Complex64::new(value.re, value.im)).collect();
         Ok(Some(multipliers.to_pyarray(py)))

@@ -18,7 +18,10 @@ pub type VariedParameters = Vec<(String, Vec<f64>)>;
 pub fn set(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
     let Some((of, key)) = name.rsplit_once('.') else { return Ok(()) };
     match key {
-        "mass" => model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value),
+        "mass" => {
+            model.masses.iter_mut().filter(|mass| mass.name == of).for_each(|mass| mass.mass = value);
+            model.bodies.iter_mut().filter(|body| body.name == of).for_each(|body| body.mass = value);
+        }
         "force" => model.forces.iter_mut().filter(|force| force.on == of).for_each(|force| force.amplitude = value),
         "motion" => {
             model.motions.iter_mut().filter(|motion| motion.on == of).for_each(|motion| motion.amplitude = value);
@@ -37,19 +40,42 @@ pub fn set(model: &mut Model, name: &str, value: f64) -> Result<(), String> {
     Ok(())
 }
 
+/// Returns the dimensions of the stiffness and the damping of a spring between two places.
+pub fn spring_dimensions(model: &Model, between: [&str; 2]) -> [Dimension; 2] {
+    if between.into_iter().any(|end| model.is_rotation(end)) {
+        [Dimension::ANGULAR_STIFFNESS, Dimension::ANGULAR_DAMPING]
+    } else {
+        [Dimension::STIFFNESS, Dimension::DAMPING]
+    }
+}
+
 /// Returns the dimension of a parameter of the model, or `None` if the model has no such
 /// parameter.
 ///
 /// The inner `None` means that any dimension is accepted.
 pub fn dimension(model: &Model, name: &str) -> Option<Option<Dimension>> {
     let (of, key) = name.rsplit_once('.')?;
-    let springs = || model.springs.iter().any(|spring| spring.between.join("-") == of);
     match key {
-        "mass" => model.masses.iter().any(|mass| mass.name == of).then_some(Some(Dimension::MASS)),
-        "force" => model.forces.iter().any(|force| force.on == of).then_some(Some(Dimension::FORCE)),
-        "motion" => model.motions.iter().any(|motion| motion.on == of).then_some(Some(Dimension::LENGTH)),
-        "stiffness" if of.contains('-') => springs().then_some(Some(Dimension::STIFFNESS)),
-        "damping" if of.contains('-') => springs().then_some(Some(Dimension::DAMPING)),
+        "mass" => {
+            let masses = model.masses.iter().map(|mass| &mass.name);
+            masses
+                .chain(model.bodies.iter().map(|body| &body.name))
+                .any(|name| name == of)
+                .then_some(Some(Dimension::MASS))
+        }
+        "force" => {
+            let dimension = if model.is_rotation(of) { Dimension::ENERGY } else { Dimension::FORCE };
+            model.forces.iter().any(|force| force.on == of).then_some(Some(dimension))
+        }
+        "motion" => {
+            let dimension = if model.is_rotation(of) { Dimension::ANGLE } else { Dimension::LENGTH };
+            model.motions.iter().any(|motion| motion.on == of).then_some(Some(dimension))
+        }
+        "stiffness" | "damping" if of.contains('-') => {
+            let spring = model.springs.iter().find(|spring| spring.between.join("-") == of)?;
+            let [stiffness, damping] = spring_dimensions(model, spring.between.each_ref().map(String::as_str));
+            Some(Some(if key == "stiffness" { stiffness } else { damping }))
+        }
         _ => {
             let law = &model.joints.iter().find(|joint| joint.name == of)?.law;
             let parameter = law.info().parameters.iter().find(|parameter| parameter.key == key)?;

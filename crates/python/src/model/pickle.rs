@@ -34,7 +34,11 @@ struct StoredModel {
     /// Number of sectors, flag for equal sectors, order.
     ring: Option<(usize, bool, Option<usize>)>,
     structure: Option<StoredStructure>,
+    views: Vec<StoredView>,
 }
+
+/// Name, directions, rows, and the mass or body of a point or a face.
+type StoredView = (String, Vec<String>, Vec<Entry>, String);
 
 #[derive(Serialize, Deserialize)]
 enum StoredAround {
@@ -85,6 +89,7 @@ pub fn bytes(model: &Model, around: &Arounds, of_study: bool) -> Result<Vec<u8>,
         around,
         ring: model.ring.map(|ring| (ring.sectors, ring.equal, ring.order)),
         structure: structure.map(|structure| StoredStructure::of(structure, &model.places)),
+        views: model.places.iter().filter_map(stored_view).collect(),
     };
     rmp_serde::to_vec(&stored).map_err(|cause| cause.to_string())
 }
@@ -102,9 +107,14 @@ pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), Str
     }
     let (substructure, places) = stored.structure.map(StoredStructure::made).transpose()?.unzip();
     let joints = stored.joints.into_iter().zip(laws);
+    let view = |(name, directions, rows, of): StoredView| Place {
+        directions,
+        rows,
+        ..Place::new(name, Vec::new()).as_view_of(of)
+    };
     let model = Model {
         substructure,
-        places: places.unwrap_or_default(),
+        places: places.unwrap_or_default().into_iter().chain(stored.views.into_iter().map(view)).collect(),
         masses: stored.masses.into_iter().map(|(name, mass, directions)| Mass { name, mass, directions }).collect(),
         bodies: stored
             .bodies
@@ -145,6 +155,11 @@ pub fn model(bytes: &[u8], laws: Vec<SharedLaw>) -> Result<(Model, Arounds), Str
     Ok((model, around))
 }
 
+fn stored_view(place: &Place) -> Option<StoredView> {
+    let of = place.view_of.clone()?;
+    Some((place.name.clone(), place.directions.clone(), place.rows.clone(), of))
+}
+
 impl StoredStructure {
     fn of(structure: &Substructure, places: &[Place]) -> StoredStructure {
         let (mass, damping, stiffness) = structure.component.matrices();
@@ -164,6 +179,7 @@ impl StoredStructure {
             },
             places: places
                 .iter()
+                .filter(|place| place.view_of.is_none())
                 .map(|place| (place.name.clone(), place.directions.clone(), place.rows.clone()))
                 .collect(),
         }

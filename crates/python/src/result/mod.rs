@@ -6,7 +6,7 @@ mod numpy_view;
 use crate::error;
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyString, PyTuple};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stickslip_report::{Outputs, html, png, svg, terminal::Terminal, write_dataset};
@@ -135,12 +135,21 @@ impl PyResultSet {
     /// Writes the files of the command into ``folder/NAME/`` and returns their paths.
     ///
     /// The files are tables as CSV, the record as JSON, and the figure as SVG, PNG and HTML
-    /// page. ``only`` selects outputs instead: csv, parquet, json, svg, png, html. The record
-    /// is always written.
+    /// page. ``only`` selects outputs instead, as in ``"csv,svg"`` or ``["csv", "svg"]``: csv,
+    /// parquet, json, svg, png, html. The record is always written.
     #[pyo3(signature = (folder, only=None))]
-    fn save<'py>(&self, py: Python<'py>, folder: PathBuf, only: Option<Vec<String>>) -> PyResult<Bound<'py, PyList>> {
+    fn save<'py>(
+        &self,
+        py: Python<'py>,
+        folder: PathBuf,
+        only: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyList>> {
+        let named = |only: &Bound<'_, PyAny>| match only.cast::<PyString>() {
+            Ok(text) => Ok(text.to_str()?.split(',').map(|name| name.trim().to_owned()).collect()),
+            Err(_) => only.extract::<Vec<String>>(),
+        };
         let outputs = match only {
-            Some(only) => Outputs::select(&only).map_err(|cause| error::report(py, cause))?,
+            Some(only) => Outputs::select(&named(only)?).map_err(|cause| error::report(py, cause))?,
             None => Outputs::defaults(),
         };
         let files = py.detach(|| write_dataset(&self.dataset, &folder, &outputs));
@@ -302,6 +311,11 @@ impl Table {
     fn table(&self) -> &dataset::Table {
         &self.dataset.tables[self.index]
     }
+
+    /// Returns the column of this name; other keys than strings have no column.
+    fn find(&self, column: &Bound<'_, PyAny>) -> Option<&Column> {
+        self.table().column(column.extract().ok()?)
+    }
 }
 
 #[pymethods]
@@ -328,9 +342,9 @@ impl Table {
         self.table().rows()
     }
 
-    fn __getitem__<'py>(slf: Bound<'py, Self>, column: &str) -> PyResult<Bound<'py, PyAny>> {
+    fn __getitem__<'py>(slf: Bound<'py, Self>, column: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
-        let Some(found) = this.table().column(column) else {
+        let Some(found) = this.find(column) else {
             let message = format!("unknown column `{column}`; the columns are {}", this.columns().join(", "));
             return Err(PyKeyError::new_err(message));
         };
@@ -349,7 +363,7 @@ impl Table {
     }
 
     fn __contains__(&self, column: &Bound<'_, PyAny>) -> bool {
-        column.extract::<&str>().is_ok_and(|column| self.table().column(column).is_some())
+        self.find(column).is_some()
     }
 
     fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -363,23 +377,23 @@ impl Table {
 
     /// Returns the columns.
     fn values<'py>(slf: Bound<'py, Self>) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        slf.get().columns().into_iter().map(|name| Table::__getitem__(slf.clone(), name)).collect()
+        slf.get().columns().into_iter().map(|name| slf.get_item(name)).collect()
     }
 
     /// Returns pairs of names and columns.
     fn items<'py>(slf: Bound<'py, Self>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
         let names = slf.get().columns().into_iter();
-        names.map(|name| Ok((name.to_owned(), Table::__getitem__(slf.clone(), name)?))).collect()
+        names.map(|name| Ok((name.to_owned(), slf.get_item(name)?))).collect()
     }
 
     /// Returns a column, or ``default`` if there is no column of this name.
     #[pyo3(signature = (column, default=None))]
     fn get<'py>(
         slf: Bound<'py, Self>,
-        column: &str,
+        column: &Bound<'py, PyAny>,
         default: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
-        if slf.get().table().column(column).is_none() {
+        if slf.get().find(column).is_none() {
             return Ok(default);
         }
         Table::__getitem__(slf, column).map(Some)

@@ -5,6 +5,7 @@
 //! length `ρ (e · θ)` with the radius of gyration `ρ = √(J/m)`. Their mass matrix is `m` times
 //! the identity, and all coordinates are in metres.
 
+use super::ElementFault;
 use super::place::Place;
 use crate::structure::reduction::Row;
 use nalgebra::DMatrix;
@@ -255,6 +256,45 @@ pub fn with_rotations(directions: &[&str]) -> Vec<String> {
     };
     let rotations = more.iter().map(|axis| ROTATIONS[*axis]);
     directions.iter().copied().chain(rotations).map(str::to_owned).collect()
+}
+
+/// Returns the inertia matrix of a body with these directions.
+///
+/// `stated` has one moment for each rotation, or in space the six entries xx, yy, zz, xy, yz, zx
+/// (kg m²).
+///
+/// # Errors
+/// [`ElementFault`]: the number of values does not match the rotations.
+pub fn inertia_matrix(directions: &[String], stated: &[f64]) -> Result<[[f64; 3]; 3], ElementFault> {
+    let turns = |axis: &usize| directions.iter().any(|along| along == ROTATIONS[*axis]);
+    let about: Vec<usize> = (0..ROTATIONS.len()).filter(turns).collect();
+    let mut matrix = [[0.0; 3]; 3];
+    match (stated, &about[..]) {
+        (&[xx, yy, zz, xy, yz, zx], [0, 1, 2]) => return Ok([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]),
+        // the check of the directions reports this
+        (_, []) => {}
+        _ if stated.len() == about.len() => {
+            about.iter().zip(stated).for_each(|(axis, moment)| matrix[*axis][*axis] = *moment);
+        }
+        _ => {
+            let names: Vec<&str> = about.iter().map(|axis| ROTATIONS[*axis]).collect();
+            let moments = match stated.len() {
+                1 => "one moment of inertia".to_owned(),
+                count => format!("{count} moments of inertia"),
+            };
+            let help = match about.len() {
+                1 => "give one moment of inertia about that axis: inertia = \"300 g mm^2\"",
+                2 => "give a list of two moments of inertia",
+                _ => "give a list of the moments about x, y, z, or of the six entries xx, yy, zz, xy, yz, zx",
+            };
+            return Err(ElementFault::new(
+                "inertia",
+                format!("{moments} for the rotations {}", names.join(", ")),
+                help,
+            ));
+        }
+    }
+    Ok(matrix)
 }
 
 fn diagonal(values: [f64; 3]) -> [[f64; 3]; 3] {

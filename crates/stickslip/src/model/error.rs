@@ -90,3 +90,21 @@ impl ModelError {
         ModelError { element, key, message: message.into(), wrong_name: None }
     }
 }
+
+/// A fault of an element that is not yet part of a model.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{key}`: {message} ({help})")]
+pub struct ElementFault {
+    /// Its key, as in the study file.
+    pub key: &'static str,
+    /// The fault and the expected value.
+    pub message: String,
+    /// A remedy.
+    pub help: &'static str,
+}
+
+impl ElementFault {
+    pub(super) fn new(key: &'static str, message: String, help: &'static str) -> Self {
+        ElementFault { key, message, help }
+    }
+}

@@ -17,13 +17,14 @@ mod place;
 mod substructure;
 mod survey;
 mod system;
+mod view;
 
-pub use body::{Body, ROTATIONS, TRANSLATIONS, with_rotations};
+pub use body::{Body, ROTATIONS, TRANSLATIONS, inertia_matrix, with_rotations};
 pub(crate) use collinear::{CollinearAxis, PARALLEL};
 pub use disk::{
     Disk, MIN_SECTORS, MistunedProperty, NEXT, Ring, SectorDistribution, deviation_error, normal_deviations,
 };
-pub use error::{Element, ModelError};
+pub use error::{Element, ElementFault, ModelError};
 pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};
 pub use survey::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, Survey, UnloadedContacts, WaveModes};
@@ -31,6 +32,7 @@ pub use system::{
     Axis, CyclicSymmetry, ExcitationHarmonic, ExcitationSum, MovedPlace, System, SystemBuilder, SystemError,
     SystemJoint,
 };
+pub use view::View;
 
 use crate::law::SharedLaw;
 use crate::structure::{Boundary, Component, ReducedComponent, Reduction};

@@ -1,7 +1,7 @@
 //! Builds the model from the lists of a study: the whole model, or one sector of a disk with
 //! its excitation pattern.
 
-use crate::case::substructure;
+use crate::case::substructure::{self, fault_in};
 use crate::case::values::{ResolvedValue, Values};
 use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
 use crate::compile::frequency_amplitude::FrequencyPolynomial;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use stickslip::law::{SharedLaw, TANGENTS};
 use stickslip::model::{
     Body, Element, Force, FrequencyForce, GROUND, Joint, Mass, Model, Motion, NEXT, ROTATIONS, SectorDistribution,
-    Spring, with_rotations,
+    Spring, inertia_matrix, with_rotations,
 };
 
 /// Returns the places of the structure given by matrices.
@@ -81,9 +81,9 @@ pub(crate) fn build_model(
         let stated: Vec<&str> = values.names("directions").unwrap_or_default().iter().map(String::as_str).collect();
         let directions = with_rotations(&stated);
         // an unreadable value was reported already
-        let stated = values.quantities("inertia").map(|stated| inertia(table, &directions, stated));
-        let inertia = stated.unwrap_or_else(|| Ok(Default::default())).unwrap_or_else(|problem| {
-            wrong.push(problem);
+        let stated = values.quantities("inertia").map(|stated| inertia_matrix(&directions, stated));
+        let inertia = stated.unwrap_or_else(|| Ok(Default::default())).unwrap_or_else(|fault| {
+            wrong.push(fault_in(table, &fault));
             Default::default()
         });
         model.bodies.push(Body { name: text(&values, "name"), mass: number(&values, "mass"), inertia, directions });
@@ -161,37 +161,6 @@ pub(crate) fn build_model(
     }
     problems.append(&mut wrong);
     (model, forces, motions)
-}
-
-/// Returns the inertia matrix of a body with these directions.
-fn inertia(table: &CompiledTable, directions: &[String], stated: &[f64]) -> Result<[[f64; 3]; 3], Problem> {
-    let turns = |axis: &usize| directions.iter().any(|along| along == ROTATIONS[*axis]);
-    let about: Vec<usize> = (0..ROTATIONS.len()).filter(turns).collect();
-    let mut matrix = [[0.0; 3]; 3];
-    match (stated, &about[..]) {
-        (&[xx, yy, zz, xy, yz, zx], [0, 1, 2]) => return Ok([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]),
-        // the check of the directions reports this
-        (_, []) => {}
-        _ if stated.len() == about.len() => {
-            about.iter().zip(stated).for_each(|(axis, moment)| matrix[*axis][*axis] = *moment);
-        }
-        _ => {
-            let names: Vec<&str> = about.iter().map(|axis| ROTATIONS[*axis]).collect();
-            let message = format!("{} for the rotations {}", plural(stated.len()), names.join(", "));
-            let help = match about.len() {
-                1 => "give one moment of inertia about that axis: inertia = \"300 g mm^2\"",
-                2 => "give a list of two moments of inertia",
-                _ => "give a list of the moments about x, y, z, or of the six entries xx, yy, zz, xy, yz, zx",
-            };
-            let problem = Problem::new(table.location_of("inertia", None), "inertia", table.with_repetition(&message));
-            return Err(problem.help(help));
-        }
-    }
-    Ok(matrix)
-}
-
-fn plural(moments: usize) -> String {
-    if moments == 1 { "one moment of inertia".to_owned() } else { format!("{moments} moments of inertia") }
 }
 
 /// Returns the critical damping `2 sqrt(k m)` of a spring, kg/s, with `m` the mass at its end.

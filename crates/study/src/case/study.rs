@@ -554,6 +554,13 @@ impl Study {
         Some(format!("{own}{sector:08x}"))
     }
 
+    /// Returns a checksum of the matrices and of the files of `[[data]]`; `None` without files.
+    pub fn files_checksum(&self) -> Option<String> {
+        let data = self.data.iter().map(DataTable::checksum);
+        let all: Vec<String> = self.matrices_checksum().into_iter().chain(data).collect();
+        (!all.is_empty()).then(|| all.join("-"))
+    }
+
     /// Returns the study as it was understood, for the record of a run. All values are in SI;
     /// the file's text is included.
     pub fn to_record(&self) -> Json {

@@ -7,7 +7,9 @@ use crate::compile::source_model::MatrixSource;
 use crate::syntax::error::Problem;
 use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use stickslip::method::WIDTH;
-use stickslip::model::{Body, Frame, Mass, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping};
+use stickslip::model::{
+    ElementFault, Frame, Mass, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping, View,
+};
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 
@@ -208,42 +210,6 @@ pub(crate) fn place(
     }
 }
 
-/// Names of the directions of a rotated face of a plane node.
-const PLANE_FRAME_DIRECTIONS: [&str; 2] = ["t", "n"];
-
-/// The element of which a `[[place]]` with `of` is a point or a face.
-enum ViewedElement<'a> {
-    Mass(&'a Mass),
-    Body(&'a Body),
-}
-
-impl ViewedElement<'_> {
-    fn find<'a>(model: &'a Model, of: &str) -> Option<ViewedElement<'a>> {
-        let body = || model.bodies.iter().find(|body| body.name == of).map(ViewedElement::Body);
-        model.masses.iter().find(|mass| mass.name == of).map(ViewedElement::Mass).or_else(body)
-    }
-
-    /// Returns the indices of x, y, z along which it moves, in the order of its directions.
-    /// Returns `None` for a mass with other directions or with only one.
-    fn axes(&self) -> Option<Vec<usize>> {
-        let axes: Option<Vec<usize>> = match self {
-            ViewedElement::Mass(mass) => {
-                mass.directions.iter().map(|along| CARTESIAN.iter().position(|axis| axis == along)).collect()
-            }
-            ViewedElement::Body(body) => Some(body.axes()),
-        };
-        axes.filter(|axes| axes.len() > 1)
-    }
-
-    /// Returns the displacement of the point at `offset` along a unit vector, as a row.
-    fn row(&self, axes: &[usize], offset: [f64; 3], along: &[f64; 3]) -> Row {
-        match self {
-            ViewedElement::Mass(_) => axes.iter().enumerate().map(|(at, axis)| (at, along[*axis])).collect(),
-            ViewedElement::Body(body) => body.row(offset, *along),
-        }
-    }
-}
-
 /// Builds a `[[place]]` that is a rotated frame of a mass or a body, or a point of a body.
 ///
 /// Its directions are those of the body, or one or two tangents and the normal.
@@ -257,101 +223,29 @@ pub(crate) fn place_on_element(table: &CompiledTable, values: &Values, model: &M
         return Err(problem(key, message).map_help("remove one of the two keys"));
     }
     let of = values.text("of").unwrap_or_default();
-    let Some(viewed) = ViewedElement::find(model, of) else {
-        let names = model.masses.iter().map(|mass| &mass.name).chain(model.bodies.iter().map(|body| &body.name));
-        let help = match suggest(of, names.map(String::as_str)) {
+    let masses = model.masses.iter().map(|mass| mass.name.as_str());
+    let names = masses.chain(model.bodies.iter().map(|body| body.name.as_str()));
+    if !names.clone().any(|name| name == of) {
+        let help = match suggest(of, names) {
             Some(near) => format!("did you mean `{near}`?"),
             None => "name a [[body]], or a [[mass]] with `directions`".to_owned(),
         };
         return Err(problem("of", format!("there is no mass and no body `{}`", excerpt(of))).map_help(&help));
-    };
-    let offset = values.vector("offset");
-    if let (ViewedElement::Mass(mass), Some(_)) = (&viewed, offset) {
-        let message = format!("`{}` is a point mass and does not rotate: all its points move alike", mass.name);
-        return Err(problem("offset", message).map_help("use a [[body]] with its inertia, or remove `offset`"));
     }
-    let name = values.text("name").unwrap_or_default().to_owned();
-    if let (ViewedElement::Body(body), None) = (&viewed, values.vector("normal")) {
-        if offset.is_none() {
-            let help =
-                "add offset = [\"3 mm\", 0, \"-2 mm\"], the position of the point relative to the centre of mass";
-            return Err(problem("name", "a place of a body needs `offset`, `normal` or both".to_owned()).map_help(help));
-        }
-        return point(table, values, body, &name);
-    }
-    let Some(axes) = viewed.axes() else {
-        let ViewedElement::Mass(mass) = viewed else { return Err(problem("of", format!("no point of `{of}` moves"))) };
-        let message = format!(
-            "a rotated face of `{}` needs directions among x, y, z, but the mass moves along {}",
-            mass.name,
-            match &mass.directions[..] {
-                [] => "one direction without a name".to_owned(),
-                all => all.join(", "),
-            }
-        );
-        return Err(problem("of", message).map_help("give the mass directions = [\"x\", \"z\"], or all three"));
+    let view = View {
+        offset: values.vector("offset"),
+        normal: values.vector("normal"),
+        tangent: values.vector("tangent"),
+        directions: values.names("directions").map(<[String]>::to_vec),
+        ..View::new(values.text("name").unwrap_or_default(), of)
     };
-    let Some(normal) = values.vector("normal") else {
-        return Err(problem("normal", "a rotated face needs its normal".to_owned()).map_help("add normal = [0, 0, 1]"));
-    };
-    let missing = (0..CARTESIAN.len()).find(|axis| !axes.contains(axis));
-    let tangent = match missing {
-        None => values.vector("tangent"),
-        Some(axis) if normal[axis] != 0.0 => {
-            let message =
-                format!("`{of}` does not move along {}, but the normal has a component along it", CARTESIAN[axis]);
-            return Err(problem("normal", message).map_help("set that component to 0"));
-        }
-        // in a plane the tangent is unique: the axis across the plane times the normal
-        Some(axis) => {
-            let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-            let mut tangent = [0.0; 3];
-            (tangent[next], tangent[last]) = (-normal[last], normal[next]);
-            Some(tangent)
-        }
-    };
-    let frame = Frame::new(normal, tangent).map_err(|error| problem("normal", error.to_string()))?;
-    let row = |along: &[f64; 3]| viewed.row(&axes, offset.unwrap_or_default(), along);
-    let [first, second, normal] = frame.axes();
-    let (rows, names) = match missing {
-        None => (vec![row(first), row(second), row(normal)], &FRAME_DIRECTIONS[..]),
-        Some(_) => (vec![row(first), row(normal)], &PLANE_FRAME_DIRECTIONS[..]),
-    };
-    let directions = values
-        .names("directions")
-        .map_or_else(|| names.iter().map(|&name| name.to_owned()).collect(), <[String]>::to_vec);
-    if directions.len() != rows.len() {
-        let message = format!("{} names in `directions` for {}", directions.len(), names.join(", "));
-        return Err(problem("directions", message).map_help("name each tangent and the normal, or remove `directions`"));
-    }
-    Ok(Place { name, directions, rows, frame: None, view_of: Some(of.to_owned()) })
+    model.view(&view).map_err(|fault| Box::new(fault_in(table, &fault)))
 }
 
-/// Builds a point of a body, with all directions of its points or those that are named.
-fn point(table: &CompiledTable, values: &Values, body: &Body, name: &str) -> Result<Place, Box<Problem>> {
-    let problem = |key: &str, message: String| {
-        Box::new(Problem::new(table.location_of(key, None), key, table.with_repetition(&message)))
-    };
-    if values.vector("tangent").is_some() {
-        return Err(problem("tangent", "a local frame needs a normal; only `tangent` is stated".to_owned())
-            .map_help("add normal = [0, 0, 1]"));
-    }
-    let point = body.point(name, values.vector("offset").unwrap_or_default());
-    let Some(named) = values.names("directions") else { return Ok(point) };
-    let mut rows = Vec::with_capacity(named.len());
-    for along in named {
-        let Some(at) = point.directions.iter().position(|own| own == along) else {
-            let message = format!(
-                "points of `{}` move along {}; `{along}` is not one of these directions",
-                body.name,
-                point.directions.join(", ")
-            );
-            let help = "use these directions; rotations are places of the body itself and apply to all its points";
-            return Err(problem("directions", message).map_help(help));
-        };
-        rows.push(point.rows[at].clone());
-    }
-    Ok(Place { directions: named.to_vec(), rows, ..point })
+/// Returns the problem of an element with its location in the file.
+pub(crate) fn fault_in(table: &CompiledTable, fault: &ElementFault) -> Problem {
+    let message = table.with_repetition(&fault.message);
+    Problem::new(table.location_of(fault.key, None), fault.key, message).help(fault.help)
 }
 
 /// Returns a mass that stands in for a place if only names are known.

@@ -100,6 +100,9 @@ impl RunHeader {
                     .to_owned(),
             );
         }
+        if of(&ours.study, "data") != of(&theirs.study, "data") {
+            return Some("a file of [[data]] has changed since the start of the run".to_owned());
+        }
         if of(&ours.study, "cases") != of(&theirs.study, "cases") || self.units != other.units {
             return Some(
                 "a file that the study reads has changed since the start of the run: its cases have different values"

@@ -11,6 +11,10 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Samples per cycle. The result serves as an initial guess, so an error of 1 % is acceptable.
 const SAMPLES: usize = 128;
 
+/// Simulated cycles. Hysteresis is periodic by then, and states with slow relaxation are close
+/// to it.
+const CYCLES: usize = 3;
+
 /// The views of a law from which its describing function follows.
 #[derive(Default)]
 pub(in crate::law) struct Views<'a> {
@@ -33,7 +37,8 @@ pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega:
         return ideal_elements.iter().map(|element| slider_or_stop(element, amplitude)).sum();
     }
     if let Some(rate) = rate {
-        return rate_law(rate, a, omega);
+        let at_once = if rate.is_batched() { batched_rate_law(rate, a, omega) } else { None };
+        return at_once.unwrap_or_else(|| rate_law(rate, a, omega));
     }
     if let Some(step) = step {
         let mut z = vec![0.0; step.states()];
@@ -88,14 +93,11 @@ pub(in crate::law) fn slider_or_stop(element: &IdealElement, amplitude: f64) -> 
 /// Returns the first harmonic of the force in the last cycle, divided by the amplitude of the
 /// motion.
 fn first_harmonic(amplitude: f64, mut force: impl FnMut(f64) -> f64) -> Complex64 {
-    // Simulated cycles. Hysteresis is periodic by then, and states with slow relaxation are
-    // close to it.
-    let cycles = 3;
     let mut sum = ZERO;
-    for i in 0..=cycles * SAMPLES {
+    for i in 0..=CYCLES * SAMPLES {
         let theta = TAU * i as f64 / SAMPLES as f64;
         let value = force(theta);
-        if i > (cycles - 1) * SAMPLES {
+        if i > (CYCLES - 1) * SAMPLES {
             sum += Complex64::cis(-theta) * value;
         }
     }
@@ -128,4 +130,40 @@ fn rate_law(rate: &dyn RateView, amplitude: f64, omega: f64) -> Complex64 {
         }
         rate.evaluate_values(&motion, &z, &mut rates)[0]
     })
+}
+
+/// Integrates the states as [`rate_law`] does, but solves all steps together by Newton's method
+/// with one evaluation of all samples per iteration. Returns `None` if it does not converge.
+fn batched_rate_law(rate: &dyn RateView, amplitude: f64, omega: f64) -> Option<Complex64> {
+    let (m, n) = (rate.states(), CYCLES * SAMPLES + 1);
+    let length = TAU / (omega * SAMPLES as f64);
+    let motions: Vec<RelativeMotion<f64>> = (0..n)
+        .map(|i| (TAU * i as f64 / SAMPLES as f64).sin_cos())
+        .map(|(sin, cos)| RelativeMotion::along(amplitude * cos, -amplitude * omega * sin))
+        .collect();
+    let mut z = vec![0.0; n * m];
+    let mut points = vec![RatePoint::new(1, m); n];
+    // With exact derivatives, 5 to 10 iterations are typical.
+    for _ in 0..30 {
+        rate.evaluate_many_with_derivatives(1, &motions, &z, &mut points);
+        let (mut before, mut largest) = (vec![0.0; m], 0.0f64);
+        for (z, point) in z.chunks_exact_mut(m.max(1)).zip(&points) {
+            let residual = DVector::from_fn(m, |s, _| z[s] - before[s] - length * point.rate[s]);
+            let jacobian =
+                DMatrix::from_fn(m, m, |s, t| f64::from(u8::from(s == t)) - length * point.rate_slope(s)[2 + t]);
+            let change = jacobian.lu().solve(&residual)?;
+            largest = change.iter().fold(largest, |largest, change| largest.max(change.abs()));
+            z.iter_mut().zip(change.iter()).for_each(|(z, change)| *z -= change);
+            before.copy_from_slice(z);
+        }
+        if !z.iter().all(|z| z.is_finite()) {
+            return None;
+        }
+        // the forces belong to the states before this change
+        if largest <= 1e-6 * rate.state_scale() {
+            let mut forces = points.iter().map(|point| point.force[0]);
+            return Some(first_harmonic(amplitude, |_| forces.next().unwrap_or(0.0)));
+        }
+    }
+    None
 }

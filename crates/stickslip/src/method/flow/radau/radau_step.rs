@@ -294,8 +294,9 @@ impl RadauStep {
         for (axis, moving) in self.moving.iter_mut().enumerate() {
             *moving = std::array::from_fn(|k| unknown[k * j + axis] - stages[k * j + axis].1);
         }
-        for stage in 0..STAGES {
-            for (q, joint) in assembly.joints.iter().enumerate() {
+        let joints = assembly.joints.len();
+        for (q, joint) in assembly.joints.iter().enumerate() {
+            let motions: [RelativeMotion<f64>; STAGES] = std::array::from_fn(|stage| {
                 let mut motion = RelativeMotion::along(0.0, 0.0);
                 for (d, axis) in joint.axes().enumerate() {
                     // structural displacement from the collocation of structural velocities,
@@ -306,14 +307,33 @@ impl RadauStep {
                     motion.displacement[d] = u;
                     motion.velocity[d] = self.unknown[stage * j + axis];
                 }
+                motion
+            });
+            let states = |stage: usize| {
                 let first = state_index(assembly, stage, joint.first_state);
-                let z = &self.unknown[first..first + joint.states];
-                let point = &mut self.points[stage * assembly.joints.len() + q];
-                if let Some(rate) = joint.law.rate() {
-                    rate.evaluate_with_derivatives(joint.directions, &motion, z, point);
+                first..first + joint.states
+            };
+            match joint.law.rate() {
+                // one call of a law in another language costs more than several points
+                Some(rate) if rate.is_batched() => {
+                    let z: Vec<f64> = (0..STAGES).flat_map(|stage| self.unknown[states(stage)].to_vec()).collect();
+                    let mut points = vec![RatePoint::new(joint.directions, joint.states); STAGES];
+                    rate.evaluate_many_with_derivatives(joint.directions, &motions, &z, &mut points);
+                    for (stage, point) in points.into_iter().enumerate() {
+                        self.points[stage * joints + q] = point;
+                    }
                 }
+                Some(rate) => {
+                    for (stage, motion) in motions.iter().enumerate() {
+                        let point = &mut self.points[stage * joints + q];
+                        rate.evaluate_with_derivatives(joint.directions, motion, &self.unknown[states(stage)], point);
+                    }
+                }
+                None => {}
+            }
+            for stage in 0..STAGES {
                 for (d, axis) in joint.axes().enumerate() {
-                    self.force[stage * j + axis] = point.force[d];
+                    self.force[stage * j + axis] = self.points[stage * joints + q].force[d];
                 }
             }
         }
