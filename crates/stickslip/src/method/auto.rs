@@ -220,22 +220,15 @@ fn may_succeed_elsewhere(error: &OrbitError) -> bool {
             | OrbitError::Breakdown { .. }
             | OrbitError::Evidence { .. }
             | OrbitError::Truncation { .. }
-            | OrbitError::NoOrbit {
-                observed: ObservedMotion::Settles | ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. },
-                ..
-            }
+            | OrbitError::NoOrbit { observed: ObservedMotion::Settles | ObservedMotion::Settling { .. }, .. }
     )
 }
 
-/// Returns the first orbit, or the second if there is no first. If there are both, their largest
-/// relative difference in amplitude is the spread over histories.
-fn with_history_spread(first: Option<Orbit>, second: Option<Orbit>) -> Option<Orbit> {
-    let (Some(mut orbit), Some(other)) = (first.clone(), second.clone()) else { return first.or(second) };
-    let size = orbit.places.iter().map(|place| place.amplitude()).fold(f64::MIN_POSITIVE, f64::max);
-    let pairs = orbit.places.iter().zip(&other.places);
-    let apart = pairs.map(|(a, b)| (a.amplitude() - b.amplitude()).abs() / size).fold(0.0, f64::max);
-    orbit.evidence.history_spread = Some(apart);
-    Some(orbit)
+/// Returns the largest change of an amplitude, relative to the largest amplitude of the first orbit.
+fn amplitude_change(one: &Orbit, other: &Orbit) -> f64 {
+    let size = one.places.iter().map(|place| place.amplitude()).fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = one.places.iter().zip(&other.places);
+    pairs.map(|(a, b)| (a.amplitude() - b.amplitude()).abs() / size).fold(0.0, f64::max)
 }
 
 impl Solver for WithFallback<'_> {
@@ -253,15 +246,12 @@ impl Solver for WithFallback<'_> {
         let Some((name, second)) = self.second() else { return Err(error) };
         let candidate = error.candidate().map(|state| Seed::from_state(request.omega, state.to_vec()));
         let near = Request { seed: by_second.or(candidate.as_ref()), ..*request };
-        let found = second.solve(&near, budget).ok();
-        let mut orbit = match found {
-            Some(orbit) if orbit.evidence.history_dependent.is_empty() || by_second.is_some() => orbit,
+        let mut orbit = second.solve(&near, budget).map_err(|_| error.with_failed_alternative(name))?;
+        if candidate.is_some() && by_second.is_none() && !orbit.evidence.history_dependent.is_empty() {
             // the candidate and the static equilibrium are two histories of the stuck joints
-            found => {
-                let from_equilibrium = second.solve(&Request { seed: None, ..*request }, budget).ok();
-                with_history_spread(found, from_equilibrium).ok_or_else(|| error.with_failed_alternative(name))?
-            }
-        };
+            let other = second.solve(&Request { seed: None, ..*request }, budget);
+            orbit.evidence.history_spread = other.ok().map(|other| amplitude_change(&orbit, &other));
+        }
         orbit.evidence.fallback_from = Some(chosen);
         Ok(orbit)
     }

@@ -22,6 +22,7 @@
 //! - `law_conformance`: conformance of every law;
 //! - `laws_in_methods`: every law in every method;
 //! - `loose_dampers`: dampers that only contacts and a constant load hold;
+//! - `massless_combinations`: mass matrices with a null space across coordinates;
 //! - `orbits_without_stick`: one Coulomb contact that always slips;
 //! - `paper_couple`: the blade couple of the paper;
 //! - `parallel_contacts`: contacts with proportional motions;
@@ -56,6 +57,7 @@ mod law_closed_forms;
 mod law_conformance;
 mod laws_in_methods;
 mod loose_dampers;
+mod massless_combinations;
 mod orbits_without_stick;
 mod paper_couple;
 mod parallel_contacts;
