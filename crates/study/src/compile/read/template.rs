@@ -98,7 +98,12 @@ impl Reader {
                 entry.clone_from(law);
             }
         }
-        Some(SourceModel { lists, template: Some(TemplateSource { table, source, given: Vec::new() }), matrices: None })
+        Some(SourceModel {
+            lists,
+            template: Some(TemplateSource { table, source, given: Vec::new() }),
+            matrices: None,
+            contacts: Vec::new(),
+        })
     }
 }
 
@@ -142,7 +147,7 @@ fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
     let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
     match (stated, order) {
         (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
-            let structure = SourceModel { lists, template: None, matrices: None };
+            let structure = SourceModel { lists, template: None, matrices: None, contacts: Vec::new() };
             Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
         }
         _ => Err(reader.error(row.name)),
