@@ -167,7 +167,7 @@ impl Deck<'_> {
                 let generate = text.split(',').any(|part| part == "GENERATE");
                 self.builder.add(&set, kind, []);
                 if let Some(of) = stated(line, "ELSET").filter(|_| kind == SetKind::Nodes) {
-                    let elements = self.builder.members(&of, SetKind::Elements).unwrap_or_default().to_vec();
+                    let elements = self.builder.members(&of, SetKind::Elements);
                     let nodes = elements.iter().filter_map(|element| self.builder.nodes_of_element(*element));
                     let nodes: Vec<i64> = nodes.flatten().copied().collect();
                     self.builder.add(&set, kind, nodes);
@@ -281,7 +281,7 @@ impl Deck<'_> {
             Some(number) => vec![number],
             None => {
                 let name = String::from_utf8_lossy(field);
-                self.builder.members(name.trim_matches('"'), kind).unwrap_or_default().to_vec()
+                self.builder.members(name.trim_matches('"'), kind)
             }
         }
     }
@@ -352,8 +352,8 @@ mod tests {
         assert_eq!(
             mesh.notes(),
             [
-                "set PAIR: 1 of 8 nodes are not in the file or not read",
-                "set LINE: 1 of 9 nodes are not in the file or not read",
+                "set PAIR: 1 of 7 nodes are not in the file or not read",
+                "set LINE: 1 of 7 nodes are not in the file or not read",
                 "2 elements of type B31 are left out"
             ]
         );
@@ -363,6 +363,16 @@ mod tests {
         assert!((patch.area() - 1.5).abs() < 1e-14 && patch.nodes().iter().all(|node| node.normal == [0.0, 0.0, 1.0]));
         // the brick and the wedge share a side
         assert_eq!(mesh.outer_faces().len(), 6 + 5 - 2);
+    }
+
+    /// Sets that name each other do not grow without bound, and a side counts once.
+    #[test]
+    fn repeated_members_count_once() {
+        let sets = "*NSET,NSET=A\n1,2\nA,A,A\n*NSET,NSET=B\nA,3\n*NSET,NSET=A\nB,B\n".repeat(60);
+        let text = format!("{DECK}{sets}*SURFACE,NAME=TOP\n11,S2\nBRICK,S2\n");
+        let mesh = read_bytes(text.as_bytes()).unwrap();
+        assert_eq!((numbers(&mesh, "A"), numbers(&mesh, "B")), (vec![1, 2, 3], vec![1, 2, 3]));
+        assert!((mesh.patch("TOP").unwrap().area() - 1.5).abs() < 1e-14);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::shape::Shape;
 use super::{Element, Members, Mesh, MeshNode, MeshSet, Side};
 use crate::error::{Error, ErrorKind, Location};
 use crate::text::Line;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// What a reader has read so far.
 #[derive(Default)]
@@ -33,9 +33,16 @@ pub(super) enum SetKind {
 struct NumberedSet {
     name: String,
     kind: SetKind,
-    numbers: Vec<i64>,
-    /// The sides of the elements, from zero; empty for other sets.
-    sides: Vec<usize>,
+    /// Each once: a deck may name sets within sets.
+    members: BTreeSet<NumberedMember>,
+}
+
+/// A member of a set by its number in the file.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct NumberedMember {
+    number: i64,
+    /// The side of an element, from zero; zero in other sets.
+    side: usize,
 }
 
 impl MeshBuilder {
@@ -83,8 +90,7 @@ impl MeshBuilder {
 
     /// Adds members to a set, which is made if it does not exist. Upper and lower case are equal.
     pub fn add(&mut self, name: &str, kind: SetKind, numbers: impl IntoIterator<Item = i64>) {
-        let set = self.set_mut(name, kind);
-        set.numbers.extend(numbers);
+        self.set_mut(name, kind).members.extend(numbers.into_iter().map(|number| NumberedMember { number, side: 0 }));
     }
 
     /// Adds the nodes or elements read so far that have certain numbers.
@@ -109,24 +115,23 @@ impl MeshBuilder {
 
     /// Adds the same side of several elements to a surface.
     pub fn add_sides(&mut self, name: &str, side: usize, elements: impl IntoIterator<Item = i64>) {
-        let set = self.set_mut(name, SetKind::Sides);
-        set.numbers.extend(elements);
-        set.sides.resize(set.numbers.len(), side);
+        let sides = elements.into_iter().map(|number| NumberedMember { number, side });
+        self.set_mut(name, SetKind::Sides).members.extend(sides);
     }
 
     fn set_mut(&mut self, name: &str, kind: SetKind) -> &mut NumberedSet {
         let known = self.sets.iter().position(|set| set.kind == kind && set.name.eq_ignore_ascii_case(name));
         let index = known.unwrap_or_else(|| {
-            self.sets.push(NumberedSet { name: name.to_owned(), kind, numbers: Vec::new(), sides: Vec::new() });
+            self.sets.push(NumberedSet { name: name.to_owned(), kind, members: BTreeSet::new() });
             self.sets.len() - 1
         });
         &mut self.sets[index]
     }
 
-    /// Returns the members of a set that was read before.
-    pub fn members(&self, name: &str, kind: SetKind) -> Option<&[i64]> {
-        let found = self.sets.iter().find(|set| set.kind == kind && set.name.eq_ignore_ascii_case(name));
-        found.map(|set| set.numbers.as_slice())
+    /// Returns the members of a set that was read before; none of an unknown set.
+    pub fn members(&self, name: &str, kind: SetKind) -> Vec<i64> {
+        let found = self.sets.iter().filter(|set| set.kind == kind && set.name.eq_ignore_ascii_case(name));
+        found.flat_map(|set| &set.members).map(|member| member.number).collect()
     }
 
     /// Returns the numbers of an element's nodes.
@@ -158,29 +163,27 @@ impl MeshBuilder {
             }
         }
         let mut sets = Vec::with_capacity(self.sets.len());
-        for NumberedSet { name, kind, numbers, sides } in std::mem::take(&mut self.sets) {
-            let find = |number: &i64| match kind {
-                SetKind::Nodes => self.by_number.get(number).copied(),
-                _ => self.element_by_number.get(number).copied(),
+        for NumberedSet { name, kind, members: stated } in std::mem::take(&mut self.sets) {
+            let index = |member: &NumberedMember| match kind {
+                SetKind::Nodes => self.by_number.get(&member.number).copied(),
+                _ => self.element_by_number.get(&member.number).copied(),
             };
-            let mut members: Vec<usize> = numbers.iter().filter_map(find).collect();
-            let missing = numbers.len() - members.len();
+            let known = stated.iter().filter_map(|member| Some(Side { element: index(member)?, side: member.side }));
+            let known: Vec<Side> = known.collect();
+            let missing = stated.len() - known.len();
             if missing > 0 {
                 let what = if kind == SetKind::Nodes { "nodes" } else { "elements" };
-                self.notes
-                    .push(format!("set {name}: {missing} of {} {what} are not in the file or not read", numbers.len()));
+                let of = stated.len();
+                self.notes.push(format!("set {name}: {missing} of {of} {what} are not in the file or not read"));
             }
+            let mut indices: Vec<usize> = known.iter().map(|known| known.element).collect();
+            indices.sort_unstable();
             let members = match kind {
+                SetKind::Nodes => Members::Nodes(indices),
+                SetKind::Elements => Members::Elements(indices),
                 SetKind::Sides => {
-                    let pairs = numbers.iter().zip(sides).filter_map(|(number, side)| Some((find(number)?, side)));
-                    let inside = |(element, side): &(usize, usize)| *side < self.elements[*element].shape.sides();
-                    let sides = pairs.filter(inside).map(|(element, side)| Side { element, side });
-                    Members::Sides(sides.collect())
-                }
-                _ => {
-                    members.sort_unstable();
-                    members.dedup();
-                    if kind == SetKind::Nodes { Members::Nodes(members) } else { Members::Elements(members) }
+                    let exists = |side: &Side| side.side < self.elements[side.element].shape.sides();
+                    Members::Sides(known.into_iter().filter(exists).collect())
                 }
             };
             sets.push(MeshSet { name, members });

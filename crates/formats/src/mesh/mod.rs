@@ -45,7 +45,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 /// A mesh. Nodes and elements have the numbers of their file, and indices from zero.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     format: &'static str,
     nodes: Vec<MeshNode>,
