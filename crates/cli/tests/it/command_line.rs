@@ -833,7 +833,7 @@ fn inspect_describes_meshes() {
         assert!(said.contains(words), "{words}: {said}");
     }
     let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("wrong.inp"), "*NODE\n1,0,0,0\n2,0,x\n").expect("a file");
+    fs::write(folder.path().join("wrong.inp"), "*NODE\n1,0,0,0\n2,0,x\n").expect("a file");
     let inspected = stickslip(folder.path(), &["inspect", "wrong.inp"]);
     assert!(code(&inspected) == 2 && stderr(&inspected).contains("wrong.inp, line 3"), "{}", stderr(&inspected));
 }
