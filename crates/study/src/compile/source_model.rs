@@ -5,7 +5,7 @@ use crate::case::names::ModelNames;
 use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
-use crate::compile::mesh::contact::ContactSummary;
+use crate::compile::mesh::MeshUse;
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::quantity_text;
 use crate::syntax::suggest::{alternatives, suggest};
@@ -21,8 +21,7 @@ pub(crate) struct SourceModel {
     pub lists: ModelLists,
     pub template: Option<TemplateSource>,
     pub matrices: Option<MatrixSource>,
-    /// The contacts between faces of the mesh; their joints are in the lists.
-    pub contacts: Vec<ContactSummary>,
+    pub mesh: MeshUse,
 }
 
 /// `[structure]`, with the contents of its files.

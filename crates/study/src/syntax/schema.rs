@@ -524,7 +524,7 @@ const CONTACT: &[Key] = &[
     ),
     optional(
         "distance",
-        ValueType::Quantity(Dimension::LENGTH, Bounds::AtLeastZero),
+        ValueType::Quantity(Dimension::LENGTH, Bounds::Positive),
         "largest distance of a node from the second face; absent: a tenth of the square root of the mean area of its \
          faces",
         "\"0.5 mm\"",

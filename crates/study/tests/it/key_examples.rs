@@ -266,6 +266,11 @@ fn study_with(table: &str, key: &Key, outer: &[(String, &Key)], kind: Option<&'s
             study = parsed(RING);
             study.insert("study".into(), own);
         }
+        if key.name == "fields" {
+            let own = study.remove("study").unwrap();
+            study = parsed(MATRICES);
+            study.insert("study".into(), own);
+        }
     }
     for (of, key) in outer {
         let parent = inside(&mut study, of);

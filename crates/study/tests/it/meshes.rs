@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use stickslip_study::dataset::{Column, Dataset};
+use stickslip_study::dataset::{Column, Dataset, Table};
 use stickslip_study::run::{Context, run};
 use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, StudyError, read_file, read_for_results};
@@ -257,4 +257,56 @@ fn wrong_sets_and_contacts_are_refused_with_their_place() {
         let said = refused(head, &contact);
         assert!(words.iter().all(|words| said.contains(words)), "{words:?}: {said}");
     }
+}
+
+/// Displacements of nodes that are places are those of the places, with and without a reduction;
+/// the displacements of the other nodes agree between both within the error of the reduction.
+#[test]
+fn fields_are_the_displacements_of_all_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let corner = "[[place]]\nname = \"corner\"\nnodes = [\"118\"]\n";
+    let study = STUDY.replace("kind = \"response\"", "kind = \"orbit\"\nfields = 8\nsamples = 8");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "frequency = \"1500 Hz\"\n");
+    let of = |head: &str| {
+        let found = dataset(folder.path(), &[head, &study, CONTACT, corner]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap().clone();
+        (table("orbit"), table("fields"))
+    };
+    let whole = of(HEAD);
+    let reduced = of(&HEAD.replace("reduce = false", "reduce = { modes = 20 }"));
+    for (orbit, fields) in [&whole, &reduced] {
+        assert_eq!(fields.rows(), 8 * 36);
+        let (times, at) = (fields.numbers("time_s").unwrap(), orbit.numbers("time_s").unwrap());
+        let nodes = fields.integers("node").unwrap();
+        for row in (0..fields.rows()).filter(|row| [16, 118].contains(&nodes[*row])) {
+            // the table of the orbit has the switches, too
+            let instant = at.iter().position(|time| (time - times[row]).abs() < 1e-15).unwrap();
+            if nodes[row] == 118 {
+                for axis in ["x", "y", "z"] {
+                    let place = orbit.numbers(&format!("corner_{axis}_displacement_m")).unwrap()[instant];
+                    let node = fields.numbers(&format!("{axis}_m")).unwrap()[row];
+                    assert!((place - node).abs() < 1e-12 * place.abs().max(1e-6), "{place} {node}");
+                }
+            } else {
+                assert_eq!(fields.texts("contact").unwrap()[row], orbit.texts("pad_16_contact").unwrap()[instant]);
+            }
+        }
+        let states = fields.texts("contact").unwrap();
+        assert!(states.iter().zip(nodes).all(|(state, node)| state.is_empty() != (10..=18).contains(node)));
+        assert!(states.iter().any(|state| state.starts_with("slip")) && states.iter().any(|state| state == "stick"));
+    }
+    // the error of all nodes falls with the number of modes
+    let values = |fields: &Table| ["x_m", "y_m", "z_m"].map(|axis| fields.numbers(axis).unwrap().to_vec()).concat();
+    let expected = values(&whole.1);
+    let size = expected.iter().fold(0.0f64, |size, x| size.max(x.abs()));
+    let error = |(_, fields): &(Table, Table)| {
+        values(fields).iter().zip(&expected).map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max)
+    };
+    let finer = of(&HEAD.replace("reduce = false", "reduce = { modes = 45 }"));
+    let (coarse, fine) = (error(&reduced), error(&finer));
+    assert!(coarse < 0.05 && fine < 0.2 * coarse, "{coarse} {fine}");
+    let moved = "[[motion]]\non = \"mover\"\namplitude = \"1 um\"\n[[spring]]\nbetween = [\"mover\", \"tip\"]\nstiffness = \"1 N/mm\"\n";
+    let error = read(folder.path(), &[HEAD, &study, CONTACT, moved]).unwrap_err().to_string();
+    assert!(error.contains("imposed motions"), "{error}");
 }

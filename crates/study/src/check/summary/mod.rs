@@ -182,7 +182,7 @@ impl ModelSummary {
             cases: study.cases(),
             dofs: first.dofs(),
             structure: StructureSummary::new(study, &cases[0]),
-            contacts: study.structure.contacts.clone(),
+            contacts: study.structure.mesh.contacts.clone(),
             bodies: bodies::described(&cases[0].case.model),
             too_large: first.is_too_large(),
             free: first.free().clone(),

@@ -141,7 +141,7 @@ fn distance(contact: &CompiledTable) -> Result<Option<f64>, Problem> {
             .problem("distance", "a parameter cannot change which nodes are in contact")
             .help("write a number with its unit"));
     }
-    let expected = Expected { dimension: Dimension::LENGTH, within: Bounds::AtLeastZero };
+    let expected = Expected { dimension: Dimension::LENGTH, within: Bounds::Positive };
     quantity.number("distance", expected, example, &Environment { names: &[], values: Vec::new() }).map(Some)
 }
 

@@ -10,14 +10,26 @@ pub(crate) mod sets;
 use super::compiled::{CompiledEntry, CompiledTable, CompiledValue};
 use crate::case::values::ResolvedValue;
 use crate::syntax::error::{Location, Problem};
+use contact::ContactSummary;
+use std::sync::Arc;
 use stickslip_formats::Error;
 use stickslip_formats::mesh::Mesh;
 
 /// A mesh, and its unit of length in metres.
-#[derive(Debug, Clone)]
-pub(crate) struct MeshSource {
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshSource {
+    /// The mesh as in its file.
     pub mesh: Mesh,
+    /// Unit of length of its coordinates, m.
     pub length: f64,
+}
+
+/// The mesh of a study, and what became of it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct MeshUse {
+    pub source: Option<Arc<MeshSource>>,
+    /// The contacts between its faces; their joints are in the lists.
+    pub contacts: Vec<ContactSummary>,
 }
 
 impl MeshSource {

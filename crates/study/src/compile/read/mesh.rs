@@ -4,22 +4,18 @@
 use super::reader::Reader;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
-use crate::compile::mesh::contact::{self, ContactSummary};
-use crate::compile::mesh::{MeshSource, mentioned_nodes, sets};
+use crate::compile::mesh::{MeshSource, MeshUse, contact, mentioned_nodes, sets};
 use crate::compile::source_model::ModelLists;
 use crate::syntax::error::Problem;
 use crate::syntax::schema::MAX_ELEMENTS;
 use crate::syntax::unit_sets;
+use std::sync::Arc;
 use stickslip_formats::mesh;
 
 impl Reader {
-    /// Replaces all places and contacts on sets of the mesh of `structure`. Returns the contacts;
-    /// `None` if a problem was found.
-    pub(super) fn expand_sets(
-        &mut self,
-        lists: &mut ModelLists,
-        structure: Option<&CompiledTable>,
-    ) -> Option<Vec<ContactSummary>> {
+    /// Replaces all places and contacts on sets of the mesh of `structure`. Returns the
+    /// mesh and the contacts; `None` if a problem was found.
+    pub(super) fn expand_sets(&mut self, lists: &mut ModelLists, structure: Option<&CompiledTable>) -> Option<MeshUse> {
         let before = self.problems.len();
         let mesh = if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table)) };
         let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
@@ -53,7 +49,7 @@ impl Reader {
             self.problems
                 .push(Problem::new(&contact.location, "contact", message).help("use a coarser mesh of the faces"));
         }
-        (self.problems.len() == before).then_some(summaries)
+        (self.problems.len() == before).then(|| MeshUse { source: mesh.map(Arc::new), contacts: summaries })
     }
 
     /// Reads the mesh of a structure; `None` without a mesh, or if it cannot be read.

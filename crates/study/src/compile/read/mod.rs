@@ -370,7 +370,7 @@ impl Reader {
             }
             None => None,
         };
-        let contacts = self.expand_sets(&mut lists, matrices.as_ref().map(|matrices| &matrices.table))?;
-        Some(SourceModel { lists, template: None, matrices, contacts })
+        let mesh = self.expand_sets(&mut lists, matrices.as_ref().map(|matrices| &matrices.table))?;
+        Some(SourceModel { lists, template: None, matrices, mesh })
     }
 }
