@@ -134,7 +134,7 @@ pub enum Command {
     /// and mass also the lowest frequencies) and files of measured data (columns, units,
     /// sampling, ranges, a plot)
     Inspect {
-        /// Files with matrices, with the names of their rows, or with measured data
+        /// Files with matrices, with the names of their rows, with measured data, or with a mesh
         #[arg(required = true)]
         files: Vec<PathBuf>,
         /// Format of the files, if their content does not show it

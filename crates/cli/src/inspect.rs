@@ -1,5 +1,5 @@
 //! `stickslip inspect`: describes matrix files, and checks whether they can belong to a
-//! structure.
+//! structure. Describes meshes, too.
 
 use crate::exit_status::{Exit, print};
 use crate::inspect_data::{inspect_data, is_no_text};
@@ -9,6 +9,7 @@ use std::fmt::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
+use stickslip_formats::mesh::{self, MeshReport};
 use stickslip_formats::{self as formats, Error, ErrorKind, Matrix, MatrixReport, align_rows, constrained_rows, names};
 use stickslip_numerics::definiteness::sparse_definite;
 use stickslip_numerics::sparse;
@@ -69,6 +70,20 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
     let mut rows = Vec::new();
     let mut row_names = None;
     for file in files {
+        if format.is_none() && mesh::is_mesh(file).unwrap_or(false) {
+            match mesh::read(file) {
+                Ok(mesh) => {
+                    let _ = writeln!(text, "{}", file.display());
+                    MeshReport(&mesh).to_string().lines().for_each(|line| text += &format!("  {line}\n"));
+                    text.push('\n');
+                }
+                Err(error) => {
+                    complain!("error: {error}");
+                    wrong = true;
+                }
+            }
+            continue;
+        }
         match inspect_file(file, format, &mut text) {
             Ok((matrices, whole)) => {
                 square.extend(matrices);

@@ -46,7 +46,7 @@ fn sniff(bytes: &[u8]) -> bool {
 }
 
 /// Returns a keyword line in capitals and without spaces, or `None` for other lines.
-fn keyword(line: &Line) -> Option<String> {
+pub(crate) fn keyword(line: &Line) -> Option<String> {
     let starts = line.text.starts_with(b"*") && !line.text.starts_with(b"**");
     starts.then(|| String::from_utf8_lossy(line.text).to_uppercase().split_whitespace().collect())
 }
@@ -56,12 +56,12 @@ fn is_keyword(line: &Line, name: &str) -> bool {
 }
 
 /// Returns the value of `NAME=value` on a keyword line.
-fn parameter<'t>(text: &'t str, name: &str) -> Option<&'t str> {
+pub(crate) fn parameter<'t>(text: &'t str, name: &str) -> Option<&'t str> {
     text.split(',').find_map(|part| part.strip_prefix(name)?.strip_prefix('='))
 }
 
 /// Returns the nonempty fields between commas of a data line or comment.
-fn fields(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(crate) fn fields(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii).filter(|field| !field.is_empty())
 }
 

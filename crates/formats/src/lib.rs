@@ -1,5 +1,6 @@
 //! Reads and writes matrices: files of finite-element programs, MATLAB and
-//! Python become one [`Matrix`] type. The module [`data`] reads measured tables.
+//! Python become one [`Matrix`] type. The module [`data`] reads measured tables, and [`mesh`] reads
+//! meshes.
 //!
 //! ```
 //! use stickslip_formats::{Matrix, Symmetry, list, read, write};
@@ -56,6 +57,7 @@ mod inflate;
 mod mat5;
 mod matrix;
 mod matrix_market;
+pub mod mesh;
 pub mod names;
 mod nastran_dmig;
 mod nastran_op4;

@@ -38,7 +38,7 @@ fn is_dmig(line: &Line) -> bool {
 
 /// Returns the fields of a line of bulk data after the first: 4 of 16
 /// characters, 8 of 8, or those between commas.
-fn fields<'a>(line: &Line<'a>) -> Vec<&'a [u8]> {
+pub(crate) fn fields<'a>(line: &Line<'a>) -> Vec<&'a [u8]> {
     if line.text.contains(&b',') {
         let mut fields: Vec<_> = line.text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii).skip(1).collect();
         // The ninth field marks a continuation.
@@ -55,7 +55,7 @@ fn is_large(line: &Line) -> bool {
     first.into_iter().any(|&byte| byte == b'*')
 }
 
-fn is_continuation(line: &Line) -> bool {
+pub(crate) fn is_continuation(line: &Line) -> bool {
     matches!(line.text.first(), Some(b' ' | b'*' | b'+' | b',')) && !line.text.trim_ascii().is_empty()
 }
 

@@ -126,6 +126,7 @@ pub(crate) fn response() -> Dataset {
     }
     let [limits, a1, a2, a3] = rows;
     Dataset {
+        mesh: None,
         name: "fig06".into(),
         title: "Response curves of the blade couple, m₁ = m/100".into(),
         source: Some("Pust, Pesek, Radolfova (2015), Fig. 6".into()),
@@ -188,6 +189,7 @@ pub(crate) fn hysteresis() -> Dataset {
         });
     }
     Dataset {
+        mesh: None,
         name: "fig02".into(),
         title: "Hysteresis loops of elastic dry friction".into(),
         source: Some("Pust, Pesek, Radolfova (2015), Fig. 2".into()),
@@ -263,6 +265,7 @@ pub(crate) fn hostile() -> Dataset {
         ),
     ];
     Dataset {
+        mesh: None,
         name: "hostile".into(),
         title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž 位移, with a title that has so many words that it must be broken into more than one line of text to fit".into(),
         source: Some("<i>nobody</i> & sons".into()),

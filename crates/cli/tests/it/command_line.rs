@@ -818,6 +818,26 @@ fn inspect_tells_frequencies_and_mass() {
     );
 }
 
+/// A mesh has its sizes, its extent and its sets, and a damaged one an error with its line.
+#[test]
+fn inspect_describes_meshes() {
+    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/tests/meshes");
+    let inspected = stickslip(&meshes, &["inspect", "quadratic.inp"]);
+    let said = String::from_utf8_lossy(&inspected.stdout).into_owned();
+    for words in [
+        "mesh of 38 nodes, 1 hexahedra of 20 nodes, 1 tetrahedra of 10 nodes, 2 wedges of 15 nodes",
+        "extent x 0 to 2, y 0 to 1, z 0 to 2",
+        "14 outer faces, area 11.3251",
+        "set FOOT: 14 nodes, 3 outer faces, area 2",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("wrong.inp"), "*NODE\n1,0,0,0\n2,0,x\n").expect("a file");
+    let inspected = stickslip(folder.path(), &["inspect", "wrong.inp"]);
+    assert!(code(&inspected) == 2 && stderr(&inspected).contains("wrong.inp, line 3"), "{}", stderr(&inspected));
+}
+
 /// `inspect` treats constrained and massless rows in the same way as a study.
 ///
 /// Covered are zero rows of ANSYS, the 1e36 of Abaqus, and rows that are missing in the mass

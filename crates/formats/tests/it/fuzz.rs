@@ -15,9 +15,13 @@ const BASE_MEMORY: u64 = 64 << 20;
 const MEMORY_PER_BYTE: u64 = 100;
 
 /// Random numbers with the same sequence in every run (Marsaglia's xorshift).
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
+    pub fn new(seed: u64) -> Self {
+        Random(seed)
+    }
+
     fn next(&mut self) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -25,7 +29,7 @@ impl Random {
         self.0
     }
 
-    fn below(&mut self, limit: usize) -> usize {
+    pub fn below(&mut self, limit: usize) -> usize {
         (self.next() % limit.max(1) as u64) as usize
     }
 
@@ -57,7 +61,7 @@ const NUMBERS: [u64; 10] =
     [0, 1, 2, 0x7f, 0x7fff_ffff, 0xffff_ffff, 0x8000_0000, 0x7fff_ffff_ffff_ffff, u64::MAX, 0x1_0000];
 
 /// Applies one random damage.
-fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
+pub(crate) fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     let at = random.below(bytes.len());
     let Some(&byte) = bytes.get(at) else { return };
     match random.below(8) {
@@ -108,7 +112,7 @@ fn read_all(bytes: &[u8], format: &str) -> usize {
 
 /// Returns the largest memory that a function holds at one time, bytes. Allocations of other
 /// threads do not count.
-fn peak_memory(f: impl FnOnce()) -> u64 {
+pub(crate) fn peak_memory(f: impl FnOnce()) -> u64 {
     measure(f).bytes_max
 }
 

@@ -4,10 +4,12 @@
 //! - `data_files`: measured data of real programs, and damaged files;
 //! - `files`: files of real programs, to the last bit;
 //! - `fuzz`: damaged files, and the memory that reading takes;
+//! - `meshes`: meshes of other programs, and damaged ones;
 //! - `properties`: random matrices, written and read.
 
 mod conformance;
 mod data_files;
 mod files;
 mod fuzz;
+mod meshes;
 mod properties;

@@ -199,6 +199,7 @@ impl PyModel {
 
     fn result(&self, name: &str, title: &str, tables: Vec<Table>, figure: Figure, record: RunRecord) -> PyResultSet {
         PyResultSet::new(Dataset {
+            mesh: None,
             name: name.to_owned(),
             title: title.to_owned(),
             source: None,

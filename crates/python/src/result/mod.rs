@@ -232,7 +232,7 @@ impl PyResultSet {
 /// Compares two datasets, with NaN equal to NaN.
 fn same(one: &Dataset, other: &Dataset) -> bool {
     let without_tables = |whole: &Dataset| {
-        let Dataset { name, title, source, kind, tables: _, figure, notes, failures, record } = whole;
+        let Dataset { name, title, source, kind, tables: _, figure, notes, failures, record, mesh: _ } = whole;
         serde_json::to_value((name, title, source, kind, figure, notes, failures, record)).ok()
     };
     std::ptr::eq(one, other)

@@ -100,6 +100,7 @@ pub fn compare(runs: &[Stored]) -> Result<Dataset, CompareError> {
         })
     });
     Ok(Dataset {
+        mesh: None,
         name: name(runs),
         title,
         source: None,

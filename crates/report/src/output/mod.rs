@@ -2,7 +2,7 @@
 //!
 //! - `result_file`: a file of results, an output, and the errors of writing.
 //! - `folder`: replaces the results of a run completely or not at all.
-//! - `csv`, `parquet`, `json`, `fitted`: one output each; figures are in `figure`.
+//! - `csv`, `parquet`, `json`, `fitted`, `vtk`: one output each; figures are in `figure`.
 
 pub mod csv;
 pub mod fitted;
@@ -10,6 +10,7 @@ pub mod folder;
 pub mod json;
 pub mod parquet;
 pub mod result_file;
+pub mod vtk;
 
 use json::{TableShape, record_json};
 use result_file::{File, Output, ReportError, file_name, write_if_changed};
@@ -22,6 +23,7 @@ pub static TABLE: &[Output] = &[
     parquet::OUTPUT,
     json::OUTPUT,
     fitted::OUTPUT,
+    vtk::OUTPUT,
     crate::figure::svg::OUTPUT,
     crate::figure::png::OUTPUT,
     crate::figure::html::OUTPUT,

@@ -151,6 +151,7 @@ pub fn read(folder: &Path) -> Result<Stored, StoredError> {
     let tables = entries.iter().map(|entry| table(folder, entry, &record, &wrong)).collect::<Result<Vec<_>, _>>()?;
     let part = |key: &str| record[key].clone();
     let dataset = Dataset {
+        mesh: None,
         name: text(&record, "name")?,
         title: study.title().to_owned(),
         source: record["source"].as_str().map(str::to_owned),

@@ -9,6 +9,7 @@ mod body;
 mod collinear;
 mod coordinates;
 mod disk;
+mod displacement_field;
 mod error;
 pub mod example;
 mod incremental_stability;
@@ -24,6 +25,7 @@ pub(crate) use collinear::{CollinearAxis, PARALLEL};
 pub use disk::{
     Disk, MIN_SECTORS, MistunedProperty, NEXT, Ring, SectorDistribution, deviation_error, normal_deviations,
 };
+pub use displacement_field::DisplacementField;
 pub use error::{Element, ElementFault, ModelError};
 pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};

@@ -55,6 +55,8 @@ struct ComponentData {
     definite_mass: bool,
     /// Stored reductions by request, because the cases of a study repeat requests.
     reductions: Cache<ReductionRequest, ReducedResult>,
+    /// Stored shapes of the coordinates of reductions.
+    shapes: Cache<ReductionRequest, ShapesResult>,
     /// Stored modal damping, by ratio and largest frequency.
     damped: Cache<(f64, f64), Damped>,
     /// Stored numbers of modes below a frequency.
@@ -99,6 +101,9 @@ struct ReducedRing {
 type Cache<K, V> = Mutex<Vec<(K, V)>>;
 type ReductionRequest = (Vec<Row>, Reduction);
 type ReducedResult = Result<Arc<ReducedComponent>, ReductionError>;
+
+/// Displacements of all rows in each coordinate of a reduction.
+type ShapesResult = Result<Arc<DMatrix<f64>>, ReductionError>;
 /// Factor of the stiffness, s, and the remaining modal damping.
 type Damped = Result<(f64, ModalDamping), ReductionError>;
 
@@ -196,7 +201,7 @@ impl Component {
         let whole = FullStructure::without_ports(mass, damping, stiffness).map_err(|_| StructureError::NegativeMass)?;
         let definite = sparse_definite_with_order(&whole.mass, &whole.analysis);
         let definite_mass = definite.ok_or(StructureError::NegativeMass)?;
-        let (index, reductions) = (OnceLock::new(), Mutex::default());
+        let (index, reductions, shapes) = (OnceLock::new(), Mutex::default(), Mutex::default());
         let (damped, counts, sectors) = (Mutex::default(), Mutex::default(), Mutex::default());
         Ok(Component(Arc::new(ComponentData {
             rows,
@@ -204,6 +209,7 @@ impl Component {
             whole,
             definite_mass,
             reductions,
+            shapes,
             damped,
             counts,
             sectors,
@@ -330,6 +336,19 @@ impl Component {
         })
     }
 
+    /// Returns the displacements of all rows in each coordinate of [`Component::reduced`], rows
+    /// by coordinates. The reduction is computed again, because it does not keep its basis; the
+    /// result is stored for repeated calls.
+    ///
+    /// # Errors
+    /// See [`Component::reduced`].
+    pub fn shapes(&self, seen: &[Row], how: &Reduction) -> ShapesResult {
+        cached(&self.0.shapes, &(seen.to_vec(), *how), || {
+            let whole = self.0.whole.with_ports(seen.to_vec())?;
+            Ok(Arc::new(reduce_whole(&whole, how)?.reduced.scaled_to_metres().columns()))
+        })
+    }
+
     /// Returns a reduced component whose basis also serves a second stiffness `K₁`, such as
     /// that at a speed of rotation.
     ///
@@ -444,7 +463,7 @@ impl Component {
     pub fn stored_reductions(&self) -> usize {
         let sector = |(.., sector): &(Boundary, usize, Arc<SectorCache>)| sector.stored_reductions();
         let sectors = self.0.sectors.try_lock().map_or(0, |known| known.iter().map(sector).sum());
-        sectors + stored(&self.0.reductions) + stored(&self.0.damped)
+        sectors + stored(&self.0.reductions) + stored(&self.0.shapes) + stored(&self.0.damped)
     }
 
     /// Returns damping with one ratio for all modes up to a frequency (rad/s), and proportional
@@ -637,7 +656,7 @@ fn natural(modes: &NaturalModes) -> Vec<f64> {
 fn reduce(whole: &FullStructure, how: &Reduction) -> Result<ReducedComponent, ReductionError> {
     let ReductionResult { reduced, deviation, modes, up_to, serves } = reduce_whole(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.rigid_body_count());
-    let form = ReducedForm::Alone(Arc::new(reduced.scaled_to_metres()));
+    let form = ReducedForm::Alone(Arc::new(reduced.scaled_to_metres().without_basis()));
     Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn build_model(
     environment: &Environment<'_>,
     problems: &mut Vec<Problem>,
 ) -> (Model, Vec<SectorDistribution>, Vec<SectorDistribution>) {
-    let SourceModel { lists, template, matrices } = structure;
+    let SourceModel { lists, template, matrices, .. } = structure;
     let (mut forces, mut motions, mut wrong) = (Vec::new(), Vec::new(), Vec::new());
     let mut model = Model::default();
     let component = matrices.as_ref().and_then(|matrices| matrices.component.as_ref());

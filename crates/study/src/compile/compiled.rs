@@ -85,12 +85,34 @@ pub(crate) enum CompiledValue {
 }
 
 /// The coordinate along which a law acts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum LawCoordinate {
     /// A displacement, with forces.
     Displacement,
     /// An angle, with moments.
     Angle,
+    /// A displacement on a face of this area, m², with forces per area.
+    Face { area: f64 },
+}
+
+impl LawCoordinate {
+    /// Returns the dimension in which a parameter of a law is stated.
+    pub fn dimension(self, of_law: Dimension) -> Dimension {
+        match self {
+            LawCoordinate::Displacement => of_law,
+            LawCoordinate::Angle => of_rotation(of_law),
+            // a kilogram stands for a force
+            LawCoordinate::Face { .. } => Dimension { m: of_law.m - 2 * of_law.kg, ..of_law },
+        }
+    }
+
+    /// Converts a stated parameter to that of the law.
+    fn value(self, stated: f64, of_law: Dimension) -> f64 {
+        match self {
+            LawCoordinate::Face { area } => stated * area.powi(i32::from(of_law.kg)),
+            _ => stated,
+        }
+    }
 }
 
 /// The range of a fitted parameter.
@@ -477,12 +499,9 @@ impl LawStatement<'_> {
             };
             // with an exponent that is not a whole number: a plain number in SI
             let dimension = parameter.dimension_for(value).unwrap_or(Dimension::NONE);
-            let dimension = match coordinate {
-                LawCoordinate::Displacement => dimension,
-                LawCoordinate::Angle => of_rotation(dimension),
-            };
-            let expected = Expected { dimension, within: *within };
-            match quantity.number(parameter.key, expected, example, environment) {
+            let expected = Expected { dimension: coordinate.dimension(dimension), within: *within };
+            let stated = quantity.number(parameter.key, expected, example, environment);
+            match stated.map(|value| coordinate.value(value, dimension)) {
                 Ok(value) if !parameter.range.contains(value) => {
                     let Parameter { key, range, .. } = *parameter;
                     let error = LawError::Value { law: row.name, key, dimension, range, value };

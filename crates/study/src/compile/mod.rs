@@ -2,6 +2,7 @@
 //!
 //! - `read`: the reader of study files;
 //! - `compiled`: compiled values, tables and laws;
+//! - `mesh`: places and joints on the sets of a mesh;
 //! - `source_model`: the model as stated, and the location of a model error in it;
 //! - `templates`: ready models that other studies use;
 //! - `torsion`: models of rotation, whose masses are moments of inertia;
@@ -13,6 +14,7 @@
 pub(crate) mod bare_numbers;
 pub(crate) mod compiled;
 pub(crate) mod frequency_amplitude;
+pub(crate) mod mesh;
 pub(crate) mod read;
 pub(crate) mod repeat;
 pub(crate) mod source_model;

@@ -5,6 +5,7 @@ use crate::case::names::ModelNames;
 use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::mesh::MeshUse;
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::quantity_text;
 use crate::syntax::suggest::{alternatives, suggest};
@@ -20,6 +21,7 @@ pub(crate) struct SourceModel {
     pub lists: ModelLists,
     pub template: Option<TemplateSource>,
     pub matrices: Option<MatrixSource>,
+    pub mesh: MeshUse,
 }
 
 /// `[structure]`, with the contents of its files.
@@ -113,6 +115,8 @@ pub(crate) struct ModelLists {
     pub joint: Vec<CompiledTable>,
     pub force: Vec<CompiledTable>,
     pub motion: Vec<CompiledTable>,
+    /// The contacts of a mesh, until they become places and joints.
+    pub contact: Vec<CompiledTable>,
     /// `[disk]`; then the lists state one sector.
     pub disk: Option<DiskSource>,
     /// True for a model of rotation, whose masses are moments of inertia.
@@ -129,6 +133,7 @@ impl ModelLists {
             "joint" => Some(&mut self.joint),
             "force" => Some(&mut self.force),
             "motion" => Some(&mut self.motion),
+            "contact" => Some(&mut self.contact),
             _ => None,
         }
     }

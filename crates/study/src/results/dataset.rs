@@ -3,10 +3,15 @@
 //!
 //! The writers in `stickslip-report` use only these.
 
+pub use crate::compile::mesh::MeshSource;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::sync::Arc;
+
+/// Name of the table with the displacements of all nodes of a structure.
+pub const FIELDS: &str = "fields";
 
 /// The result of one study.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,6 +34,9 @@ pub struct Dataset {
     pub failures: Vec<Failure>,
     /// The record of the run.
     pub record: Record,
+    /// The mesh of the structure, for the table `fields`. It is not stored with results.
+    #[serde(skip)]
+    pub mesh: Option<Arc<MeshSource>>,
 }
 
 impl Dataset {

@@ -9,7 +9,7 @@
 //! as the full curve, and all its points were computed.
 
 use crate::case::study::Study;
-use crate::results::dataset::{CellValues, Column, Table};
+use crate::results::dataset::{CellValues, Column, FIELDS, Table};
 use crate::results::drawing::MAX_CURVES;
 
 /// Largest number of rows of a table that are held in memory for its figure.
@@ -94,7 +94,8 @@ impl DecimatedTable {
         let empty = Table { name: name.to_owned(), columns: Vec::new() };
         let keys = study.varied().len();
         let (mut cases, mut bin) = (CaseSelection::All, None);
-        if rows > most {
+        // the figure does not show this table, but the files of the mesh need all its rows
+        if rows > most && name != FIELDS {
             let rows_per_case = rows.div_ceil(study.cases());
             let kept = if study.draws().is_some() {
                 let first = (most / rows_per_case).clamp(1, study.cases());

@@ -273,6 +273,7 @@ impl CheckedStudy {
                 points: BTreeMap::new(),
                 interrupted: false,
             },
+            mesh: study.structure.mesh.source.clone(),
         }
     }
 }

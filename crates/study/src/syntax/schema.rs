@@ -62,6 +62,12 @@ pub const FILE: &[Key] = &[
     optional("spring", ValueType::List(SPRING), "springs and dampers", "[]"),
     optional("joint", ValueType::List(JOINT), "friction joints and contacts between places", "[]"),
     optional(
+        "contact",
+        ValueType::List(CONTACT),
+        "contacts between faces of the mesh of [structure]; each node of the first face becomes a joint",
+        "[]",
+    ),
+    optional(
         "disk",
         ValueType::Table(DISK),
         "the model is one sector of a bladed disk, with `next.NAME` for the place of that name in the next sector",
@@ -190,6 +196,13 @@ pub const STRUCTURE: &[Key] = &[
         ValueType::Choice(unit_sets),
         "units of the numbers in these files; all other quantities of the study state their own units",
         "\"mm-t-s\"",
+    ),
+    optional(
+        "mesh",
+        ValueType::Text,
+        "file of the mesh with the nodes of these rows, for `set`, for sets in `nodes`, and for [[contact]]: input deck \
+         of Abaqus or CalculiX, Gmsh, Nastran, Ansys archive, VTK .vtu",
+        "\"blade.inp\"",
     ),
     optional(
         "modal_damping",
@@ -349,8 +362,14 @@ const PLACE: &[Key] = &[
     optional(
         "nodes",
         ValueType::Rows,
-        "one node, or several nodes: each direction is the mean of their rows `node.direction`",
+        "one node, several nodes, or sets of the mesh: each direction is the mean of their rows `node.direction`",
         "[\"188\", \"189\"]",
+    ),
+    optional(
+        "set",
+        ValueType::Text,
+        "a set of the mesh: each of its nodes is a place `NAME_NODE`, such as `tip_17`",
+        "\"PADS\"",
     ),
     optional(
         "sum",
@@ -478,6 +497,40 @@ const JOINT: &[Key] = &[
     REPEAT,
 ];
 
+const CONTACT: &[Key] = &[
+    required(
+        "name",
+        ValueType::Name,
+        "name; its joints are `NAME_NODE`, their places `NAME_NODE_a` and `_b`",
+        "\"pad\"",
+    ),
+    required(
+        "between",
+        ValueType::Rows,
+        "two sets of the mesh, or one and \"ground\"; the nodes of the first meet the faces of the second",
+        "[\"PADS\", \"ground\"]",
+    ),
+    required(
+        "law",
+        ValueType::Law,
+        "law with stiffnesses, forces and dampings per area: N/mm^3, MPa; each joint has them times the area of its node",
+        "{ kind = \"friction-contact\", tangential = \"20 N/mm^3\", normal = \"30 N/mm^3\", friction = 0.3, preload = \"2 MPa\" }",
+    ),
+    optional(
+        "tangent",
+        ValueType::Vector(Dimension::NONE),
+        "a vector whose projection onto the face is the first tangent",
+        "[1, 0, 0]",
+    ),
+    optional(
+        "distance",
+        ValueType::Quantity(Dimension::LENGTH, Bounds::Positive),
+        "largest distance of a node from the second face; absent: a tenth of the square root of the mean area of its \
+         faces",
+        "\"0.5 mm\"",
+    ),
+];
+
 /// The keys of `[disk]`.
 const DISK: &[Key] = &[
     required(
@@ -496,8 +549,8 @@ const DISK: &[Key] = &[
     optional(
         "nodes",
         ValueType::Text,
-        "coordinates of the nodes of the sector: a CSV file with the columns node, x, y, z, or an input deck with \
-         *NODE; checks `boundary`, and replaces it if it is absent",
+        "coordinates of the nodes of the sector: a CSV file with the columns node, x, y, z, or a mesh, such as an \
+         input deck with *NODE; checks `boundary`, and replaces it if it is absent",
         "\"sector.inp\"",
     ),
     optional(

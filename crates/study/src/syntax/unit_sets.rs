@@ -1,4 +1,4 @@
-//! Consistent unit sets of finite-element programs: their units of mass, time, stiffness and
+//! Consistent unit sets of finite-element programs: their units of length, mass, time, stiffness and
 //! damping in SI.
 
 /// A consistent set of units.
@@ -8,6 +8,8 @@ pub struct UnitSet {
     pub name: &'static str,
     /// One line that describes it.
     pub summary: &'static str,
+    /// Its unit of length, m.
+    pub length: f64,
     /// Its unit of mass, kg.
     pub mass: f64,
     /// Its unit of time, s.
@@ -35,41 +37,53 @@ const FOOT: f64 = 0.3048;
 
 /// All unit sets.
 pub const TABLE: &[UnitSet] = &[
-    UnitSet { name: "m-kg-s", summary: "SI: metre, kilogram, second, newton, pascal", mass: 1.0, time: 1.0 },
+    UnitSet {
+        name: "m-kg-s",
+        summary: "SI: metre, kilogram, second, newton, pascal",
+        length: 1.0,
+        mass: 1.0,
+        time: 1.0,
+    },
     UnitSet {
         name: "mm-t-s",
         summary: "millimetre, tonne, second, newton, megapascal; densities like 7.85e-9",
+        length: 1e-3,
         mass: 1e3,
         time: 1.0,
     },
     UnitSet {
         name: "mm-kg-s",
         summary: "millimetre, kilogram, second, millinewton, kilopascal; densities like 7.85e-6, moduli like 2.1e8",
+        length: 1e-3,
         mass: 1.0,
         time: 1.0,
     },
     UnitSet {
         name: "mm-kg-ms",
         summary: "millimetre, kilogram, millisecond, kilonewton, gigapascal; densities like 7.85e-6, moduli like 210",
+        length: 1e-3,
         mass: 1.0,
         time: 1e-3,
     },
     UnitSet {
         name: "mm-g-ms",
         summary: "millimetre, gram, millisecond, newton, megapascal; densities like 7.85e-3",
+        length: 1e-3,
         mass: 1e-3,
         time: 1e-3,
     },
-    UnitSet { name: "cm-g-s", summary: "centimetre, gram, second, dyne", mass: 1e-3, time: 1.0 },
+    UnitSet { name: "cm-g-s", summary: "centimetre, gram, second, dyne", length: 1e-2, mass: 1e-3, time: 1.0 },
     UnitSet {
         name: "in-lbf-s",
         summary: "inch, pound of force, second, mass in lbf s²/in (snail); densities like 7.3e-4",
+        length: INCH,
         mass: POUND / INCH,
         time: 1.0,
     },
     UnitSet {
         name: "ft-lbf-s",
         summary: "foot, pound of force, second, mass in slugs; densities like 15.2",
+        length: FOOT,
         mass: POUND / FOOT,
         time: 1.0,
     },
@@ -97,6 +111,7 @@ mod tests {
             ("in-lbf-s", 0.0254, 4.4482216152605),
             ("ft-lbf-s", 0.3048, 4.4482216152605),
         ] {
+            assert_eq!(find(name).unwrap().length, length, "{name}");
             let stiffness = find(name).unwrap().stiffness();
             assert!((stiffness * length / force - 1.0).abs() < 1e-15, "{name}");
         }

@@ -111,6 +111,16 @@ study = { kind = "response", frequency = "121 Hz" }
 method = { kind = "harmonic-balance" }
 "#;
 
+/// These matrices with their mesh, and a contact on it.
+const MESH: &str = r#"
+schema = 1
+structure = { stiffness = "blade.sti", mass = "blade.mas", dofs = "blade.dof", units = "mm-t-s", mesh = "blade.inp" }
+place = [{ name = "tip", dof = "1353.y" }]
+contact = [{ name = "pad", between = ["PADS", "ground"], law = { kind = "friction-contact", tangential = "20 N/mm^3", normal = "30 N/mm^3", friction = 0.3 } }]
+study = { kind = "response", frequency = "121 Hz" }
+method = { kind = "harmonic-balance" }
+"#;
+
 /// These matrices as a sector of a disk.
 const SECTOR: &str = r#"
 schema = 1
@@ -139,6 +149,8 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
         ("body", "repeat") => (BODY, "name = \"damper{i}\"", &["/place", "/spring"]),
         ("body", _) => (BODY, "", &[]),
         ("place", "dofs" | "nodes" | "sum") => (MATRICES, "", &["dof"]),
+        ("place", "set") => (MESH, "", &["dof"]),
+        ("contact", _) => (MESH, "", &[]),
         ("place", "directions" | "normal") => (MATRICES, "nodes = [\"188\"]", &["dof"]),
         ("place", "tangent") => (MATRICES, "nodes = [\"188\"]\nnormal = [0, 0, 1]", &["dof"]),
         ("place", "repeat") => (MATRICES, "name = \"tip{i}\"", &[]),
@@ -197,6 +209,8 @@ fn write_files(folder: &Path) {
     };
     let text = format!("*NODE\n188, {}\n189, {}\n1353, {}\n", at(0.0, 100.0), at(15.0, 100.0), at(7.0, 200.0));
     write("sector.inp", text.as_bytes());
+    let text = "*NODE\n188, 0, 0, 0\n189, 1, 0, 0\n1353, 0, 1, 0\n*ELEMENT, TYPE=S3\n1, 188, 189, 1353\n*NSET, NSET=PADS\n188, 189, 1353\n";
+    write("blade.inp", text.as_bytes());
     let pattern: String = (0..24).map(|sector| format!("{sector},0.0{sector:02}\n")).collect();
     write("pattern.csv", format!("sector,deviation\n{pattern}").as_bytes());
 }
@@ -250,6 +264,11 @@ fn study_with(table: &str, key: &Key, outer: &[(String, &Key)], kind: Option<&'s
         if kind.info.name == "nodal-diameter" || key.name == "amplification" {
             let own = study.remove("study").unwrap();
             study = parsed(RING);
+            study.insert("study".into(), own);
+        }
+        if key.name == "fields" {
+            let own = study.remove("study").unwrap();
+            study = parsed(MATRICES);
             study.insert("study".into(), own);
         }
     }

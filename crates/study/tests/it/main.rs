@@ -14,6 +14,7 @@
 //! - `key_examples`: the example of every key;
 //! - `laws_and_kinds`: every law in every study kind;
 //! - `maps`: the peak over two parameters;
+//! - `meshes`: places on sets of a mesh, and contacts from geometry;
 //! - `nodes`: nodes with several directions;
 //! - `random`: generator of random studies;
 //! - `random_studies`: random studies of every kind;
@@ -41,6 +42,7 @@ mod initial_states;
 mod key_examples;
 mod laws_and_kinds;
 mod maps;
+mod meshes;
 mod nodes;
 mod random;
 mod random_studies;

@@ -73,8 +73,10 @@ impl FullStructure {
             }
             let (deviation, at) = worst;
             if deviation.error <= tolerance {
-                let (own, other) =
-                    (project(&wholes[0])?.scaled_to_metres(), project(&wholes[last])?.scaled_to_metres());
+                let (own, other) = (
+                    project(&wholes[0])?.scaled_to_metres().without_basis(),
+                    project(&wholes[last])?.scaled_to_metres().without_basis(),
+                );
                 return Ok(CommonBasis { own, other, deviation, up_to });
             }
             if taken.contains(&at) {

@@ -447,7 +447,7 @@ impl ReducedMatrices {
     ///
     /// The unit is the displacement of the port that moves most in each coordinate, or of the
     /// largest degree of freedom if no port moves. Comparisons between coordinates then compare
-    /// metres. The displacements of all other rows are dropped.
+    /// metres.
     #[must_use]
     pub(super) fn scaled_to_metres(mut self) -> Self {
         let most = |column: &[f64]| column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -468,12 +468,19 @@ impl ReducedMatrices {
             }
             let factor = 1.0 / size;
             self.ports.column_mut(k).scale_mut(factor);
+            self.weights.column_mut(k).scale_mut(factor);
             for matrix in [&mut self.mass, &mut self.damping, &mut self.stiffness] {
                 matrix.row_mut(k).scale_mut(factor);
                 matrix.column_mut(k).scale_mut(factor);
             }
         }
-        // the basis has the size of the whole structure, and only ports are needed from here on
+        self
+    }
+
+    /// Drops the displacements of all rows except ports: the basis has the size of the whole
+    /// structure.
+    #[must_use]
+    pub(super) fn without_basis(mut self) -> Self {
         (self.basis, self.weights, self.n) = (Arc::default(), DMatrix::zeros(0, 0), 0);
         self
     }
@@ -488,7 +495,7 @@ impl ReducedMatrices {
     }
 
     /// Returns all displacements of the whole structure, n × r.
-    fn columns(&self) -> DMatrix<f64> {
+    pub(super) fn columns(&self) -> DMatrix<f64> {
         DMatrix::from_vec(self.n, self.dofs(), multi_vector::combine(self.n, &self.basis, &self.weights))
     }
 

@@ -13,6 +13,7 @@ mod structure;
 mod text;
 mod warnings;
 
+pub use crate::compile::mesh::contact::ContactSummary;
 pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 pub(crate) use text::line;
 
@@ -39,6 +40,8 @@ pub struct ModelSummary {
     pub dofs: usize,
     /// The structure given by matrices, if there is one.
     pub structure: Option<StructureSummary>,
+    /// The contacts between faces of its mesh.
+    pub contacts: Vec<ContactSummary>,
     /// The rigid bodies in words; on a disk, those of the first sector.
     pub bodies: Vec<String>,
     /// True if the model has too many degrees of freedom for the modes, which are then absent.
@@ -179,6 +182,7 @@ impl ModelSummary {
             cases: study.cases(),
             dofs: first.dofs(),
             structure: StructureSummary::new(study, &cases[0]),
+            contacts: study.structure.mesh.contacts.clone(),
             bodies: bodies::described(&cases[0].case.model),
             too_large: first.is_too_large(),
             free: first.free().clone(),
@@ -222,6 +226,7 @@ impl ModelSummary {
             "degrees_of_freedom": self.dofs,
             "bodies": self.bodies,
             "structure": self.structure.as_ref().map(StructureSummary::to_json),
+            "contacts": self.contacts.iter().map(ContactSummary::to_json).collect::<Vec<_>>(),
             "joints_free": modes(&self.free),
             "joints_stuck": modes(&self.stuck),
             "joints": self.joints.iter().map(joint).collect::<Vec<_>>(),

@@ -178,6 +178,9 @@ impl fmt::Display for ModelSummary {
         for (name, text) in self.structure.iter().flat_map(|structure| structure.lines()) {
             line(name, &text)?;
         }
+        for (number, contact) in self.contacts.iter().enumerate() {
+            line(if number == 0 { "contacts" } else { "" }, &contact.text())?;
+        }
         for (number, body) in self.bodies.iter().enumerate() {
             line(if number == 0 { "bodies" } else { "" }, body)?;
         }

@@ -13,6 +13,8 @@ use crate::syntax::key::Key;
 use crate::syntax::suggest::excerpt;
 use std::io::Read;
 use stickslip::structure::NodeCoordinates;
+use stickslip_formats::Error;
+use stickslip_formats::mesh::{self, Mesh};
 
 impl Reader {
     pub(super) fn disk(&mut self, table: &TomlTable, keys: &[Key]) -> Option<DiskSource> {
@@ -43,15 +45,20 @@ impl Reader {
     fn nodes(&mut self, stated: &CompiledTable) -> Option<Vec<NodeCoordinates>> {
         let entry = stated.entry("nodes").filter(|_| !self.study_file_only)?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
-        let read = self.read_text(name).and_then(|text| {
-            let deck = text.trim_start_matches('\u{feff}').trim_start().starts_with('*');
-            let read = if deck { deck_nodes(&text) } else { csv_nodes(&text) };
-            read.map_err(|(line, message)| {
-                let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name an input \
-                    deck with a *NODE block";
-                (format!("`{}`, line {line}: {message}", excerpt(name)), Some(help.to_owned()))
-            })
-        });
+        let path = self.path_of(name);
+        let read = match mesh::is_mesh(&path) {
+            Ok(true) => mesh::read(&path).map(|mesh| mesh_nodes(&mesh)).map_err(|error| {
+                let Error { problem, remedy, .. } = error;
+                (format!("`{}`: {problem}", excerpt(name)), Some(remedy))
+            }),
+            _ => self.read_text(name).and_then(|text| {
+                csv_nodes(&text).map_err(|(line, message)| {
+                    let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name a mesh, \
+                        such as an input deck with a *NODE block";
+                    (format!("`{}`, line {line}: {message}", excerpt(name)), Some(help.to_owned()))
+                })
+            }),
+        };
         let refuse = |(message, help): MessageAndHelp| Problem::new(&entry.location, "nodes", message).maybe_help(help);
         read.map_err(|problem| self.problems.push(refuse(problem))).ok()
     }
@@ -117,7 +124,7 @@ impl Reader {
     fn read_text(&self, name: &str) -> Result<String, MessageAndHelp> {
         // Largest size of a file in bytes: lines for a million nodes.
         let max_bytes = 1 << 26;
-        let path = self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name));
+        let path = self.path_of(name);
         let failed = |error: std::io::Error| {
             let message = format!("`{}` cannot be read: {error}", excerpt(&path.display().to_string()));
             (message, Some("the path is relative to the folder of the study file".to_owned()))
@@ -185,25 +192,9 @@ fn csv_nodes(text: &str) -> Result<Vec<NodeCoordinates>, (usize, String)> {
     rows.map(|(line, [node, x, y, z])| node_of(line, &node, [&x, &y, &z])).collect()
 }
 
-/// Parses the nodes of an Abaqus or CalculiX input deck. The error is the wrong line and the
-/// reason.
-fn deck_nodes(text: &str) -> Result<Vec<NodeCoordinates>, (usize, String)> {
-    let (mut nodes, mut inside) = (Vec::new(), false);
-    for (line, text) in text.lines().enumerate().map(|(i, line)| (i + 1, line.trim())) {
-        if text.is_empty() || text.starts_with("**") {
-            continue;
-        }
-        if let Some(keyword) = text.strip_prefix('*') {
-            inside = keyword.split(',').next().is_some_and(|word| word.trim().eq_ignore_ascii_case("node"));
-        } else if inside {
-            let fields: Vec<&str> = text.split(',').map(str::trim).collect();
-            let [node, ref at @ ..] = fields[..] else { continue };
-            // a missing coordinate is zero
-            let field = |i: usize| at.get(i).copied().filter(|field| !field.is_empty()).unwrap_or("0");
-            nodes.push(node_of(line, node, [field(0), field(1), field(2)])?);
-        }
-    }
-    if nodes.is_empty() { Err((1, "the file has no *NODE block with nodes".to_owned())) } else { Ok(nodes) }
+/// Returns the nodes of a mesh by the names that rows have.
+fn mesh_nodes(mesh: &Mesh) -> Vec<NodeCoordinates> {
+    mesh.nodes().iter().map(|node| (node.number.to_string(), node.position)).collect()
 }
 
 /// Parses the deviations of a pattern by sector. The error is the wrong line and the reason.
@@ -238,19 +229,15 @@ fn pattern(text: &str) -> Result<Vec<f64>, (usize, String)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{csv_nodes, deck_nodes, pattern};
+    use super::{csv_nodes, mesh_nodes, pattern};
 
     #[test]
     fn nodes_are_read_from_tables_and_decks() {
         let expected = vec![("7".to_owned(), [1.0, -25.0, 0.0]), ("12".to_owned(), [0.5, 0.0, 3.0])];
         assert_eq!(csv_nodes("x,y,node,z\n1,-2.5e1,7,0\n0.5,0,12,3\n").unwrap(), expected);
-        let deck = "** a sector\n*HEADING\n1, 2, 3\n*Node, NSET=all\n7, 1.0, -2.5D1\n** beside\n12, .5, , 3.\n*ELEMENT, TYPE=C3D8\n1, 7, 12\n*NODE PRINT\nU\n";
-        assert_eq!(deck_nodes(deck).unwrap(), expected);
-        assert_eq!(
-            deck_nodes("*STEP\n*NODE\n7, a, 0, 0\n").unwrap_err(),
-            (3, "`a` is not a valid coordinate of node `7`".to_owned())
-        );
-        assert!(deck_nodes("*STEP\n1, 2\n").unwrap_err().1.contains("no *NODE"));
+        let deck = "** a sector\n*HEADING\n1, 2, 3\n*Node, NSET=all\n7, 1.0, -2.5D1\n** beside\n12, .5, , 3.\n*NODE PRINT\nU\n";
+        let mesh = stickslip_formats::mesh::read_bytes(deck.as_bytes()).unwrap();
+        assert_eq!(mesh_nodes(&mesh), expected);
         assert!(csv_nodes("node,x,y,z\n7,1,2\n").unwrap_err().1.contains("expected node,x,y,z"));
     }
 

@@ -7,6 +7,7 @@
 //! - `data`: `[[data]]` and the files that it names;
 //! - `disk`: `[disk]` and the pattern file that it names;
 //! - `lists`: the lists of a model, and repeated entries;
+//! - `mesh`: the mesh of `[structure]`, and the entries on its sets;
 //! - `parameters`: `[parameters]`, `vary`, and overrides;
 //! - `structure`: `[structure]` and its files;
 //! - `structure_cache`: structures that stay in memory after their files were read;
@@ -16,6 +17,7 @@ mod data;
 mod disk;
 mod kinds;
 mod lists;
+mod mesh;
 mod parameters;
 mod reader;
 mod structure;
@@ -359,7 +361,7 @@ impl Reader {
 
     /// Reads the model that the file states itself, without a template.
     fn model_from_lists(&mut self, root: &TomlTable, file: &str) -> Option<SourceModel> {
-        let lists = self.lists(root)?;
+        let mut lists = self.lists(root)?;
         let matrices = match root.get("structure").map(|entry| &entry.node) {
             Some(TomlNode { value: TomlValue::Table(table), .. }) => Some(self.matrices(table, file)?),
             Some(other) => {
@@ -368,6 +370,7 @@ impl Reader {
             }
             None => None,
         };
-        Some(SourceModel { lists, template: None, matrices })
+        let mesh = self.expand_sets(&mut lists, matrices.as_ref().map(|matrices| &matrices.table))?;
+        Some(SourceModel { lists, template: None, matrices, mesh })
     }
 }

@@ -40,6 +40,11 @@ impl Reader {
         error.unwrap_or_else(|| StudyError::file(file, "the study could not be read", None))
     }
 
+    /// Returns the path of a file that the study names, relative to its folder.
+    pub(super) fn path_of(&self, name: &str) -> PathBuf {
+        self.folder.as_deref().map_or_else(|| name.into(), |folder| folder.join(name))
+    }
+
     /// Adds a text that is not in the file, and returns its location.
     pub(super) fn text(&mut self, name: String, text: String) -> Location {
         let span = 0..text.len();

@@ -4,6 +4,7 @@
 use super::reader::Reader;
 use crate::case::study::{Parameter, case_model, evaluate};
 use crate::compile::compiled::Environment;
+use crate::compile::mesh::MeshUse;
 use crate::compile::source_model::{ModelLists, SourceModel, TemplateSource};
 use crate::compile::templates::{self, Template, trailing_comment};
 use crate::syntax::document::{self, TomlTable, TomlValue};
@@ -98,7 +99,12 @@ impl Reader {
                 entry.clone_from(law);
             }
         }
-        Some(SourceModel { lists, template: Some(TemplateSource { table, source, given: Vec::new() }), matrices: None })
+        Some(SourceModel {
+            lists,
+            template: Some(TemplateSource { table, source, given: Vec::new() }),
+            matrices: None,
+            mesh: MeshUse::default(),
+        })
     }
 }
 
@@ -142,7 +148,7 @@ fn compile_template(row: &Template) -> Result<CompiledTemplate, StudyError> {
     let order = stated.as_ref().and_then(|stated| reader.order(&stated.parameters, &[]));
     match (stated, order) {
         (Some(TemplateFile { parameters, lists, .. }), Some(order)) if reader.problems.is_empty() => {
-            let structure = SourceModel { lists, template: None, matrices: None };
+            let structure = SourceModel { lists, template: None, matrices: None, mesh: MeshUse::default() };
             Ok(CompiledTemplate { names: reader.names, parameters, order, structure, sources: reader.sources })
         }
         _ => Err(reader.error(row.name)),

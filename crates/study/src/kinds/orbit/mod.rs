@@ -1,5 +1,6 @@
 //! Orbits over one period, in time.
 
+mod fields;
 mod figure;
 
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
@@ -9,11 +10,12 @@ use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::excitation_warnings;
 use crate::kinds::info::KindInfo;
 use crate::kinds::kind::{Kind, Probe};
+use crate::results::dataset::FIELDS;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::{PointRow, describe_location};
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
-use crate::syntax::key::{ValueType, default};
+use crate::syntax::key::{ValueType, default, optional};
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
 
@@ -32,13 +34,20 @@ pub(super) const KIND: Kind = Kind {
                 "computes all Floquet multipliers into `multipliers.csv`; `stable` needs only the largest one",
                 "true",
             ),
+            optional(
+                "fields",
+                ValueType::Count(1, 1000),
+                "number of instants of the period at which the displacements of all nodes of the structure are \
+                 written to `fields.csv`, and with a `mesh` to `fields.pvd` for ParaView",
+                "24",
+            ),
         ],
-        check: |values, _, _| check_output(values),
+        check: |values, model, _| check_output(values).and_then(|()| fields::check(values, model)),
         axes: [Some(Dimension::TIME), None],
         uses_method: true,
         needs: no_requirements,
         adapts: false,
-        tables: &["orbit", "orbits", "multipliers"],
+        tables: &["orbit", "orbits", "multipliers", FIELDS],
     },
     unit_size: orbit_sweep::grain,
     size,
@@ -54,14 +63,16 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let orbits = inputs.orbits(points);
     let wanted = inputs.case.values.flag("multipliers") == Some(true);
     let multipliers = if wanted { points * 2.0 * inputs.dofs } else { 0.0 };
+    let fields = fields::size(inputs);
     PlannedSize {
         tables: vec![
             inputs.motion(rows),
             TableShape { numbers: orbits.numbers + 4.0, ..orbits },
             TableShape { rows: multipliers, numbers: inputs.varied + 5.0, words: 0.0 },
+            fields,
         ],
-        // the panels beyond the limit are also built
-        drawn: rows * (inputs.places + inputs.joints),
+        // the panels beyond the limit are also built; all fields are held until they are written
+        drawn: rows * (inputs.places + inputs.joints) + fields.rows,
         unit: inputs.kept_orbits(),
     }
 }
@@ -70,7 +81,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     let (mut motion, mut summary, mut multipliers) =
         (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
+    let mut of_nodes = TableBuilder::default();
     let prepared = work.case();
+    let nodes = fields::Fields::new(prepared, &mut part);
     for (orbit, stable) in orbit_sweep::converged_orbits(work, &mut part)? {
         let omega = orbit.omega;
         continuum_note(prepared, &orbit).into_iter().for_each(|note| note.merge_into(&mut part.notes));
@@ -113,8 +126,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             write_sample(prepared, &orbit.sample(time), &mut motion);
             motion.end_row();
         }
+        if let Some(nodes) = &nodes {
+            nodes.write(prepared, &orbit, &mut of_nodes);
+        }
     }
-    part.tables = vec![motion, summary, multipliers];
+    part.tables = vec![motion, summary, multipliers, of_nodes];
     Ok(part)
 }
 

@@ -1,0 +1,296 @@
+//! Nastran bulk data (`.bdf`, `.dat`, `.nas`): grid points, elements and sets, in free fields or in
+//! fields of 8 or 16 characters.
+//!
+//! ```text
+//! GRID, 1,, 0.0, 0.0, 0.0
+//! CHEXA   11      3       1       2       3       4       5       6
+//!         7       8
+//! SET1    5       1       THRU    4
+//! ```
+//! The elements of a property become the set `property_3`, the grid points of `SET1`, `SET3` and of
+//! `SET 5 = …` in the case control the set `set_5`. Coordinate systems of grid points are refused,
+//! because the rows of the matrices follow them.
+//!
+//! Source: MSC Nastran Quick Reference Guide, bulk data entries `GRID`, `CTETRA`, `CPYRAM`,
+//! `CPENTA`, `CHEXA`, `CQUAD4`, `CQUAD8`, `CTRIA3`, `CTRIA6`, `SET1`, `SET3`; case control `SET`.
+
+use super::builder::{MeshBuilder, SetKind};
+use super::shape::Shape;
+use super::{MeshFile, MeshFormat};
+use crate::error::{Error, ErrorKind};
+use crate::nastran_dmig::{fields, is_continuation};
+use crate::text::{Line, Lines, integer};
+
+pub(super) const FORMAT: MeshFormat =
+    MeshFormat { name: "nastran-bulk", summary: "Nastran bulk data (.bdf, .dat, .nas)", sniff, read };
+
+fn sniff(bytes: &[u8]) -> bool {
+    let names = || Lines::new(bytes).map(|line| name(&line));
+    names().any(|name| name == "GRID") && !names().any(|name| name == "DMIG")
+}
+
+/// Returns the name of the card that begins in a line; empty for other lines.
+fn name(line: &Line) -> String {
+    let end = line.text.iter().take(8).position(|byte| b",* \t".contains(byte)).unwrap_or(line.text.len().min(8));
+    let is_card = line.text.first().is_some_and(u8::is_ascii_alphabetic);
+    if is_card { String::from_utf8_lossy(&line.text[..end]).to_uppercase() } else { String::new() }
+}
+
+/// A card with the fields of all its lines.
+struct Card<'a> {
+    name: String,
+    fields: Vec<&'a [u8]>,
+    line: Line<'a>,
+}
+
+impl Card<'_> {
+    fn field(&self, at: usize) -> &[u8] {
+        self.fields.get(at).copied().unwrap_or_default()
+    }
+
+    fn integer(&self, at: usize) -> Result<i64, Error> {
+        self.line.integer(self.field(at))
+    }
+}
+
+fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
+    let mut card: Option<Card> = None;
+    let mut sets: Vec<StatedSet> = Vec::new();
+    let mut lines = Lines::new(file.bytes);
+    while let Some(line) = lines.next() {
+        if line.text.starts_with(b"$") {
+            continue;
+        }
+        if let Some(card) = card.as_mut().filter(|_| is_continuation(&line)) {
+            card.fields.extend(fields(&line));
+            continue;
+        }
+        if let Some(card) = card.take() {
+            add(&card, &mut sets, builder)?;
+        }
+        match name(&line).as_str() {
+            "SET" => sets.extend(case_set(&line, &mut lines)),
+            "INCLUDE" => {
+                let problem = "the deck includes another file".to_owned();
+                let remedy = "write the whole model to one file, or name the included file";
+                return Err(Error::new(ErrorKind::Unsupported, line.location(), problem, remedy));
+            }
+            "" => {}
+            name => card = Some(Card { name: name.to_owned(), fields: fields(&line), line }),
+        }
+    }
+    card.map_or(Ok(()), |card| add(&card, &mut sets, builder))?;
+    // a set may precede its grid points
+    sets.iter().for_each(|set| set.add(builder));
+    Ok(())
+}
+
+/// Adds what a card states.
+fn add(card: &Card, sets: &mut Vec<StatedSet>, builder: &mut MeshBuilder) -> Result<(), Error> {
+    let solids = ["CTETRA", "CPYRAM", "CPENTA", "CHEXA"];
+    let faces = ["CTRIA3", "CTRIA6", "CTRIAR", "CQUAD4", "CQUAD8", "CQUADR"];
+    match card.name.as_str() {
+        "GRID" => grid(card, builder)?,
+        name if solids.contains(&name) || faces.contains(&name) => element(card, builder)?,
+        // SET1, ID, members; SET3, ID, kind, members
+        "SET1" => sets.extend(StatedSet::of_card(card, 1)),
+        "SET3" if card.field(1).eq_ignore_ascii_case(b"GRID") => sets.extend(StatedSet::of_card(card, 2)),
+        name => {
+            let is_other =
+                name.starts_with('C') && integer(card.field(0)).is_some() && integer(card.field(1)).is_some();
+            let counted = ["CBAR", "CBEAM", "CROD", "CBUSH", "CELAS1", "CELAS2", "CQUAD", "CTRIAX6"];
+            if is_other && counted.contains(&name) {
+                builder.leave_out(name);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn grid(card: &Card, builder: &mut MeshBuilder) -> Result<(), Error> {
+    for at in [1, 5] {
+        if !card.field(at).is_empty() && card.integer(at)? != 0 {
+            let problem = format!("grid point {} has the coordinate system {}", card.integer(0)?, card.integer(at)?);
+            let remedy = "write the model with all grid points and displacements in the basic system";
+            return Err(Error::new(ErrorKind::Unsupported, card.line.location(), problem, remedy));
+        }
+    }
+    let mut position = [0.0; 3];
+    for (axis, x) in position.iter_mut().enumerate() {
+        *x = if card.field(2 + axis).is_empty() { 0.0 } else { card.line.real(card.field(2 + axis))? };
+    }
+    builder.node(card.integer(0)?, position, &card.line)
+}
+
+fn element(card: &Card, builder: &mut MeshBuilder) -> Result<(), Error> {
+    let (number, property) = (card.integer(0)?, card.field(1));
+    // corners and most nodes; thickness and offsets follow the nodes of linear plates
+    let (linear, quadratic) = match card.name.as_str() {
+        "CTRIA3" | "CTRIAR" => (3, 3),
+        "CTRIA6" => (3, 6),
+        "CQUAD4" | "CQUADR" => (4, 4),
+        "CQUAD8" => (4, 8),
+        "CTETRA" => (4, 10),
+        "CPYRAM" => (5, 13),
+        "CPENTA" => (6, 15),
+        _ => (8, 20),
+    };
+    let is_face = card.name.starts_with("CTRI") || card.name.starts_with("CQUAD");
+    let stated = (0..quadratic).map(|i| card.field(2 + i)).collect::<Vec<_>>();
+    let filled = stated.iter().filter(|field| !field.is_empty()).count();
+    let count = if stated[linear..].iter().all(|field| field.is_empty()) { linear } else { quadratic };
+    if filled != count {
+        let problem = format!("element {number} has some middle nodes, but not all");
+        let remedy = "write the elements with all middle nodes, or with none";
+        return Err(Error::new(ErrorKind::Unsupported, card.line.location(), problem, remedy));
+    }
+    let nodes = stated[..count].iter().map(|field| card.line.integer(field)).collect::<Result<Vec<_>, _>>()?;
+    let shape = if is_face { Shape::face(count) } else { Shape::solid(count) };
+    let Some(shape) = shape else {
+        return Err(card.line.malformed("the nodes of an element", &filled.to_string()));
+    };
+    // Nastran numbers the edges between both ends before those of the second end
+    let order: &[usize] = match count {
+        20 => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15],
+        15 => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11],
+        _ => &[],
+    };
+    let ordered: Vec<i64> = order.iter().map(|position| nodes[*position]).collect();
+    builder.element(number, shape, if order.is_empty() { &nodes } else { &ordered }, &card.line)?;
+    if let Some(property) = integer(property) {
+        builder.add(&format!("property_{property}"), SetKind::Elements, [number]);
+    }
+    Ok(())
+}
+
+/// A set of grid points: numbers, and ranges `1 THRU 4`.
+struct StatedSet {
+    name: String,
+    words: Vec<Vec<u8>>,
+}
+
+impl StatedSet {
+    /// Reads the set of a card with its members from a field on; `None` without a number.
+    fn of_card(card: &Card, first: usize) -> Option<StatedSet> {
+        let number = integer(card.field(0))?;
+        let words = card.fields.iter().skip(first).filter(|field| !field.is_empty());
+        Some(StatedSet { name: format!("set_{number}"), words: words.map(|word| word.to_vec()).collect() })
+    }
+
+    fn add(&self, builder: &mut MeshBuilder) {
+        let StatedSet { name, words } = self;
+        let mut at = 0;
+        while let Some(word) = words.get(at) {
+            let is_range = words.get(at + 1).is_some_and(|word| word.eq_ignore_ascii_case(b"THRU"));
+            match (integer(word), words.get(at + 2).filter(|_| is_range).and_then(|last| integer(last))) {
+                (Some(from), Some(to)) => {
+                    builder.add_range(name, SetKind::Nodes, from, to);
+                    at += 3;
+                }
+                (Some(number), None) => {
+                    builder.add(name, SetKind::Nodes, [number]);
+                    at += 1;
+                }
+                _ => at += 1,
+            }
+        }
+    }
+}
+
+/// Reads `SET 5 = 1, 2, 7 THRU 9` of the case control, which continues after a comma; `None` for
+/// a set without a number.
+fn case_set(line: &Line, lines: &mut Lines) -> Option<StatedSet> {
+    let mut text = line.text.to_vec();
+    while text.trim_ascii_end().ends_with(b",") {
+        let Some(more) = lines.next() else { break };
+        text.extend(more.text);
+    }
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let (head, list) = text.split_once('=')?;
+    let number = integer(head.split_whitespace().nth(1)?.as_bytes())?;
+    let words = list.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
+    Some(StatedSet { name: format!("set_{number}"), words: words.map(|word| word.as_bytes().to_vec()).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::error::Location;
+    use crate::mesh::{Mesh, read_bytes};
+
+    /// A brick in small fields, its upper face as a plate in free fields, and a point in large
+    /// fields.
+    const DECK: &str = "SOL 103\nCEND\nSET 8 = 1 THRU 3,\n 7\nSUBCASE 1\nBEGIN BULK\n$ comment\n\
+        GRID           1              0.      0.      0.\n\
+        GRID           2              1.      0.      0.\n\
+        GRID           3              1.      1.      0.\n\
+        GRID           4              0.     1.0      0.\n\
+        GRID,5,,0.,0.,1.0\nGRID,6,0,1.,0.,1.0,0\nGRID,7,,1.,1.,1.0\n\
+        GRID*                  8                             0.0             1.0\n*                    1.0\n\
+        CHEXA         11       3       1       2       3       4       5       6+\n\
+        +              7       8\n\
+        CQUAD4,12,4,5,6,7,8,0.5\nCBAR,13,5,1,2,0.,0.,1.\n\
+        SET1    5       5       THRU    8\nSET3,6,GRID,1,2\nENDDATA\n";
+
+    fn mesh(text: &str) -> Mesh {
+        read_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn fields_of_every_width() {
+        let mesh = mesh(DECK);
+        assert_eq!((mesh.nodes().len(), mesh.elements().len(), mesh.format()), (8, 2, "nastran-bulk"));
+        assert_eq!(mesh.nodes()[7].position, [0.0, 1.0, 1.0]);
+        assert_eq!(mesh.element_nodes(0), [0, 1, 2, 3, 4, 5, 6, 7]);
+        let numbers = |name: &str| -> Vec<i64> {
+            mesh.nodes_of(name).unwrap().iter().map(|node| mesh.nodes()[*node].number).collect()
+        };
+        assert_eq!(
+            (numbers("set_5"), numbers("set_6"), numbers("set_8")),
+            (vec![5, 6, 7, 8], vec![1, 2], vec![1, 2, 3, 7])
+        );
+        // the plate lies on the brick, so its normal points out of it
+        for name in ["property_4", "set_5"] {
+            let patch = mesh.patch(name).unwrap();
+            assert!(
+                (patch.area() - 1.0).abs() < 1e-14 && patch.nodes().iter().all(|node| node.normal == [0.0, 0.0, 1.0])
+            );
+        }
+        assert_eq!(mesh.notes(), ["1 elements of type CBAR are left out"]);
+    }
+
+    /// The middle nodes of a brick lie in the middle of their edges.
+    #[test]
+    fn middle_nodes_are_in_the_order_of_the_shape() {
+        let corners = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]];
+        // G9 to G20 of CHEXA: edges of the lower face, between both faces, of the upper face
+        let edges = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 5), (2, 6), (3, 7), (4, 5), (5, 6), (6, 7), (7, 4)];
+        let middle = |(a, b): (usize, usize)| [0, 1, 2].map(|axis| (corners[a][axis] + corners[b][axis]) / 2);
+        let points: Vec<[i32; 3]> = corners.into_iter().chain(edges.map(middle)).collect();
+        let mut text = String::new();
+        for (i, [x, y, z]) in points.iter().enumerate() {
+            text += &format!("GRID,{},,{x}.,{y}.,{z}.\n", i + 1);
+        }
+        text += "CHEXA,1,1,1,2,3,4,5,6\n,7,8,9,10,11,12,13,14\n,15,16,17,18,19,20\n";
+        let mesh = mesh(&text);
+        let faces = mesh.outer_faces();
+        assert!(faces.len() == 6 && faces.iter().all(|face| (face.area() - 4.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn coordinate_systems_and_incomplete_elements_are_refused() {
+        for (text, location, words) in [
+            (DECK.replace("GRID,5,,", "GRID,5,2,"), Location::Line(12), "coordinate system 2"),
+            (DECK.replace("GRID,6,0,1.,0.,1.0,0", "GRID,6,0,1.,0.,1.0,9"), Location::Line(13), "coordinate system 9"),
+            (
+                DECK.replace("+              7       8\n", "+              7       8       5\n"),
+                Location::Line(17),
+                "not all",
+            ),
+            (DECK.replace("GRID,7,,1.,", "GRID,7,,a,"), Location::Line(14), "`a`"),
+            (DECK.replace("ENDDATA", "INCLUDE 'rest.bdf'"), Location::Line(23), "includes"),
+        ] {
+            let error = read_bytes(text.as_bytes()).map(|_| ()).expect_err(&text);
+            assert!(error.location == location && error.to_string().contains(words), "{error}");
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! Writes the displacements of all nodes of a mesh for ParaView: `fields.pvd`, a list of instants,
+//! and a file `.vtu` of VTK for each. Several orbits have a list each, `fields_1.pvd` ….
+//!
+//! The point data are `displacement` (m) and, at the nodes of contacts, `contact`: 0 none, 1 open,
+//! 2 touching, 3 sticking, 4 slipping. Nodes that are not in the table are at rest.
+//! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
+
+use crate::output::result_file::{File, Output, ReportError};
+use std::fmt::Write;
+use std::ops::Range;
+use stickslip_formats::mesh::{Family, Mesh, Shape};
+use stickslip_study::dataset::{Dataset, FIELDS, MeshSource, Table};
+
+/// The output `vtk`.
+pub const OUTPUT: Output = Output {
+    name: "vtk",
+    summary: "the table `fields` on its mesh: fields.pvd and .vtu for ParaView",
+    make: files,
+    sink: None,
+    is_default: true,
+};
+
+fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
+    let table = dataset.tables.iter().find(|table| table.name == FIELDS);
+    let Some((table, source)) = table.zip(dataset.mesh.as_ref()) else { return Ok(Vec::new()) };
+    let Some(fields) = Fields::new(table) else { return Ok(Vec::new()) };
+    let (mut files, orbits) = (Vec::new(), fields.orbits());
+    let grid = Grid::new(source);
+    for (number, orbit) in orbits.iter().enumerate() {
+        let stem = if orbits.len() == 1 { "fields".to_owned() } else { format!("fields_{}", number + 1) };
+        let mut list =
+            String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n");
+        for (instant, rows) in fields.instants(orbit).into_iter().enumerate() {
+            let name = format!("{stem}_{instant:04}.vtu");
+            let _ = writeln!(list, "<DataSet timestep=\"{:e}\" part=\"0\" file=\"{name}\"/>", fields.time[rows.start]);
+            files.push(File::new(name, grid.file(&fields, rows)));
+        }
+        list += "</Collection>\n</VTKFile>\n";
+        files.push(File::new(format!("{stem}.pvd"), list));
+    }
+    Ok(files)
+}
+
+/// The columns of the table.
+struct Fields<'a> {
+    table: &'a Table,
+    time: &'a [f64],
+    node: &'a [u64],
+    displacement: [&'a [f64]; 3],
+    contact: &'a [String],
+}
+
+impl<'a> Fields<'a> {
+    fn new(table: &'a Table) -> Option<Fields<'a>> {
+        let [x, y, z] = ["x_m", "y_m", "z_m"].map(|name| table.numbers(name));
+        Some(Fields {
+            table,
+            time: table.numbers("time_s")?,
+            node: table.integers("node")?,
+            displacement: [x?, y?, z?],
+            contact: table.texts("contact")?,
+        })
+    }
+
+    /// Returns the rows of each orbit: time does not fall within it.
+    fn orbits(&self) -> Vec<Range<usize>> {
+        let frequency = self.table.numbers("frequency_Hz").unwrap_or_default();
+        let begins = |row: &usize| {
+            let row = *row;
+            row == 0 || self.time[row] < self.time[row - 1] || frequency.get(row) != frequency.get(row - 1)
+        };
+        ranges(0..self.time.len(), begins)
+    }
+
+    /// Returns the rows of each instant of an orbit.
+    fn instants(&self, orbit: &Range<usize>) -> Vec<Range<usize>> {
+        ranges(orbit.clone(), |row| *row == orbit.start || self.time[*row] != self.time[*row - 1])
+    }
+}
+
+/// Divides rows into ranges that begin where `begins` says.
+fn ranges(rows: Range<usize>, begins: impl Fn(&usize) -> bool) -> Vec<Range<usize>> {
+    let mut starts: Vec<usize> = rows.clone().filter(begins).collect();
+    starts.push(rows.end);
+    starts.windows(2).map(|pair| pair[0]..pair[1]).collect()
+}
+
+/// The part of the files that does not depend on time.
+struct Grid<'a> {
+    mesh: &'a Mesh,
+    head: String,
+}
+
+impl<'a> Grid<'a> {
+    fn new(source: &'a MeshSource) -> Grid<'a> {
+        let MeshSource { mesh, length } = source;
+        let (nodes, elements) = (mesh.nodes(), mesh.elements());
+        let points = nodes.iter().flat_map(|node| node.position.map(|x| x * length));
+        let all = (0..elements.len()).flat_map(|element| mesh.element_nodes(element));
+        let ends = elements.iter().scan(0u32, |end, element| {
+            *end += element.shape.nodes() as u32;
+            Some(*end)
+        });
+        let mut head = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n\
+             <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
+            nodes.len(),
+            elements.len()
+        );
+        head += &format!(
+            "<Points>\n{}</Points>\n<Cells>\n",
+            array("Float64", "Points", 3, points.flat_map(f64::to_le_bytes))
+        );
+        head += &array("UInt32", "connectivity", 1, all.flat_map(|node| node.to_le_bytes()));
+        head += &array("UInt32", "offsets", 1, ends.flat_map(u32::to_le_bytes));
+        head += &array("UInt8", "types", 1, elements.iter().map(|element| cell_type(element.shape)));
+        Grid { mesh, head: head + "</Cells>\n" }
+    }
+
+    /// Returns the file of an instant.
+    fn file(&self, fields: &Fields, rows: Range<usize>) -> String {
+        let mut displacement = vec![[0.0; 3]; self.mesh.nodes().len()];
+        let mut contact = vec![0u8; displacement.len()];
+        for row in rows {
+            let node = i64::try_from(fields.node[row]).ok().and_then(|number| self.mesh.node(number));
+            let Some(node) = node else { continue };
+            displacement[node] = fields.displacement.map(|column| column[row]);
+            contact[node] = match fields.contact[row].as_str() {
+                "" => 0,
+                "open" => 1,
+                "touch" => 2,
+                "stick" => 3,
+                _ => 4,
+            };
+        }
+        let bytes = displacement.iter().flatten().flat_map(|x| x.to_le_bytes());
+        let mut text = self.head.clone() + "<PointData Vectors=\"displacement\">\n";
+        text += &array("Float64", "displacement", 3, bytes);
+        text += &array("UInt8", "contact", 1, contact.into_iter());
+        text + "</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+    }
+}
+
+/// Returns the number of a cell type in `vtkCellType.h`.
+fn cell_type(shape: Shape) -> u8 {
+    match (shape.family, shape.quadratic) {
+        (Family::Triangle, false) => 5,
+        (Family::Quadrilateral, false) => 9,
+        (Family::Tetrahedron, false) => 10,
+        (Family::Hexahedron, false) => 12,
+        (Family::Wedge, false) => 13,
+        (Family::Pyramid, false) => 14,
+        (Family::Triangle, true) => 22,
+        (Family::Quadrilateral, true) => 23,
+        (Family::Tetrahedron, true) => 24,
+        (Family::Hexahedron, true) => 25,
+        (Family::Wedge, true) => 26,
+        (Family::Pyramid, true) => 27,
+    }
+}
+
+/// Returns an array in base64: its size in bytes, then its bytes.
+fn array(kind: &str, name: &str, components: usize, bytes: impl Iterator<Item = u8>) -> String {
+    let data: Vec<u8> = bytes.collect();
+    let size = u32::try_from(data.len()).unwrap_or(u32::MAX);
+    let encoded = base64(&[&size.to_le_bytes()[..], &data].concat());
+    format!(
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">\n{encoded}\n</DataArray>\n"
+    )
+}
+
+fn base64(bytes: &[u8]) -> String {
+    let letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for part in bytes.chunks(3) {
+        let value = (0..3).fold(0u32, |value, i| value << 8 | u32::from(part.get(i).copied().unwrap_or(0)));
+        for i in 0..4 {
+            let letter = letters[(value >> (18 - 6 * i) & 63) as usize];
+            text.push(if i <= part.len() { char::from(letter) } else { '=' });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use stickslip_formats::mesh::read_bytes;
+    use stickslip_study::dataset::{CellValues, Column};
+
+    #[test]
+    fn base64_of_every_length() {
+        // RFC 4648, section 10
+        for (bytes, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+    }
+
+    /// Two orbits of two instants on a tetrahedron; the third node is not in the table.
+    #[test]
+    fn a_list_for_every_orbit_and_a_file_for_every_instant() {
+        let deck = "*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n";
+        let source = MeshSource { mesh: read_bytes(deck.as_bytes()).unwrap(), length: 1e-3 };
+        let repeat = |one: &[f64]| [one, one].concat();
+        let table = Table {
+            name: "fields".to_owned(),
+            columns: vec![
+                Column::numbers("frequency_Hz", [[10.0; 4], [20.0; 4]].concat()),
+                Column::numbers("time_s", repeat(&[0.0, 0.0, 0.5, 0.5])),
+                Column { name: "node".to_owned(), values: CellValues::Integer([1, 4].repeat(4)) },
+                Column::numbers("x_m", (0..8).map(f64::from).collect()),
+                Column::numbers("y_m", vec![0.0; 8]),
+                Column::numbers("z_m", vec![0.0; 8]),
+                Column::texts("contact", ["", "slip+"].repeat(4).into_iter().map(str::to_owned).collect()),
+            ],
+        };
+        let dataset = Dataset { tables: vec![table], mesh: Some(Arc::new(source)), ..Dataset::default() };
+        let files = files(&dataset).unwrap();
+        let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+        let expected = [
+            "fields_1_0000.vtu",
+            "fields_1_0001.vtu",
+            "fields_1.pvd",
+            "fields_2_0000.vtu",
+            "fields_2_0001.vtu",
+            "fields_2.pvd",
+        ];
+        assert_eq!(names, expected);
+        let text = String::from_utf8(files[4].content.clone()).unwrap();
+        // the displacements 6 and 7 of the first and the last node
+        let bytes: Vec<u8> = [6.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.0, 0.0, 0.0]
+            .iter()
+            .flat_map(|x: &f64| x.to_le_bytes())
+            .collect();
+        assert!(text.contains(&base64(&[&96u32.to_le_bytes()[..], &bytes].concat())));
+        assert!(text.contains(&base64(&[4, 0, 0, 0, 0, 0, 0, 4])));
+        // the reader of meshes reads it back, in metres
+        let back = read_bytes(text.as_bytes()).unwrap();
+        assert_eq!((back.nodes().len(), back.elements().len()), (4, 1));
+        assert_eq!(back.nodes()[2].position, [0.0, 3e-3, 0.0]);
+    }
+}

@@ -1,0 +1,296 @@
+//! Contacts from geometry: a pair of faces becomes a joint for every node of the first face.
+//!
+//! The node `a` is joined to the closest point of the second face, as a sum of that face's nodes
+//! with the values of their shape functions, or to the ground. The normal is the mean of the
+//! normal of the node and the opposite of that of the face. The law states stiffnesses, forces and
+//! dampings per area; the joint has them times the area of the node
+//! ([`stickslip_formats::mesh::Face`] tells how areas are shared).
+
+use super::{MeshSource, entry, node_entry, set_problem, table_of_node};
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledEntry, CompiledTable, CompiledValue, Environment, Expected, LawCoordinate};
+use crate::syntax::error::{Location, Problem};
+use crate::syntax::format::{format_significant, plural_suffix};
+use crate::syntax::key::Bounds;
+use serde_json::{Value as Json, json};
+use stickslip::dimension::Dimension;
+use stickslip::model::GROUND;
+use stickslip_formats::mesh::{Patch, PatchNode, ProjectedPoint};
+
+/// A contact after its pairs are known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ContactSummary {
+    /// Name of the contact; its joints are `NAME_NODE`.
+    pub name: String,
+    /// The names of both sets, or the ground.
+    pub between: [String; 2],
+    /// Number of joints.
+    pub joints: usize,
+    /// Area of the joints and of the first face, m².
+    pub area: [f64; 2],
+    /// Smallest and largest distance along the normal, m, negative where the faces overlap; `None`
+    /// on the ground.
+    pub gaps: Option<[f64; 2]>,
+    /// Largest angle between both faces, rad.
+    pub angle: f64,
+    /// Nodes of the first face that no face opposes within the distance.
+    pub unpaired: Vec<i64>,
+}
+
+/// The places and joints of a contact.
+pub(crate) struct ExpandedContact {
+    pub places: Vec<CompiledTable>,
+    pub joints: Vec<CompiledTable>,
+    pub summary: ContactSummary,
+}
+
+/// A node of the first face with its counterpart.
+struct Pair<'a> {
+    node: &'a PatchNode,
+    /// The point of the second face; `None` on the ground.
+    opposite: Option<ProjectedPoint>,
+    /// Unit normal out of the first face.
+    normal: [f64; 3],
+}
+
+/// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
+const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
+
+/// Returns the places and joints that an entry of `[[contact]]` states.
+pub(crate) fn expand(contact: &CompiledTable, source: &MeshSource) -> Result<ExpandedContact, Problem> {
+    let (sets, location) = between(contact)?;
+    let patch = |set: &str| source.mesh.patch(set).map_err(|error| set_problem(error, "between", location));
+    let first = patch(&sets[0])?;
+    let second = if sets[1] == GROUND { None } else { Some(patch(&sets[1])?) };
+    let limit = match distance(contact)? {
+        Some(meters) => meters / source.length,
+        None => second.as_ref().map_or(0.0, default_distance),
+    };
+    let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
+    for node in first.nodes() {
+        match &second {
+            None => pairs.push(Pair { node, opposite: None, normal: node.normal }),
+            Some(second) => match second.closest(node).filter(|found| found.point.distance <= limit) {
+                Some(found) => {
+                    let normal = unit([0, 1, 2].map(|axis| node.normal[axis] - found.point.normal[axis]));
+                    pairs.push(Pair { node, opposite: Some(found), normal });
+                }
+                None => unpaired.push(source.number(node.node)),
+            },
+        }
+    }
+    if pairs.is_empty() {
+        let message = format!("no node of {} has a face of {} in front of it within the distance", sets[0], sets[1]);
+        let help = "state a larger `distance`; `stickslip inspect` shows the extent of the mesh";
+        return Err(Problem::new(location, "between", message).help(help));
+    }
+    let mut expanded = ExpandedContact {
+        places: Vec::new(),
+        joints: Vec::new(),
+        summary: summary(contact, source, &first, &pairs, unpaired),
+    };
+    for pair in &pairs {
+        let number = source.number(pair.node.node);
+        let area = pair.node.area * source.length * source.length;
+        let mut side = |suffix: &str, rows: CompiledEntry| {
+            expanded.places.push(place(contact, &format!("{number}_{suffix}"), rows, Some(pair.normal)));
+        };
+        side("a", node_entry(number, location));
+        if let Some(opposite) = &pair.opposite {
+            side("b", opposite_rows(opposite, source, location));
+        }
+        expanded.joints.push(joint(contact, number, pair.opposite.is_some(), area));
+    }
+    Ok(expanded)
+}
+
+/// Returns stand-ins for the places and joints of these nodes, if the mesh is not read.
+pub(crate) fn placeholders(contact: &CompiledTable, numbers: &[i64]) -> Result<ExpandedContact, Problem> {
+    let (sets, location) = between(contact)?;
+    let is_pair = sets[1] != GROUND;
+    let mut expanded = ExpandedContact { places: Vec::new(), joints: Vec::new(), summary: ContactSummary::default() };
+    for number in numbers {
+        for suffix in ["a", "b"].into_iter().take(1 + usize::from(is_pair)) {
+            expanded.places.push(place(contact, &format!("{number}_{suffix}"), node_entry(*number, location), None));
+        }
+        expanded.joints.push(joint(contact, *number, is_pair, 1.0));
+    }
+    Ok(expanded)
+}
+
+/// Returns the names of both sets, and where they stand.
+fn between(contact: &CompiledTable) -> Result<([String; 2], &Location), Problem> {
+    let location = contact.location_of("between", None);
+    match contact.entry("between").map(|entry| &entry.value) {
+        Some(CompiledValue::Names(names)) if names.len() == 2 => {
+            Ok(([names[0].0.clone(), names[1].0.clone()], location))
+        }
+        _ => Err(Problem::new(location, "between", "a contact is between two sets of the mesh")
+            .help("write between = [\"PADS\", \"DAMPER_TOP\"], or [\"PADS\", \"ground\"]")),
+    }
+}
+
+/// Returns the stated distance, m. It decides which joints exist, so no parameter may change it.
+fn distance(contact: &CompiledTable) -> Result<Option<f64>, Problem> {
+    let Some(CompiledValue::Quantity { quantity, example, .. }) = contact.entry("distance").map(|entry| &entry.value)
+    else {
+        return Ok(None);
+    };
+    if quantity.expression.parameters().next().is_some() {
+        return Err(quantity
+            .problem("distance", "a parameter cannot change which nodes are in contact")
+            .help("write a number with its unit"));
+    }
+    let expected = Expected { dimension: Dimension::LENGTH, within: Bounds::Positive };
+    quantity.number("distance", expected, example, &Environment { names: &[], values: Vec::new() }).map(Some)
+}
+
+/// Returns a tenth of the size of a face, the square root of its area.
+fn default_distance(patch: &Patch) -> f64 {
+    0.1 * (patch.area() / patch.faces().len() as f64).sqrt()
+}
+
+fn unit(vector: [f64; 3]) -> [f64; 3] {
+    let length = dot(vector, vector).sqrt();
+    vector.map(|component| component / length)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Returns the row of each direction at a point of the second face: the node on which it lies, or
+/// the weighted sum of the face's nodes.
+fn opposite_rows(opposite: &ProjectedPoint, source: &MeshSource, location: &Location) -> CompiledEntry {
+    let nodes = opposite.nodes.iter().filter(|(_, weight)| weight.abs() > NEGLIGIBLE_WEIGHT);
+    let nodes: Vec<(i64, f64)> = nodes.map(|(node, weight)| (source.number(*node), *weight)).collect();
+    if let [(number, _)] = nodes[..] {
+        return node_entry(number, location);
+    }
+    let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
+    let row = |along: &str| nodes.iter().map(|(number, weight)| (format!("{number}.{along}"), weight / sum)).collect();
+    entry("sum", ResolvedValue::Sums(["x", "y", "z"].map(row).to_vec()), location)
+}
+
+fn place(contact: &CompiledTable, ending: &str, rows: CompiledEntry, normal: Option<[f64; 3]>) -> CompiledTable {
+    let name = format!("{}_{ending}", contact.name().unwrap_or_default());
+    let location = rows.location.clone();
+    let mut entries = vec![entry("name", ResolvedValue::Text(name.clone()), contact.location_of("name", None)), rows];
+    entries.extend(normal.map(|normal| entry("normal", ResolvedValue::Vector(normal), &location)));
+    if normal.is_some() {
+        entries.extend(contact.entry("tangent").cloned());
+    } else {
+        let frame = ["t1", "t2", "n"].map(str::to_owned).to_vec();
+        entries.push(entry("directions", ResolvedValue::Names(frame), &location));
+    }
+    table_of_node(contact, &name, entries)
+}
+
+fn joint(contact: &CompiledTable, number: i64, is_pair: bool, area: f64) -> CompiledTable {
+    let name = format!("{}_{number}", contact.name().unwrap_or_default());
+    let location = contact.location_of("between", None);
+    let ends = [format!("{name}_a"), if is_pair { format!("{name}_b") } else { GROUND.to_owned() }];
+    let ends = CompiledValue::Names(ends.into_iter().map(|end| (end, location.clone())).collect());
+    let mut entries = vec![entry("name", ResolvedValue::Text(name.clone()), contact.location_of("name", None))];
+    entries.push(CompiledEntry { key: "between", location: location.clone(), value: ends });
+    entries.extend(contact.entry("law").cloned().map(|mut law| {
+        if let CompiledValue::Law(_, table, coordinate) = &mut law.value {
+            *coordinate = LawCoordinate::Face { area };
+            per_area(table);
+        }
+        law
+    }));
+    table_of_node(contact, &name, entries)
+}
+
+/// Gives the quantities of a law the dimensions per area.
+fn per_area(law: &mut CompiledTable) {
+    for entry in &mut law.entries {
+        if let CompiledValue::Quantity { dimension, example, .. } = &mut entry.value {
+            *dimension = LawCoordinate::Face { area: 1.0 }.dimension(*dimension);
+            *example = match *dimension {
+                PRESSURE => "\"2 MPa\"",
+                Dimension::CUBIC_STIFFNESS => "\"1e3 N/mm^3\"",
+                _ => example,
+            };
+        }
+    }
+}
+
+/// Force per area.
+const PRESSURE: Dimension = Dimension { kg: 1, m: -1, s: -2, rad: 0 };
+
+fn summary(
+    contact: &CompiledTable,
+    source: &MeshSource,
+    first: &Patch,
+    pairs: &[Pair],
+    unpaired: Vec<i64>,
+) -> ContactSummary {
+    let gap = |pair: &Pair| {
+        let between = &pair.opposite.as_ref()?.point.position;
+        Some(dot([0, 1, 2].map(|axis| between[axis] - pair.node.position[axis]), pair.normal) * source.length)
+    };
+    let gaps = pairs.iter().filter_map(gap).fold(None, |range: Option<[f64; 2]>, gap| {
+        let [low, high] = range.unwrap_or([gap, gap]);
+        Some([low.min(gap), high.max(gap)])
+    });
+    let angle = |pair: &Pair| -> f64 {
+        pair.opposite.as_ref().map_or(0.0, |found| (-dot(pair.node.normal, found.point.normal)).clamp(-1.0, 1.0).acos())
+    };
+    let square = source.length * source.length;
+    let paired: f64 = pairs.iter().map(|pair| pair.node.area).sum();
+    ContactSummary {
+        name: contact.name().unwrap_or_default().to_owned(),
+        between: between(contact).map_or_else(|_| Default::default(), |(sets, _)| sets),
+        joints: pairs.len(),
+        area: [paired * square, first.area() * square],
+        gaps,
+        angle: pairs.iter().map(angle).fold(0.0, f64::max),
+        unpaired,
+    }
+}
+
+impl ContactSummary {
+    /// Describes the contact in a line.
+    pub(crate) fn text(&self) -> String {
+        let Self { name, between: [first, second], joints, area: [paired, all], gaps, angle, unpaired } = self;
+        let number = |value: f64| format_significant(value, 4);
+        let mut text = format!(
+            "{name}: {joints} joint{} of {first} on {second}, area {} of {} mm^2",
+            plural_suffix(*joints),
+            number(paired * 1e6),
+            number(all * 1e6)
+        );
+        if let Some([low, high]) = gaps {
+            text += &format!(
+                ", gaps {} to {} mm, angles up to {} deg",
+                number(low * 1e3),
+                number(high * 1e3),
+                number(angle.to_degrees())
+            );
+        }
+        if !unpaired.is_empty() {
+            // Most nodes that a line lists.
+            let listed: Vec<String> = unpaired.iter().take(8).map(ToString::to_string).collect();
+            let more = if unpaired.len() > listed.len() { ", …" } else { "" };
+            let (count, listed) = (unpaired.len(), listed.join(", "));
+            text += &format!("; no counterpart for {count} node{}: {listed}{more}", plural_suffix(count));
+        }
+        text
+    }
+
+    /// Returns the contact for the record of a run, in SI.
+    pub(crate) fn to_json(&self) -> Json {
+        json!({
+            "name": self.name,
+            "between": self.between,
+            "joints": self.joints,
+            "area_m2": self.area[0],
+            "face_area_m2": self.area[1],
+            "gaps_m": self.gaps,
+            "largest_angle_rad": self.angle,
+            "unpaired_nodes": self.unpaired,
+        })
+    }
+}

@@ -1,0 +1,93 @@
+//! Reads the mesh of `[structure]`, and replaces entries on its sets by places and joints of single
+//! nodes.
+
+use super::reader::Reader;
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::mesh::{MeshSource, MeshUse, contact, mentioned_nodes, sets};
+use crate::compile::source_model::ModelLists;
+use crate::syntax::error::Problem;
+use crate::syntax::schema::MAX_ELEMENTS;
+use crate::syntax::unit_sets;
+use std::sync::Arc;
+use stickslip_formats::mesh;
+
+impl Reader {
+    /// Replaces all places and contacts on sets of the mesh of `structure`. Returns the
+    /// mesh and the contacts; `None` if a problem was found.
+    pub(super) fn expand_sets(&mut self, lists: &mut ModelLists, structure: Option<&CompiledTable>) -> Option<MeshUse> {
+        let before = self.problems.len();
+        let mesh = if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table)) };
+        let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
+        let mut summaries = Vec::new();
+        for place in places {
+            match self.places_on_sets(place, mesh.as_ref()) {
+                Ok(places) => lists.place.extend(places),
+                Err(problem) => self.problems.push(problem),
+            }
+        }
+        for contact in &contacts {
+            let expanded = match &mesh {
+                Some(mesh) => contact::expand(contact, mesh),
+                None if self.study_file_only => contact::placeholders(contact, &self.mentioned(contact)),
+                None => Err(no_mesh(contact, "between")),
+            };
+            match expanded {
+                Ok(expanded) => {
+                    lists.place.extend(expanded.places);
+                    lists.joint.extend(expanded.joints);
+                    summaries.push(expanded.summary);
+                }
+                // a mesh that cannot be read was reported already
+                Err(problem) if self.problems.len() == before || mesh.is_some() => self.problems.push(problem),
+                Err(_) => {}
+            }
+        }
+        if let Some(contact) = contacts.first().filter(|_| lists.joint.len() > MAX_ELEMENTS) {
+            let message =
+                format!("{} joints with those of the contacts; the limit is {MAX_ELEMENTS}", lists.joint.len());
+            self.problems
+                .push(Problem::new(&contact.location, "contact", message).help("use a coarser mesh of the faces"));
+        }
+        (self.problems.len() == before).then(|| MeshUse { source: mesh.map(Arc::new), contacts: summaries })
+    }
+
+    /// Reads the mesh of a structure; `None` without a mesh, or if it cannot be read.
+    fn mesh(&mut self, structure: &CompiledTable) -> Option<MeshSource> {
+        let entry = structure.entry("mesh")?;
+        let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
+        let units = match &structure.entry("units")?.value {
+            CompiledValue::Fixed(ResolvedValue::Text(units)) => unit_sets::find(units)?,
+            _ => return None,
+        };
+        match mesh::read(self.path_of(name)) {
+            Ok(mesh) => Some(MeshSource { mesh, length: units.length }),
+            Err(mut error) => {
+                let help = std::mem::take(&mut error.remedy);
+                let message = error.to_string().trim_end_matches("; ").to_owned();
+                self.problems.push(Problem::new(&entry.location, "mesh", message).help(help));
+                None
+            }
+        }
+    }
+
+    fn places_on_sets(&self, place: CompiledTable, mesh: Option<&MeshSource>) -> Result<Vec<CompiledTable>, Problem> {
+        match mesh {
+            Some(mesh) => sets::expand(place, mesh),
+            None if place.entry("set").is_none() => Ok(vec![place]),
+            None if self.study_file_only => Ok(sets::places_of_nodes(&place, &self.mentioned(&place))),
+            None => Err(no_mesh(&place, "set")),
+        }
+    }
+
+    /// Returns the nodes of a set or contact that the study file mentions.
+    fn mentioned(&self, table: &CompiledTable) -> Vec<i64> {
+        let text = self.sources.first().map_or("", |source| source.text.as_str());
+        table.name().map_or_else(Vec::new, |name| mentioned_nodes(text, name))
+    }
+}
+
+fn no_mesh(table: &CompiledTable, key: &str) -> Problem {
+    Problem::new(table.location_of(key, None), key, "a set needs a mesh, but the study has none")
+        .help("add to [structure] mesh = \"blade.inp\", the mesh of its matrices")
+}

@@ -1,0 +1,312 @@
+//! Meshes in a study: places on sets, and contacts from geometry.
+
+use std::fmt::Write;
+use std::path::Path;
+use stickslip_study::dataset::{Column, Dataset, Table};
+use stickslip_study::run::{Context, run};
+use stickslip_study::summary::ModelSummary;
+use stickslip_study::{Study, StudyError, read_file, read_for_results};
+
+/// A node: its number and its position in millimetres.
+type Node = (i64, [f64; 3]);
+
+/// A block of hexahedra of 1 mm with 3 x 3 x 2 nodes, from 1, and above it at `gap` (mm) a lid:
+/// nodes from 101, either on the same grid or at the corners only.
+fn nodes(gap: f64, same_grid: bool) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    let grid = |first: i64, x: &[f64], z: [f64; 2], nodes: &mut Vec<Node>| {
+        let points = z.iter().flat_map(|z| x.iter().flat_map(move |y| x.iter().map(move |x| [*x, *y, *z])));
+        nodes.extend(points.enumerate().map(|(i, at)| (first + i as i64, at)));
+    };
+    grid(1, &[0.0, 1.0, 2.0], [0.0, 1.0], &mut nodes);
+    let lid: &[f64] = if same_grid { &[0.0, 1.0, 2.0] } else { &[0.0, 2.0] };
+    grid(101, lid, [1.0 + gap, 2.0 + gap], &mut nodes);
+    nodes
+}
+
+/// The hexahedra of a grid of `n` x `n` nodes from `first`.
+fn bricks(first: i64, n: i64) -> Vec<[i64; 8]> {
+    let corner = |i: i64, j: i64, k: i64| first + i + n * j + n * n * k;
+    let brick = |i: i64, j: i64| {
+        let lower = |k| [corner(i, j, k), corner(i + 1, j, k), corner(i + 1, j + 1, k), corner(i, j + 1, k)];
+        let mut all = [0; 8];
+        all[..4].copy_from_slice(&lower(0));
+        all[4..].copy_from_slice(&lower(1));
+        all
+    };
+    (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| (i, j))).map(|(i, j)| brick(i, j)).collect()
+}
+
+/// Writes a deck with the sets FOOT, PADS and LID, and matrices: a mass and a spring to the ground
+/// at every row, and springs along the edges of the bricks.
+fn write_files(folder: &Path, gap: f64, same_grid: bool) {
+    let nodes = nodes(gap, same_grid);
+    let elements = [bricks(1, 3), bricks(101, if same_grid { 3 } else { 2 })].concat();
+    let mut deck = String::from("*NODE\n");
+    nodes.iter().for_each(|(number, [x, y, z])| writeln!(deck, "{number}, {x}, {y}, {z}").unwrap());
+    deck += "*ELEMENT, TYPE=C3D8, ELSET=ALL\n";
+    for (i, element) in elements.iter().enumerate() {
+        let all: Vec<String> = element.iter().map(ToString::to_string).collect();
+        writeln!(deck, "{}, {}", i + 1, all.join(", ")).unwrap();
+    }
+    for (name, z, first) in [("FOOT", 0.0, 1), ("PADS", 1.0, 1), ("LID", 1.0 + gap, 101)] {
+        writeln!(deck, "*NSET, NSET={name}").unwrap();
+        for (number, _) in nodes.iter().filter(|(number, at)| at[2] == z && (*number >= 101) == (first == 101)) {
+            writeln!(deck, "{number},").unwrap();
+        }
+    }
+    let index = |number: &i64| nodes.iter().position(|(known, _)| known == number).unwrap();
+    let n = 3 * nodes.len();
+    let mut stiffness = vec![0.0; n * n];
+    for row in 0..n {
+        // different springs keep the motion free of symmetries
+        stiffness[row * n + row] = 100.0 + 3.0 * ((row * 7) % 11) as f64;
+    }
+    let edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)];
+    for (element, (a, b)) in elements.iter().flat_map(|element| edges.iter().map(move |edge| (element, *edge))) {
+        for along in 0..3 {
+            let (a, b) = (3 * index(&element[a]) + along, 3 * index(&element[b]) + along);
+            for (row, column, value) in [(a, a, 500.0), (b, b, 500.0), (a, b, -500.0), (b, a, -500.0)] {
+                stiffness[row * n + column] += value;
+            }
+        }
+    }
+    let (mut sti, mut mas, mut dof) = (String::new(), String::new(), String::new());
+    for row in 0..n {
+        for column in (0..=row).filter(|column| stiffness[row * n + column] != 0.0) {
+            writeln!(sti, "{} {} {:e}", column + 1, row + 1, stiffness[row * n + column]).unwrap();
+        }
+        writeln!(mas, "{} {} 1e-6", row + 1, row + 1).unwrap();
+        writeln!(dof, "{}.{}", nodes[row / 3].0, row % 3 + 1).unwrap();
+    }
+    for (name, text) in [("block.sti", sti), ("block.mas", mas), ("block.dof", dof), ("block.inp", deck)] {
+        std::fs::write(folder.join(name), text).unwrap();
+    }
+}
+
+const HEAD: &str = "schema = 1\n[parameters]\nmu = 0.3\nkt = \"200 N/mm^3\"\n[structure]\nstiffness = \"block.sti\"\nmass = \"block.mas\"\n\
+    dofs = \"block.dof\"\nunits = \"mm-t-s\"\nmesh = \"block.inp\"\nrayleigh = { stiffness = \"1e-6 s\" }\nreduce = false\n";
+
+const STUDY: &str = "[[force]]\non = \"tip\"\namplitude = \"30 N\"\n[[place]]\nname = \"tip\"\ndof = \"1.x\"\n\
+    [study]\nkind = \"response\"\nfrequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n\
+    [method]\nkind = \"harmonic-balance\"\nharmonics = 5\ntolerance = 0.5\n";
+
+const CONTACT: &str = "[[contact]]\nname = \"pad\"\nbetween = [\"PADS\", \"LID\"]\ntangent = [1, 1, 0]\n\
+    law = { kind = \"friction-contact\", tangential = \"kt\", normal = \"300 N/mm^3\", friction = \"mu\", preload = \"10 MPa\" }\n";
+
+fn read(folder: &Path, parts: &[&str]) -> Result<Study, StudyError> {
+    let path = folder.join("study.toml");
+    std::fs::write(&path, parts.concat()).unwrap();
+    read_file(&path, &[])
+}
+
+fn dataset(folder: &Path, parts: &[&str]) -> Dataset {
+    let study = read(folder, parts).unwrap_or_else(|error| panic!("{error}\n{}", parts.concat()));
+    run(&study, &Context::without_progress(1)).unwrap()
+}
+
+/// Checks that all columns of both runs have the same names and values. Both have slip.
+fn check_equal(found: &Dataset, expected: &Dataset) {
+    let (found, expected) = (&found.tables[0], &expected.tables[0]);
+    let names = |columns: &[Column]| columns.iter().map(|column| column.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&found.columns), names(&expected.columns));
+    let mut compared = 0;
+    for name in names(&found.columns).iter().filter(|name| name.contains("amplitude_m") || name.contains("mean_m")) {
+        let (a, b) = (found.numbers(name).unwrap(), expected.numbers(name).unwrap());
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() <= 1e-12 * b.abs() && b.is_finite(), "{name}: {a} {b}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 20, "{compared}");
+    let slips = names(&found.columns).into_iter().filter(|name| name.ends_with("slip_fraction"));
+    assert!(slips.filter(|name| found.numbers(name).unwrap()[0] > 0.01).count() > 2);
+}
+
+/// Areas of a bilinear face of 1 mm²: each node has a quarter of every face around it.
+fn area(at: [f64; 3]) -> f64 {
+    at[..2].iter().map(|x| if *x == 1.0 { 1.0 } else { 0.5 }).product()
+}
+
+/// Returns the joint of a node by hand: the rows of its counterpart, and the law times its area.
+fn by_hand(number: i64, at: [f64; 3], rows: &str) -> String {
+    let area = area(at);
+    format!(
+        "[[place]]\nname = \"pad_{number}_a\"\nnodes = [\"{number}\"]\nnormal = [0, 0, 1]\ntangent = [1, 1, 0]\n\
+         [[place]]\nname = \"pad_{number}_b\"\n{rows}\nnormal = [0, 0, 1]\ntangent = [1, 1, 0]\n\
+         [[joint]]\nname = \"pad_{number}\"\nbetween = [\"pad_{number}_a\", \"pad_{number}_b\"]\n\
+         law = {{ kind = \"friction-contact\", tangential = \"{} N/mm\", normal = \"{} N/mm\", friction = 0.3, preload = \"{} N\" }}\n",
+        200.0 * area,
+        300.0 * area,
+        10.0 * area
+    )
+}
+
+#[test]
+fn contacts_of_equal_meshes_are_the_joints_of_their_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let found = dataset(folder.path(), &[HEAD, STUDY, CONTACT]);
+    let pads = nodes(0.01, true).into_iter().filter(|(number, at)| *number < 101 && at[2] == 1.0);
+    let joints: String =
+        pads.map(|(number, at)| by_hand(number, at, &format!("nodes = [\"{}\"]", number + 91))).collect();
+    check_equal(&found, &dataset(folder.path(), &[&HEAD.replace("kt = \"200 N/mm^3\"\n", ""), STUDY, &joints]));
+    // a parameter of the law can be varied
+    let wear = STUDY.replace("peaks = false", "peaks = false\nvary = { mu = [0.1, 0.3] }");
+    let varied = dataset(folder.path(), &[HEAD, &wear, CONTACT]);
+    assert_eq!(varied.tables[0].rows(), 4);
+}
+
+/// The lid has nodes at its corners only: the counterpart of a node is a bilinear mean of them.
+#[test]
+fn contacts_of_different_meshes_are_weighted_sums() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, false);
+    let found = dataset(folder.path(), &[HEAD, STUDY, CONTACT]);
+    let pads = nodes(0.01, false).into_iter().filter(|(number, at)| *number < 101 && at[2] == 1.0);
+    let rows = |at: [f64; 3]| {
+        let (x, y) = (at[0] / 2.0, at[1] / 2.0);
+        let weights = [(101, (1.0 - x) * (1.0 - y)), (102, x * (1.0 - y)), (103, (1.0 - x) * y), (104, x * y)];
+        let sum = |along: &str| {
+            let parts: Vec<String> = weights
+                .iter()
+                .filter(|(_, weight)| *weight > 0.0)
+                .map(|(node, weight)| format!("\"{node}.{along}\" = {weight}"))
+                .collect();
+            format!("{{ {} }}", parts.join(", "))
+        };
+        format!("sum = [{}, {}, {}]", sum("x"), sum("y"), sum("z"))
+    };
+    let joints: String = pads.map(|(number, at)| by_hand(number, at, &rows(at))).collect();
+    check_equal(&found, &dataset(folder.path(), &[&HEAD.replace("kt = \"200 N/mm^3\"\n", ""), STUDY, &joints]));
+}
+
+#[test]
+fn check_lists_contacts_with_gaps_and_nodes_without_counterpart() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let summary = |contact: &str| ModelSummary::new(&read(folder.path(), &[HEAD, STUDY, contact]).unwrap()).unwrap();
+    let found = summary(CONTACT);
+    let [pad] = &found.contacts[..] else { panic!("one contact") };
+    assert_eq!((pad.joints, pad.unpaired.len(), pad.angle), (9, 0, 0.0));
+    assert!((pad.area[0] - 4e-6).abs() < 1e-18 && (pad.area[1] - 4e-6).abs() < 1e-18);
+    assert!(pad.gaps.unwrap().iter().all(|gap| (gap - 1e-5).abs() < 1e-12), "{:?}", pad.gaps);
+    let words = "pad: 9 joints of PADS on LID, area 4 of 4 mm^2, gaps 0.01 to 0.01 mm, angles up to 0 deg";
+    assert!(found.to_string().contains(words), "{found}");
+    let ground = summary(&CONTACT.replace("\"LID\"", "\"ground\""));
+    assert!(ground.to_string().contains("9 joints of PADS on ground") && ground.joints.len() == 27, "{ground}");
+    // the foot is 1 mm below the lid's upper neighbour: all of its nodes look away from it
+    let error = read(folder.path(), &[HEAD, STUDY, &CONTACT.replace("PADS", "FOOT")]).unwrap_err().to_string();
+    assert!(error.contains("no node of FOOT"), "{error}");
+}
+
+#[test]
+fn places_on_sets_are_those_of_their_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let on_sets = "[[place]]\nname = \"foot\"\nset = \"foot\"\n[[place]]\nname = \"mean\"\nnodes = [\"FOOT\"]\n";
+    let found = dataset(folder.path(), &[HEAD, STUDY, on_sets]);
+    let mut by_hand: String = (1..=9).map(|n| format!("[[place]]\nname = \"foot_{n}\"\nnodes = [\"{n}\"]\n")).collect();
+    by_hand += "[[place]]\nname = \"mean\"\nnodes = [\"1\", \"2\", \"3\", \"4\", \"5\", \"6\", \"7\", \"8\", \"9\"]\n";
+    let expected = dataset(folder.path(), &[HEAD, STUDY, &by_hand]);
+    let amplitudes = found.tables[0].columns.iter().filter(|column| column.name.ends_with("amplitude_m"));
+    let mut compared = 0;
+    for column in amplitudes {
+        let values = |found: &Dataset| found.tables[0].numbers(&column.name).map(<[f64]>::to_vec);
+        assert!(values(&found).is_some() && values(&found) == values(&expected), "{}", column.name);
+        compared += 1;
+    }
+    assert_eq!(compared, 1 + 9 * 3 + 3);
+    assert!(found.tables[0].numbers("foot_3_x_amplitude_m").unwrap()[0] > 0.0);
+}
+
+/// Stored results are read without the mesh; names that the file mentions are known.
+#[test]
+fn results_are_read_without_the_mesh() {
+    let on_sets = "[[place]]\nname = \"foot\"\nset = \"FOOT\"\n";
+    let figure = "[figure]\nonly = [\"foot_3.x\", \"pad_12\"]\n";
+    let text = [HEAD, &STUDY.replace("\"tip\"\namp", "\"foot_7.z\"\namp"), CONTACT, on_sets, figure].concat();
+    read_for_results("study.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn wrong_sets_and_contacts_are_refused_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let refused = |head: &str, contact: &str| {
+        let error = read(folder.path(), &[head, STUDY, contact]).expect_err(contact);
+        format!("{error} {}", error.help_text().unwrap_or_default())
+    };
+    let without = HEAD.replace("mesh = \"block.inp\"\n", "");
+    let place = "[[place]]\nname = \"foot\"\nset = \"FEET\"\n";
+    for (head, contact, words) in [
+        (HEAD, CONTACT.replace("\"LID\"", "\"LIDS\""), &["no set `LIDS`", "FOOT, PADS, LID"][..]),
+        (HEAD, CONTACT.replace("\"LID\"", "\"FOOT\""), &["no node of PADS", "`distance`"]),
+        (HEAD, CONTACT.replace(", \"LID\"", ""), &["between two sets"]),
+        (HEAD, CONTACT.replace("\"kt\"", "\"200 N/mm\""), &["N/m^3", "N/mm^3"]),
+        (HEAD, CONTACT.replace("\"10 MPa\"", "\"10 N\""), &["2 MPa"]),
+        (HEAD, CONTACT.to_owned() + "distance = \"kt*1 m^4/N\"\n", &["a parameter cannot change"]),
+        (HEAD, CONTACT.replace("[1, 1, 0]", "[0, 0, 1]"), &["tangent", "pad_10_a"]),
+        (HEAD, place.to_owned(), &["no set `FEET`"]),
+        (HEAD, place.replace("FEET", "FOOT") + "dof = \"1.x\"\n", &["exclude each other"]),
+        (&without, CONTACT.to_owned(), &["needs a mesh", "mesh = \"blade.inp\""]),
+        (&without, place.to_owned(), &["needs a mesh"]),
+        (&HEAD.replace("block.inp", "none.inp"), CONTACT.to_owned(), &["none.inp"]),
+        (&HEAD.replace("block.inp", "block.sti"), CONTACT.to_owned(), &["no known format of a mesh"]),
+    ] {
+        let said = refused(head, &contact);
+        assert!(words.iter().all(|words| said.contains(words)), "{words:?}: {said}");
+    }
+}
+
+/// Displacements of nodes that are places are those of the places, with and without a reduction;
+/// the displacements of the other nodes agree between both within the error of the reduction.
+#[test]
+fn fields_are_the_displacements_of_all_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let corner = "[[place]]\nname = \"corner\"\nnodes = [\"118\"]\n";
+    let study = STUDY.replace("kind = \"response\"", "kind = \"orbit\"\nfields = 8\nsamples = 8");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "frequency = \"1500 Hz\"\n");
+    let of = |head: &str| {
+        let found = dataset(folder.path(), &[head, &study, CONTACT, corner]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap().clone();
+        (table("orbit"), table("fields"))
+    };
+    let whole = of(HEAD);
+    let reduced = of(&HEAD.replace("reduce = false", "reduce = { modes = 20 }"));
+    for (orbit, fields) in [&whole, &reduced] {
+        assert_eq!(fields.rows(), 8 * 36);
+        let (times, at) = (fields.numbers("time_s").unwrap(), orbit.numbers("time_s").unwrap());
+        let nodes = fields.integers("node").unwrap();
+        for row in (0..fields.rows()).filter(|row| [16, 118].contains(&nodes[*row])) {
+            // the table of the orbit has the switches, too
+            let instant = at.iter().position(|time| (time - times[row]).abs() < 1e-15).unwrap();
+            if nodes[row] == 118 {
+                for axis in ["x", "y", "z"] {
+                    let place = orbit.numbers(&format!("corner_{axis}_displacement_m")).unwrap()[instant];
+                    let node = fields.numbers(&format!("{axis}_m")).unwrap()[row];
+                    assert!((place - node).abs() < 1e-12 * place.abs().max(1e-6), "{place} {node}");
+                }
+            } else {
+                assert_eq!(fields.texts("contact").unwrap()[row], orbit.texts("pad_16_contact").unwrap()[instant]);
+            }
+        }
+        let states = fields.texts("contact").unwrap();
+        assert!(states.iter().zip(nodes).all(|(state, node)| state.is_empty() != (10..=18).contains(node)));
+        assert!(states.iter().any(|state| state.starts_with("slip")) && states.iter().any(|state| state == "stick"));
+    }
+    // the error of all nodes falls with the number of modes
+    let values = |fields: &Table| ["x_m", "y_m", "z_m"].map(|axis| fields.numbers(axis).unwrap().to_vec()).concat();
+    let expected = values(&whole.1);
+    let size = expected.iter().fold(0.0f64, |size, x| size.max(x.abs()));
+    let error = |(_, fields): &(Table, Table)| {
+        values(fields).iter().zip(&expected).map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max)
+    };
+    let finer = of(&HEAD.replace("reduce = false", "reduce = { modes = 45 }"));
+    let (coarse, fine) = (error(&reduced), error(&finer));
+    assert!(coarse < 0.05 && fine < 0.2 * coarse, "{coarse} {fine}");
+    let moved = "[[motion]]\non = \"mover\"\namplitude = \"1 um\"\n[[spring]]\nbetween = [\"mover\", \"tip\"]\nstiffness = \"1 N/mm\"\n";
+    let error = read(folder.path(), &[HEAD, &study, CONTACT, moved]).unwrap_err().to_string();
+    assert!(error.contains("imposed motions"), "{error}");
+}
