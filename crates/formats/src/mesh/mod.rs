@@ -3,7 +3,8 @@
 //! ```
 //! use stickslip_formats::mesh;
 //!
-//! let deck = b"*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n*NSET,NSET=FOOT\n1,2,3\n";
+//! let deck = b"*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n\
+//!     *ELEMENT,TYPE=C3D4\n1,1,2,3,4\n*NSET,NSET=FOOT\n1,2,3\n";
 //! let mesh = mesh::read_bytes(deck)?;
 //! assert_eq!((mesh.nodes().len(), mesh.elements().len()), (4, 1));
 //! // The outer faces whose nodes all belong to the set, with the area of each node.

@@ -224,7 +224,7 @@ fn may_succeed_elsewhere(error: &OrbitError) -> bool {
     )
 }
 
-/// Returns the largest change of an amplitude, relative to the largest amplitude of the first orbit.
+/// Returns the largest change of an amplitude, relative to the largest of the first orbit.
 fn amplitude_change(one: &Orbit, other: &Orbit) -> f64 {
     let size = one.places.iter().map(|place| place.amplitude()).fold(f64::MIN_POSITIVE, f64::max);
     let pairs = one.places.iter().zip(&other.places);

@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// });
 /// let stiffness = SparseMatrix::from_triplets(n, springs)?;
 /// let mass = SparseMatrix::from_triplets(n, (0..n).map(|i| (i, i, 0.1)))?;
-/// let end = Place { name: "end".into(), directions: Vec::new(), rows: vec![vec![(n - 1, 1.0)]], frame: None, view_of: None };
+/// let end = Place::new("end", vec![(n - 1, 1.0)]);
 /// let model = Model {
 ///     places: vec![end],
 ///     substructure: Some(Substructure {

@@ -264,7 +264,11 @@ pub struct Force {
 /// let (mass, unbalance) = (5.0, 1e-4);
 /// let model = Model {
 ///     masses: vec![Mass::new("rotor", mass)],
-///     springs: vec![Spring { between: ["rotor".into(), GROUND.into()], stiffness: 1.0, damping: 1e-3 }],
+///     springs: vec![Spring {
+///         between: ["rotor".into(), GROUND.into()],
+///         stiffness: 1.0,
+///         damping: 1e-3,
+///     }],
 ///     forces: vec![Force { on: "rotor".into(), amplitude: 0.0, phase: 0.0, harmonic: 1 }],
 ///     frequency_forces: vec![FrequencyForce { force: 0, linear: 0.0, quadratic: unbalance }],
 ///     ..Model::default()

@@ -1,4 +1,4 @@
-//! Residuals of an identification and their derivatives, for solvers and samplers of other programs.
+//! Residuals of an identification and their derivatives, for solvers of other programs.
 
 use super::problem::FitProblem;
 use super::targets;

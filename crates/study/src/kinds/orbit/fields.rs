@@ -1,4 +1,4 @@
-//! Displacements and contact states of all nodes of a structure over one period: the table `fields`.
+//! The table `fields`: displacements and contact states of all nodes over one period.
 
 use super::word;
 use crate::case::values::{Values, hertz};

@@ -1,4 +1,4 @@
-//! Forces and motions from records and signals: `data` and `signal` in `[[force]]` and `[[motion]]`.
+//! Forces and motions from records and signals: `data` and `signal` in their entries.
 //!
 //! A record is linear between its rows and zero outside of them. The motion is computed from row
 //! to row. Within an interval of length `h`, the linear part is
