@@ -123,7 +123,7 @@ pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
 /// use nalgebra::dmatrix;
 /// use stickslip_numerics::definiteness::smallest_scaled_pivot;
 /// assert_eq!(smallest_scaled_pivot(&dmatrix![1e-6, 0.0; 0.0, 4.0]), 1.0);
-/// assert_eq!(smallest_scaled_pivot(&dmatrix![4.0, 4.0; 4.0, 5.0]), 0.2);
+/// assert!((smallest_scaled_pivot(&dmatrix![4.0, 4.0; 4.0, 5.0]) - 0.2).abs() < 1e-15);
 /// assert_eq!(smallest_scaled_pivot(&dmatrix![4.0, 4.0; 4.0, 4.0]), 0.0);
 /// ```
 pub fn smallest_scaled_pivot(matrix: &DMatrix<f64>) -> f64 {
