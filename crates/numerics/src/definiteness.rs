@@ -113,24 +113,6 @@ pub fn is_semidefinite(matrix: &DMatrix<f64>) -> bool {
         || largest(matrix).is_some_and(|size| is_positive_definite(&(matrix / size), zero))
 }
 
-/// Returns the smallest pivot of the Cholesky factorization of a symmetric matrix whose diagonal
-/// is scaled to ones, or zero if the matrix is not positive definite.
-///
-/// Coordinates in which the matrix is the identity lose the digits that this pivot lacks.
-///
-/// # Example
-/// ```
-/// use nalgebra::dmatrix;
-/// use stickslip_numerics::definiteness::smallest_scaled_pivot;
-/// assert_eq!(smallest_scaled_pivot(&dmatrix![1e-6, 0.0; 0.0, 4.0]), 1.0);
-/// assert!((smallest_scaled_pivot(&dmatrix![4.0, 4.0; 4.0, 5.0]) - 0.2).abs() < 1e-15);
-/// assert_eq!(smallest_scaled_pivot(&dmatrix![4.0, 4.0; 4.0, 4.0]), 0.0);
-/// ```
-pub fn smallest_scaled_pivot(matrix: &DMatrix<f64>) -> f64 {
-    let factor = scaled(matrix).and_then(|(rows, _)| rows.cholesky());
-    factor.map_or(0.0, |factor| factor.l_dirty().diagonal().iter().fold(1.0, |least: f64, l| least.min(l * l)))
-}
-
 /// Size from which factors in blocks are faster, as in [`dense`](crate::dense).
 const BLOCKED_FROM: usize = 96;
 

@@ -4,7 +4,6 @@ use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FRE
 use crate::model::System;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use stickslip_numerics::definiteness::smallest_scaled_pivot;
 use stickslip_numerics::quadratic_modes::QuadraticModes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -30,14 +29,16 @@ impl ComplexModes {
     /// at every frequency.
     pub fn new(system: &System, direction: &DMatrix<f64>) -> Option<Self> {
         let n = system.dofs();
-        // With a smallest scaled pivot of 1e-6, the sum keeps ten digits. Pivots of consistent
-        // and reduced mass matrices are above 1e-3; those of nearly massless motions are below.
-        if smallest_scaled_pivot(system.structure().mass()) < 1e-6 {
+        // M = L Lᵀ; in q = Lᵀ x the mass matrix is the identity
+        let mass = system.structure().mass();
+        let lower = mass.clone().cholesky()?.l();
+        // These coordinates lose the digits that the pivots lack, relative to the diagonal. With
+        // 1e-6, the sum keeps ten digits. Pivots of consistent and reduced mass matrices are above
+        // 1e-3; those of nearly massless motions are below.
+        if (0..n).any(|i| lower[(i, i)].powi(2) < 1e-6 * mass[(i, i)]) {
             return None;
         }
-        // M = L Lᵀ; in q = Lᵀ x the mass matrix is the identity
-        let factor = system.structure().mass().clone().cholesky()?;
-        let to = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+        let to = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
         let back = to.transpose();
         let modes = QuadraticModes::new(
             &(&to * system.structure().damping() * &back),
