@@ -6,7 +6,6 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use stickslip::model::{Axis, DiskPart, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping, System};
-use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
 use stickslip_formats::{Matrix, Symmetry, names};
 use stickslip_numerics::sparse;
@@ -87,11 +86,6 @@ fn structure_places(model: &Model) -> Vec<Place> {
     model.places.iter().filter(of_structure).cloned().collect()
 }
 
-/// Returns the rows of all places that are not second views of a place.
-fn observed_rows(places: &[Place]) -> Vec<Row> {
-    places.iter().filter(|place| place.view_of.is_none()).flat_map(|place| place.rows.clone()).collect()
-}
-
 /// The reduced structure to save.
 struct ReducedStructure {
     system: System,
@@ -136,7 +130,7 @@ fn over_speeds(
     places: &[Place],
     exports: &StiffnessExports,
 ) -> Result<ReducedStructure, String> {
-    let seen = observed_rows(places);
+    let seen = Place::substructure_rows(places);
     let reduced = exports.at_rest.reduced_for_two_stiffnesses(&exports.at_speed, &seen, &substructure.reduction);
     let reduced = reduced.map_err(|error| error.to_string())?;
     let mut seen = reduced.seen.into_iter();
@@ -176,7 +170,7 @@ fn sector(
     disk: &DiskPart,
 ) -> Result<ReducedStructure, String> {
     let stated = &places[..places.len() / sectors];
-    let seen = observed_rows(stated);
+    let seen = Place::substructure_rows(stated);
     let reduced = substructure.component.reduced_sector(&disk.boundary, sectors, &seen, &substructure.reduction);
     let reduced = reduced.map_err(|error| error.to_string())?;
     let mut seen = reduced.seen.into_iter();

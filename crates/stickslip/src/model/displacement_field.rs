@@ -3,9 +3,8 @@
 //! The coordinates of the structure are the first of a model: its rows, or the coordinates `q` of
 //! its reduction with the displacements `u = T q` of all rows.
 
-use super::{Element, Model, ModelError, Substructure};
+use super::{Element, Model, ModelError, Place, Substructure};
 use crate::structure::Reduction;
-use crate::structure::reduction::Row;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -60,7 +59,7 @@ impl DisplacementField {
         }
     }
 
-    /// Prepares the displacements of a model; without a structure given by matrices there are none.
+    /// Prepares the displacements of a model. Without a structure given by matrices it has no rows.
     ///
     /// # Errors
     /// [`ModelError`] for a [`DisplacementField::refusal`], or if the structure cannot be reduced.
@@ -75,8 +74,7 @@ impl DisplacementField {
         if let Reduction::None { .. } = reduction {
             return Ok(DisplacementField { shapes: None, rows });
         }
-        let own = model.places.iter().filter(|place| place.view_of.is_none());
-        let seen: Vec<Row> = own.flat_map(|place| place.rows.iter().cloned()).collect();
+        let seen = Place::substructure_rows(&model.places);
         let shapes = component.shapes(&seen, reduction);
         let shapes = shapes.map_err(|error| ModelError::new(Element::Substructure, "reduce", error.to_string()))?;
         Ok(DisplacementField { shapes: Some(shapes), rows })

@@ -53,6 +53,12 @@ pub struct Place {
 }
 
 impl Place {
+    /// Returns the rows of the substructure in all places, without second views of a node: those
+    /// whose displacements a reduction keeps.
+    pub fn substructure_rows(places: &[Place]) -> Vec<Row> {
+        places.iter().filter(|place| place.view_of.is_none()).flat_map(|place| place.rows.iter().cloned()).collect()
+    }
+
     /// Creates a place with one displacement.
     pub fn new(name: impl Into<String>, row: Row) -> Self {
         Place { name: name.into(), directions: Vec::new(), rows: vec![row], frame: None, view_of: None }

@@ -3,7 +3,7 @@
 //! For a disk, they cover all sectors.
 
 use super::error::{Element, ModelError};
-use super::{DiskPart, Model, Substructure, SubstructureDamping};
+use super::{DiskPart, Model, Place, Substructure, SubstructureDamping};
 use crate::structure::reduction::{ReducedMatrices, ReductionError, Row, StructureDamping};
 use crate::structure::{
     BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorCache,
@@ -92,8 +92,7 @@ impl SubstructureParts {
     }
 
     fn reduced(substructure: &Substructure, model: &Model) -> Result<Self, ModelError> {
-        let own = model.places.iter().filter(|place| place.view_of.is_none());
-        let seen: Vec<Row> = own.flat_map(|place| place.rows.iter().cloned()).collect();
+        let seen = Place::substructure_rows(&model.places);
         let component = substructure.component.reduced(&seen, &substructure.reduction).map_err(reduction_error)?;
         let ReducedForm::Alone(reduced) = component.form() else { return Ok(SubstructureParts::default()) };
         let damped = damping_law(substructure, &component).map(|damping| reduced.damped(&damping));
@@ -106,7 +105,7 @@ impl SubstructureParts {
         let ReducedMatrices { mass, damping, stiffness, ports, .. } = reduced;
         let row = |port: usize| ports.row(port).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
         let mut next = 0;
-        let of_place = |place: &super::Place| -> Vec<Row> {
+        let of_place = |place: &Place| -> Vec<Row> {
             if place.view_of.is_some() {
                 return Vec::new();
             }
@@ -207,7 +206,7 @@ impl SubstructureParts {
         let damping = modes.damped(damping_law(substructure, &component).as_ref()).map_err(reduction_error)?;
         let own = |of: usize| modes.own.iter().enumerate().map(|(k, own)| (k, k, own[of])).collect();
         let mut next = 0;
-        let of_place = |place: &super::Place| {
+        let of_place = |place: &Place| {
             next += place.rows.len();
             let rows = (next - place.rows.len()..next)
                 .map(|row| modes.seen.row(row).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect());
