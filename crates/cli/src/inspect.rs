@@ -70,8 +70,10 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
     let mut rows = Vec::new();
     let mut row_names = None;
     for file in files {
-        if format.is_none() && mesh::is_mesh(file).unwrap_or(false) {
-            match mesh::read(file) {
+        if format.is_none()
+            && let Some(read) = mesh::read_if_mesh(file)
+        {
+            match read {
                 Ok(mesh) => {
                     let _ = writeln!(text, "{}", file.display());
                     MeshReport(&mesh).to_string().lines().for_each(|line| text += &format!("  {line}\n"));

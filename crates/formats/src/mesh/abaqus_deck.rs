@@ -42,7 +42,7 @@ fn sniff(bytes: &[u8]) -> bool {
     !of_matrices && all.any(|name| matches!(name.as_str(), "*NODE" | "*ELEMENT" | "*INCLUDE"))
 }
 
-/// What the data lines below a keyword state.
+/// Content of the data lines below a keyword.
 enum Block {
     Nodes {
         set: Option<String>,

@@ -6,7 +6,7 @@ use crate::error::{Error, ErrorKind, Location};
 use crate::text::Line;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// What a reader has read so far.
+/// Nodes, elements and sets that a reader has read so far.
 #[derive(Default)]
 pub(super) struct MeshBuilder {
     nodes: Vec<MeshNode>,

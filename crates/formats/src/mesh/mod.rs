@@ -36,6 +36,7 @@ pub use face::{ClosestPoint, Face, NodeShare};
 pub use patch::{Patch, PatchNode, ProjectedPoint};
 pub use report::MeshReport;
 pub use shape::{Family, Shape};
+pub use vtk_unstructured::vtk_cell_type;
 
 use crate::error::{Error, ErrorKind, Location};
 use crate::file::load;
@@ -141,9 +142,20 @@ pub const TABLE: &[MeshFormat] = &[
 /// [`Error`] with file, location, problem and remedy.
 pub fn read(path: impl AsRef<Path>) -> Result<Mesh, Error> {
     let path = path.as_ref();
-    let bytes = load(path)?;
+    read_loaded(path, &load(path)?)
+}
+
+/// Reads a file whose content looks like a mesh. Returns `None` for other files and for those that
+/// cannot be opened.
+pub fn read_if_mesh(path: impl AsRef<Path>) -> Option<Result<Mesh, Error>> {
+    let path = path.as_ref();
+    let bytes = load(path).ok()?;
+    find_format(&bytes).is_some().then(|| read_loaded(path, &bytes))
+}
+
+fn read_loaded(path: &Path, bytes: &[u8]) -> Result<Mesh, Error> {
     let folder = Some(path.parent().unwrap_or(Path::new("")));
-    parse(&MeshFile { bytes: &bytes, folder }).map_err(|error| error.with_path(path))
+    parse(&MeshFile { bytes, folder }).map_err(|error| error.with_path(path))
 }
 
 /// Reads a mesh from a file in memory, which cannot include other files.
@@ -152,15 +164,6 @@ pub fn read(path: impl AsRef<Path>) -> Result<Mesh, Error> {
 /// Like [`read`], without the path.
 pub fn read_bytes(bytes: &[u8]) -> Result<Mesh, Error> {
     parse(&MeshFile { bytes, folder: None })
-}
-
-/// Returns whether a file looks like a mesh.
-///
-/// # Errors
-/// The file cannot be read.
-pub fn is_mesh(path: impl AsRef<Path>) -> Result<bool, Error> {
-    let bytes = load(path.as_ref())?;
-    Ok(find_format(&bytes).is_some())
 }
 
 fn find_format(bytes: &[u8]) -> Option<&'static MeshFormat> {

@@ -7,7 +7,7 @@
 //! Source: VTK file formats, "XML file formats"; `vtkCellType.h`.
 
 use super::builder::{MeshBuilder, SetKind};
-use super::shape::Shape;
+use super::shape::{Family, Shape};
 use super::{MeshFile, MeshFormat};
 use crate::bytes::{ByteCursor, ByteOrder, NumberType};
 use crate::error::{Error, ErrorKind, Location};
@@ -16,6 +16,29 @@ use crate::text::{Line, real};
 
 pub(super) const FORMAT: MeshFormat =
     MeshFormat { name: "vtk-unstructured", summary: "unstructured grids of VTK (.vtu)", sniff, read };
+
+/// Cell types in `vtkCellType.h`, with their family, without and with middle nodes.
+const CELL_TYPES: [(u8, Family, bool); 12] = [
+    (5, Family::Triangle, false),
+    (9, Family::Quadrilateral, false),
+    (10, Family::Tetrahedron, false),
+    (12, Family::Hexahedron, false),
+    (13, Family::Wedge, false),
+    (14, Family::Pyramid, false),
+    (22, Family::Triangle, true),
+    (23, Family::Quadrilateral, true),
+    (24, Family::Tetrahedron, true),
+    (25, Family::Hexahedron, true),
+    (26, Family::Wedge, true),
+    (27, Family::Pyramid, true),
+];
+
+/// Returns the number of a shape in `vtkCellType.h`.
+pub fn vtk_cell_type(shape: Shape) -> u8 {
+    let found =
+        CELL_TYPES.iter().find(|(_, family, quadratic)| (*family, *quadratic) == (shape.family, shape.quadratic));
+    found.expect("every shape has a cell type").0
+}
 
 fn sniff(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(2000)];
@@ -295,22 +318,12 @@ impl<'a> Piece<'a> {
             let points = self.connectivity.get(from..to.max(from));
             let points = points.ok_or_else(|| self.tag.malformed(format!("cell {} has no points", cell + 1)))?;
             from = to.max(from);
-            let shape = match *kind as i64 {
-                1 | 3 | 21 => continue,
-                5 => Shape::face(3),
-                9 => Shape::face(4),
-                22 => Shape::face(6),
-                23 => Shape::face(8),
-                10 => Shape::solid(4),
-                12 => Shape::solid(8),
-                13 => Shape::solid(6),
-                14 => Shape::solid(5),
-                24 => Shape::solid(10),
-                25 => Shape::solid(20),
-                26 => Shape::solid(15),
-                27 => Shape::solid(13),
-                _ => None,
-            };
+            // points and lines
+            if matches!(*kind as i64, 1 | 3 | 21) {
+                continue;
+            }
+            let shape = CELL_TYPES.iter().find(|(code, ..)| i64::from(*code) == *kind as i64);
+            let shape = shape.map(|&(_, family, quadratic)| Shape { family, quadratic });
             let Some(shape) = shape else {
                 builder.leave_out(&format!("{kind} of VTK"));
                 continue;

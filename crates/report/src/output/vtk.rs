@@ -8,7 +8,7 @@
 use crate::output::result_file::{File, Output, ReportError};
 use std::fmt::Write;
 use std::ops::Range;
-use stickslip_formats::mesh::{Family, Mesh, Shape};
+use stickslip_formats::mesh::{Mesh, vtk_cell_type};
 use stickslip_study::dataset::{Dataset, FIELDS, MeshSource, Table};
 
 /// The output `vtk`.
@@ -113,7 +113,7 @@ impl<'a> Grid<'a> {
         );
         head += &array("UInt32", "connectivity", 1, all.flat_map(|node| node.to_le_bytes()));
         head += &array("UInt32", "offsets", 1, ends.flat_map(u32::to_le_bytes));
-        head += &array("UInt8", "types", 1, elements.iter().map(|element| cell_type(element.shape)));
+        head += &array("UInt8", "types", 1, elements.iter().map(|element| vtk_cell_type(element.shape)));
         Grid { mesh, head: head + "</Cells>\n" }
     }
 
@@ -138,24 +138,6 @@ impl<'a> Grid<'a> {
         text += &array("Float64", "displacement", 3, bytes);
         text += &array("UInt8", "contact", 1, contact.into_iter());
         text + "</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
-    }
-}
-
-/// Returns the number of a cell type in `vtkCellType.h`.
-fn cell_type(shape: Shape) -> u8 {
-    match (shape.family, shape.quadratic) {
-        (Family::Triangle, false) => 5,
-        (Family::Quadrilateral, false) => 9,
-        (Family::Tetrahedron, false) => 10,
-        (Family::Hexahedron, false) => 12,
-        (Family::Wedge, false) => 13,
-        (Family::Pyramid, false) => 14,
-        (Family::Triangle, true) => 22,
-        (Family::Quadrilateral, true) => 23,
-        (Family::Tetrahedron, true) => 24,
-        (Family::Hexahedron, true) => 25,
-        (Family::Wedge, true) => 26,
-        (Family::Pyramid, true) => 27,
     }
 }
 

@@ -338,6 +338,14 @@ fn reduction_kinds() -> Vec<(&'static str, &'static str)> {
     REDUCTIONS.iter().map(|(name, summary, _)| (*name, *summary)).collect()
 }
 
+/// The key of a tangent of a face.
+const TANGENT: Key = optional(
+    "tangent",
+    ValueType::Vector(Dimension::NONE),
+    "a vector whose projection onto the face is the first tangent",
+    "[1, 0, 0]",
+);
+
 const PLACE: &[Key] = &[
     required("name", ValueType::Name, "name, for joints, forces and results", "\"tip\""),
     optional(
@@ -389,12 +397,7 @@ const PLACE: &[Key] = &[
         "normal of a local frame, with components along x, y, z; the directions are then two tangents and the normal",
         "[0, \"-sin(a)\", \"cos(a)\"]",
     ),
-    optional(
-        "tangent",
-        ValueType::Vector(Dimension::NONE),
-        "a vector whose projection onto the face is the first tangent",
-        "[1, 0, 0]",
-    ),
+    TANGENT,
     optional(
         "offset",
         ValueType::Vector(Dimension::LENGTH),
@@ -516,12 +519,7 @@ const CONTACT: &[Key] = &[
         "law with stiffnesses, forces and dampings per area: N/mm^3, MPa; each joint has them times the area of its node",
         "{ kind = \"friction-contact\", tangential = \"20 N/mm^3\", normal = \"30 N/mm^3\", friction = 0.3, preload = \"2 MPa\" }",
     ),
-    optional(
-        "tangent",
-        ValueType::Vector(Dimension::NONE),
-        "a vector whose projection onto the face is the first tangent",
-        "[1, 0, 0]",
-    ),
+    TANGENT,
     optional(
         "distance",
         ValueType::Quantity(Dimension::LENGTH, Bounds::Positive),

@@ -16,6 +16,7 @@ use serde_json::{Value as Json, json};
 use stickslip::dimension::Dimension;
 use stickslip::model::GROUND;
 use stickslip_formats::mesh::{Patch, PatchNode, ProjectedPoint};
+use stickslip_numerics::vector::dot;
 
 /// A contact after its pairs are known.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -151,12 +152,8 @@ fn default_distance(patch: &Patch) -> f64 {
 }
 
 fn unit(vector: [f64; 3]) -> [f64; 3] {
-    let length = dot(vector, vector).sqrt();
+    let length = dot(&vector, &vector).sqrt();
     vector.map(|component| component / length)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Returns the row of each direction at a point of the second face: the node on which it lies, or
@@ -229,14 +226,16 @@ fn summary(
 ) -> ContactSummary {
     let gap = |pair: &Pair| {
         let between = &pair.opposite.as_ref()?.point.position;
-        Some(dot([0, 1, 2].map(|axis| between[axis] - pair.node.position[axis]), pair.normal) * source.length)
+        Some(dot(&[0, 1, 2].map(|axis| between[axis] - pair.node.position[axis]), &pair.normal) * source.length)
     };
     let gaps = pairs.iter().filter_map(gap).fold(None, |range: Option<[f64; 2]>, gap| {
         let [low, high] = range.unwrap_or([gap, gap]);
         Some([low.min(gap), high.max(gap)])
     });
     let angle = |pair: &Pair| -> f64 {
-        pair.opposite.as_ref().map_or(0.0, |found| (-dot(pair.node.normal, found.point.normal)).clamp(-1.0, 1.0).acos())
+        pair.opposite
+            .as_ref()
+            .map_or(0.0, |found| (-dot(&pair.node.normal, &found.point.normal)).clamp(-1.0, 1.0).acos())
     };
     let square = source.length * source.length;
     let paired: f64 = pairs.iter().map(|pair| pair.node.area).sum();

@@ -46,12 +46,12 @@ impl Reader {
         let entry = stated.entry("nodes").filter(|_| !self.study_file_only)?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let path = self.path_of(name);
-        let read = match mesh::is_mesh(&path) {
-            Ok(true) => mesh::read(&path).map(|mesh| mesh_nodes(&mesh)).map_err(|error| {
+        let read = match mesh::read_if_mesh(&path) {
+            Some(read) => read.map(|mesh| mesh_nodes(&mesh)).map_err(|error| {
                 let Error { problem, remedy, .. } = error;
                 (format!("`{}`: {problem}", excerpt(name)), Some(remedy))
             }),
-            _ => self.read_text(name).and_then(|text| {
+            None => self.read_text(name).and_then(|text| {
                 csv_nodes(&text).map_err(|(line, message)| {
                     let help = "write a line `node,x,y,z` and below it `12,0.5,0,3` … for every node, or name a mesh, \
                         such as an input deck with a *NODE block";
