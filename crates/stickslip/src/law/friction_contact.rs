@@ -104,6 +104,9 @@ impl Law for FrictionContact {
     fn with_preload(&self, force: f64) -> Option<SharedLaw> {
         (self.preload <= 0.0).then(|| Arc::new(FrictionContact { preload: force, ..*self }) as SharedLaw)
     }
+    fn with_limit_factor(&self, factor: f64) -> Option<SharedLaw> {
+        Some(Arc::new(FrictionContact { friction: factor * self.friction, ..*self }))
+    }
     fn closed_stiffness(&self) -> Option<Vec<f64>> {
         Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())
     }

@@ -64,6 +64,9 @@ impl Law for Jenkins2d {
     fn force_scale(&self) -> f64 {
         self.limit
     }
+    fn with_limit_factor(&self, factor: f64) -> Option<SharedLaw> {
+        Some(Arc::new(Jenkins2d { limit: factor * self.limit, ..*self }))
+    }
     fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }

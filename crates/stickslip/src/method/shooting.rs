@@ -624,8 +624,8 @@ impl<'a> ShootingSolver<'a> {
         let laws = self.stepping.assembly().joints.iter().map(|joint| &joint.law);
         // a joint may stick right up to its limit. Its derivative is then that of an instant of
         // slip, which does not hold for nearby motions that stick
-        let at_its_limit =
-            measured.joints.iter().any(|joint| joint.slip_fraction > 0.0 && measured.stuck.contains(&joint.name));
+        let at_its_limit = measured.stuck.iter().any(|&joint| measured.joints[joint].slip_fraction > 0.0);
+        let stuck = measured.stuck_names();
         // the residual of the closed state may do work on a vibration as small as rest
         let left = self.settings.closed * norm(&self.weights, &closed.state) * self.rest;
         let least = f64::max(CONSERVATIVE_WORK * self.rest * self.rest, left / self.settings.energy_gap);
@@ -644,8 +644,8 @@ impl<'a> ShootingSolver<'a> {
                 error_estimate: closed.distance,
                 accuracy: Accuracy::Converged,
                 return_defect: Some(closed.residual),
-                history_dependent: history_dependent_joints(laws, &measured.joints, &measured.stuck, symmetry),
-                stuck: measured.stuck,
+                history_dependent: history_dependent_joints(laws, &measured.joints, &stuck, symmetry),
+                stuck,
                 history_spread: None,
                 found_by: self.name,
                 fallback_from: None,

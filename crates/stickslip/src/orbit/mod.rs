@@ -234,6 +234,7 @@ impl Orbit {
         if energy_gap > 0.1 {
             return Err(OrbitError::Evidence { method, omega, energy_gap });
         }
+        let stuck = measured.stuck_names();
         Ok(Orbit {
             method,
             omega,
@@ -249,8 +250,8 @@ impl Orbit {
                 error_estimate,
                 accuracy,
                 return_defect: None,
-                history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
-                stuck: measured.stuck,
+                history_dependent: history_dependent_joints(laws(system), &measured.joints, &stuck, symmetry),
+                stuck,
                 history_spread: None,
                 found_by: method,
                 fallback_from: None,

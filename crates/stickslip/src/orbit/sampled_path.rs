@@ -1,6 +1,6 @@
 //! Results of any path from its samples alone, by Gauss quadrature between its transitions.
 
-use super::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
+use super::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes};
 use super::{Path, Sample};
 use crate::model::{Axis, System};
 use num_complex::Complex64;
@@ -120,11 +120,9 @@ impl PathSignals for Sampled<'_> {
     fn faces(&self, joint: usize) -> ContactSummary {
         let contact = |i: usize| self.samples[i % self.nodes.len()].joints[joint].contact;
         let count = self.nodes.len();
-        ContactSummary {
-            shares: ContactFractions::of((0..count).map(|i| (contact(i), self.nodes[i].1))),
-            switches: (0..count).filter(|&i| contact(i) != contact(i + 1)).count(),
-            sticks_throughout: sticks((0..count).map(contact)),
-        }
+        let shares = ContactFractions::of((0..count).map(|i| (contact(i), self.nodes[i].1)));
+        let switches = (0..count).filter(|&i| contact(i) != contact(i + 1)).count();
+        ContactSummary::of_samples(shares, switches, (0..count).map(contact))
     }
 }
 

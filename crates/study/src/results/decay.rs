@@ -7,9 +7,9 @@
 //!
 //! `δ = 2 ln((s + s')/(s' + s''))`, with the next swing `s''`.
 //!
-//! The formula is exact for a linear oscillator. The last cycle has no next swing and uses the
-//! previous one. `ζ = δ/√(4π² + δ²)` is the damping ratio of the linear oscillator with the
-//! same decrement.
+//! The formula is exact for a linear oscillator. A last cycle without a next swing has no
+//! decrement and is left out; a decay of two swings only compares these. `ζ = δ/√(4π² + δ²)` is
+//! the damping ratio of the linear oscillator with the same decrement.
 
 use std::f64::consts::TAU;
 
@@ -76,7 +76,8 @@ impl Decay {
         let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
         let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
         let (swings, turns) = (&swings[..moves], &self.turns);
-        let cycles = (1..swings.len()).step_by(2).map_while(|second| {
+        let complete = if swings.len() == 2 { 2 } else { swings.len().saturating_sub(1) };
+        let cycles = (1..complete).step_by(2).map_while(|second| {
             let duration = turns[second + 1].0 - turns[second - 1].0;
             (duration > 0.0).then(|| {
                 let decrement = decrement(swings, second);
@@ -94,12 +95,10 @@ impl Decay {
 
 /// Returns the logarithmic decrement of the cycle whose second swing has index `second`.
 fn decrement(swings: &[f64], second: usize) -> f64 {
-    let cycle = swings[second - 1] + swings[second];
-    match (swings.get(second + 1), second.checked_sub(2)) {
-        (Some(next), _) => 2.0 * (cycle / (swings[second] + next)).ln(),
-        (None, Some(before)) => 2.0 * ((swings[before] + swings[second - 1]) / cycle).ln(),
+    match swings.get(second + 1) {
+        Some(next) => 2.0 * ((swings[second - 1] + swings[second]) / (swings[second] + next)).ln(),
         // the decay has two swings only
-        (None, None) => 2.0 * (swings[second - 1] / swings[second]).ln(),
+        None => 2.0 * (swings[second - 1] / swings[second]).ln(),
     }
 }
 
@@ -137,6 +136,7 @@ fn turning_point(motion: &PlaceMotionFn<'_>, [mut low, mut high]: [f64; 2], v0: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     fn decay(motion: impl Fn(f64) -> (f64, f64), duration: f64, step: f64) -> Vec<Cycle> {
         let mut decay = Decay::default();
@@ -186,6 +186,30 @@ mod tests {
                 // the remaining error is the second difference of the drift over half a cycle,
                 // 0.3 (1/20)² of an amplitude of 1, over 2π
                 assert!((cycle.damping_ratio - zeta).abs() < 1.3e-4, "{cycle:?}");
+            }
+        }
+    }
+
+    /// With Coulomb friction every swing is shorter than the one before by `limit/k`. All cycles
+    /// obey the formula, wherever the record ends.
+    #[test]
+    fn every_cycle_of_a_dry_decay_is_complete() {
+        let (offset, loss, omega) = (1.0f64, 0.06, TAU * 5.0);
+        let motion = |t: f64| {
+            let half = (omega * t / PI).floor();
+            let (sign, amplitude) = (if half % 2.0 == 0.0 { 1.0 } else { -1.0 }, offset - loss * (2.0 * half + 1.0));
+            let phase = omega * t - PI * half;
+            (sign * (amplitude * phase.cos() + loss), -sign * amplitude * omega * phase.sin())
+        };
+        let swing = |i: usize| offset - loss * (2.0 * i as f64 + 1.0);
+        for duration in [0.41, 0.45, 0.49, 0.51, 0.55, 0.59] {
+            let cycles = decay(motion, duration, 1e-3);
+            assert_eq!(cycles.len(), if duration < 0.5 { 1 } else { 2 });
+            for (i, cycle) in cycles.iter().enumerate() {
+                let sum = |first: usize| swing(first) + swing(first + 1);
+                let decrement = 2.0 * (sum(2 * i) / sum(2 * i + 1)).ln();
+                let expected = decrement / TAU.hypot(decrement);
+                assert!((cycle.damping_ratio - expected).abs() < 1e-4, "{duration}: {cycle:?}, not {expected}");
             }
         }
     }

@@ -429,3 +429,89 @@ fn the_templates_of_dampers_have_bodies() {
         assert_eq!((summary.bodies.len(), summary.dofs), (1, 12 * 5), "{name}: {:?}", summary.bodies);
     }
 }
+
+/// A loose cylinder between two blades, heavy enough to stick. The right contact touches its slip
+/// limit: the motion is the edge of a continuum of stuck motions. It is stable, as the structure
+/// with both contacts stuck is linear and damped, and a time integration stays at it.
+#[test]
+fn a_cylinder_that_sticks_up_to_its_limit_is_stable() {
+    let text = r#"
+schema = 1
+[parameters]
+rc = "4 mm"
+[[mass]]
+name = "left"
+mass = "300 g"
+directions = ["x", "z"]
+[[mass]]
+name = "right"
+mass = "310 g"
+directions = ["x", "z"]
+[[spring]]
+between = ["left.x", "ground"]
+stiffness = "200 N/mm"
+damping = "0.2 %"
+[[spring]]
+between = ["left.z", "ground"]
+stiffness = "5 kN/mm"
+damping = "0.2 %"
+[[spring]]
+between = ["right.x", "ground"]
+stiffness = "200 N/mm"
+damping = "0.2 %"
+[[spring]]
+between = ["right.z", "ground"]
+stiffness = "5 kN/mm"
+damping = "0.2 %"
+[[body]]
+name = "pin"
+mass = "8 g"
+inertia = "64 g mm^2"
+directions = ["x", "z"]
+[[place]]
+name = "pin_left"
+of = "pin"
+offset = ["-rc*sin(25 deg)", 0, "rc*cos(25 deg)"]
+normal = ["-sin(25 deg)", 0, "cos(25 deg)"]
+[[place]]
+name = "pad_left"
+of = "left"
+normal = ["-sin(25 deg)", 0, "cos(25 deg)"]
+[[place]]
+name = "pin_right"
+of = "pin"
+offset = ["rc*sin(40 deg)", 0, "rc*cos(40 deg)"]
+normal = ["sin(40 deg)", 0, "cos(40 deg)"]
+[[place]]
+name = "pad_right"
+of = "right"
+normal = ["sin(40 deg)", 0, "cos(40 deg)"]
+[[joint]]
+name = "L"
+between = ["pin_left", "pad_left"]
+law = { kind = "friction-contact", tangential = "30 N/mm", normal = "60 N/mm", friction = 0.25 }
+[[joint]]
+name = "R"
+between = ["pin_right", "pad_right"]
+law = { kind = "friction-contact", tangential = "30 N/mm", normal = "60 N/mm", friction = 0.25 }
+[[force]]
+on = "pin.z"
+amplitude = "59.2 N"
+harmonic = 0
+[[force]]
+on = "left.x"
+amplitude = "2 N"
+[study]
+kind = "response"
+frequency = ["121 Hz"]
+peaks = false
+[method]
+kind = "harmonic-balance"
+harmonics = 9
+"#;
+    let found = dataset(text);
+    let curve = &found.tables[0];
+    assert_eq!(curve.flags("stable").unwrap(), [Some(true)]);
+    assert!(numbers(&found, &curve.name, "R_slip_fraction")[0] < 0.01);
+    assert!(numbers(&found, &curve.name, "R_dissipation_J")[0].abs() < 1e-15);
+}

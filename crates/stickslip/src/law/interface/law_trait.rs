@@ -93,6 +93,12 @@ pub trait Law: Debug + Send + Sync {
     fn with_preload(&self, _force: f64) -> Option<SharedLaw> {
         None
     }
+    /// Returns this law with its slip limit multiplied by `factor`. Laws with a step view that
+    /// stick exactly implement it; the stability of an orbit that sticks right up to the limit
+    /// is computed with a higher limit.
+    fn with_limit_factor(&self, _factor: f64) -> Option<SharedLaw> {
+        None
+    }
     /// Returns the stiffness (N/m) in each direction while the faces are closed and stick.
     /// `None` if the faces cannot separate.
     fn closed_stiffness(&self) -> Option<Vec<f64>> {

@@ -59,6 +59,7 @@ pub(super) fn orbit(
     // stored energy. Below it, the work is not a suitable reference for the energy gap.
     let unresolved = settings.residual / settings.energy_gap;
     let stored = share * norm(weights, &closed.state).powi(2);
+    let stuck = measured.stuck_names();
     let mut orbit = Orbit {
         method: NAME,
         omega,
@@ -74,8 +75,8 @@ pub(super) fn orbit(
             error_estimate: closed.distance,
             return_defect: Some(closed.residual),
             accuracy: Accuracy::Converged,
-            history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
-            stuck: measured.stuck,
+            history_dependent: history_dependent_joints(laws(system), &measured.joints, &stuck, symmetry),
+            stuck,
             history_spread: None,
             found_by: NAME,
             fallback_from: None,
@@ -383,7 +384,8 @@ impl PathSignals for ExactMeasurement<'_> {
             return ContactSummary {
                 shares: ContactFractions { slip: 1.0, ..ContactFractions::default() },
                 switches: 0,
-                sticks_throughout: false,
+                slips: 1,
+                stays_closed: false,
             };
         }
         let contact = |piece: &PathSegment| path.contact_of(joint, &piece.segment).unwrap_or(Contact::Open);
@@ -396,8 +398,9 @@ impl PathSignals for ExactMeasurement<'_> {
             let (first, last) = (&first.segment.contacts, &last.segment.contacts);
             switches += parts().filter(|&s| path.next_of(last[s]) != first[s]).count();
         }
-        let sticks_throughout = !path.pieces.iter().any(|piece| slips(&piece.segment));
-        ContactSummary { shares, switches, sticks_throughout }
+        // unlike samples, the segments resolve each slip: a joint with one slip does not stick
+        let slips = path.pieces.iter().filter(|piece| slips(&piece.segment)).count();
+        ContactSummary { shares, switches, slips, stays_closed: slips == 0 }
     }
 }
 

@@ -5,7 +5,7 @@ use super::excitation::HarmonicExcitation;
 use super::step_record::{RecordedInstant, StepRecord};
 use crate::law::{Contact, MAX_DIRECTIONS, RelativeMotion};
 use crate::model::{Axis, System};
-use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes, sticks};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, extremes};
 use crate::orbit::{JointSample, Path, Sample, Symmetry};
 use num_complex::Complex64;
 use std::convert::Infallible;
@@ -308,10 +308,6 @@ impl PathSignals for Trajectory {
             let before = if self.symmetry == Symmetry::HalfPeriod { last.mirrored() } else { last };
             switches += usize::from(before != at_end(0));
         }
-        ContactSummary {
-            shares,
-            switches,
-            sticks_throughout: sticks(self.steps.nodes().map(|node| node.contact[joint])),
-        }
+        ContactSummary::of_samples(shares, switches, self.steps.nodes().map(|node| node.contact[joint]))
     }
 }

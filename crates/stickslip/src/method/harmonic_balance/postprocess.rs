@@ -7,7 +7,7 @@ use super::equations::{Discretization, HarmonicSolution};
 use crate::law::{Contact, MAX_DIRECTIONS};
 use crate::method::orbit_search::evidence::{OrbitCheck, ReturnEvidence};
 use crate::model::{Axis, MovedPlace, System};
-use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results, sticks};
+use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results};
 use crate::orbit::{
     Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws,
 };
@@ -96,8 +96,8 @@ pub(super) fn mean_forces_balance(
     missing.sum::<f64>().sqrt() <= 1e-6 * size
 }
 
-#[derive(Debug, Clone)]
 /// Motion as a Fourier series, with the joint forces at the samples.
+#[derive(Debug, Clone)]
 struct FourierPath {
     system: Arc<System>,
     omega: f64,
@@ -107,6 +107,8 @@ struct FourierPath {
     force: Vec<Vec<[f64; MAX_DIRECTIONS]>>,
     /// Contact state per joint and sample.
     contact: Vec<Vec<Contact>>,
+    /// Numbers of the joints that stick for the whole period.
+    stuck: Vec<usize>,
 }
 
 /// Data of the solver for the orbit of a solution.
@@ -176,9 +178,10 @@ pub(super) fn orbit(
     start.extend(states);
     let contracts = orbit_check.as_ref().is_some_and(|orbit_check| orbit_check.proves());
     let top = harmonics.last().copied();
-    let path = FourierPath { system: system.clone(), omega, harmonics, x, force, contact };
+    let stuck_names = measured.stuck_names();
+    let path = FourierPath { system: system.clone(), omega, harmonics, x, force, contact, stuck: measured.stuck.clone() };
     let ReturnEvidence { derivative, defect } = orbit_check.map_or_else(ReturnEvidence::default, |orbit_check| {
-        orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck())
+        orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck)
     });
     // If a normal force changes the slip limit, or vanishes, a series with twice the harmonics
     // may be as wrong as the shorter one. The return defect shows it, except on an unstable
@@ -207,8 +210,8 @@ pub(super) fn orbit(
                 Some(_) => Accuracy::Truncated,
                 None => Accuracy::Unchecked,
             },
-            history_dependent: history_dependent_joints(laws(system), &measured.joints, &measured.stuck, symmetry),
-            stuck: measured.stuck,
+            history_dependent: history_dependent_joints(laws(system), &measured.joints, &stuck_names, symmetry),
+            stuck: stuck_names,
             history_spread: None,
             found_by: motion.found_by.name(),
             fallback_from: None,
@@ -423,11 +426,8 @@ impl PathSignals for SolutionSignals<'_> {
         let contact = &self.contact[joint];
         let runs: Vec<_> = contact.chunk_by(PartialEq::eq).map(|run| (run[0], run.len() as f64)).collect();
         let changes = runs.len() - usize::from(contact.first() == contact.last());
-        ContactSummary {
-            shares: ContactFractions::of(runs.into_iter()),
-            switches: changes / self.returns_per_period,
-            sticks_throughout: sticks(contact.iter().copied()),
-        }
+        let shares = ContactFractions::of(runs.into_iter());
+        ContactSummary::of_samples(shares, changes / self.returns_per_period, contact.iter().copied())
     }
 }
 
@@ -474,13 +474,6 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
     }
     force
-}
-
-impl FourierPath {
-    /// Returns the joints that never slip.
-    fn stuck(&self) -> Vec<usize> {
-        (0..self.contact.len()).filter(|&joint| sticks(self.contact[joint].iter().copied())).collect()
-    }
 }
 
 impl Path for FourierPath {
@@ -565,7 +558,7 @@ impl Path for FourierPath {
             self.omega,
             (self, symmetry),
             start,
-            &self.stuck(),
+            &self.stuck,
         );
         judged.derivative
     }

@@ -285,6 +285,12 @@ impl Flow for AverageAccelerationFlow {
         let mut springs = self.springs();
         springs.iter_mut().filter(|spring| joints.contains(&spring.joint)).for_each(|spring| spring.limit *= factor);
         self.limit(&springs);
+        for &joint in joints {
+            let law = &mut self.assembly.joints[joint].law;
+            if let Some(scaled) = law.with_limit_factor(factor) {
+                *law = scaled;
+            }
+        }
     }
 
     fn set_recording(&mut self, keep: bool) {
