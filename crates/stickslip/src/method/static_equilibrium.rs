@@ -10,10 +10,11 @@
 
 use super::flow::average_acceleration::law_step;
 use super::harmonic_balance;
-use crate::law::{IdealElement, Law, MAX_DIRECTIONS, RelativeMotion};
-use crate::model::System;
+use crate::law::{IdealElement, Jenkins, Law, MAX_DIRECTIONS, RelativeMotion, SharedLaw};
+use crate::model::{Axis, System};
 use crate::orbit::Orbit;
 use num_complex::Complex64;
+use std::sync::Arc;
 
 /// Displacements, joint states and joint forces under the constant loads.
 ///
@@ -46,14 +47,87 @@ pub struct StaticEquilibrium {
     /// An orbit without motion.
     orbit: Orbit,
     dofs: usize,
+    /// Number of joints of the system; further joints of `orbit` hold places.
+    joints: usize,
+    /// Number of internal states of these joints.
+    states: usize,
 }
 
 impl StaticEquilibrium {
     /// Computes the static equilibrium of a system. Returns `None` if no stiffness carries a
     /// constant load, or if the iteration does not converge.
     pub fn of(system: &System) -> Option<Self> {
-        let orbit = harmonic_balance::static_equilibrium_of(system)?;
-        Some(StaticEquilibrium { orbit, dofs: system.dofs() })
+        StaticEquilibrium::holding(system, &[])
+    }
+
+    /// Computes the static equilibrium with some places held: axes, and their displacements (m,
+    /// or rad for rotations). Returns `None` as [`StaticEquilibrium::of`] does.
+    ///
+    /// A stiff spring pulls every place towards a target, and the targets are corrected until
+    /// each place is at its displacement. An axis may be any combination of degrees of freedom,
+    /// as for a point of a reduced structure.
+    ///
+    /// # Example
+    /// Two springs in series; the outer end is pulled to 4 mm.
+    /// ```
+    /// use stickslip::method::StaticEquilibrium;
+    /// use stickslip::model::{GROUND, Mass, Model, Spring};
+    /// let spring = |a: &str, b: &str, stiffness| Spring {
+    ///     between: [a.into(), b.into()],
+    ///     stiffness,
+    ///     damping: 0.0,
+    /// };
+    /// let model = Model {
+    ///     masses: vec![Mass::new("a", 1.0), Mass::new("b", 1.0)],
+    ///     springs: vec![spring("a", "b", 3e3), spring("b", GROUND, 1e3)],
+    ///     ..Model::default()
+    /// };
+    /// let system = model.assemble().unwrap();
+    /// let pulled = [(system.place_axes()[0].clone(), 4e-3)];
+    /// let held = StaticEquilibrium::holding(&system, &pulled).unwrap();
+    /// assert!((held.displacement()[1] - 3e-3).abs() < 1e-12);
+    /// ```
+    pub fn holding(system: &System, held: &[(Axis, f64)]) -> Option<Self> {
+        let count = |orbit: &Orbit| orbit.initial_state.len() - 2 * system.dofs() - held.len();
+        let made = |orbit: Orbit| StaticEquilibrium {
+            states: count(&orbit),
+            orbit,
+            dofs: system.dofs(),
+            joints: system.joints().len(),
+        };
+        if held.is_empty() {
+            return harmonic_balance::static_equilibrium_of(system).map(made);
+        }
+        let largest = held.iter().fold(0.0f64, |largest, (_, value)| largest.max(value.abs()));
+        let [mass, _, stiffness] = system.structure().largest();
+        let mut targets: Vec<f64> = held.iter().map(|(_, value)| *value).collect();
+        // each pass leaves the share `k/(k + spring)` of the distances, with the stiffness k of
+        // a place
+        let mut spring = 100.0 * if stiffness > 0.0 { stiffness } else { mass };
+        let mut left = f64::INFINITY;
+        for _ in 0..20 {
+            let springs = held.iter().zip(&targets).map(|((axis, _), target)| {
+                let weight: f64 = axis.rows().iter().map(|(_, weight)| weight * weight).sum();
+                let stiffness = spring / weight;
+                // the spring never slips
+                let limit = 1e6 * stiffness * (largest + target.abs()).max(f64::MIN_POSITIVE);
+                let imposed = axis.clone().with_imposed_motion([(0, Complex64::from(-target))]);
+                (Arc::new(Jenkins { stiffness, limit }) as SharedLaw, imposed)
+            });
+            let orbit = harmonic_balance::static_equilibrium_of(&system.with_joints(springs))?;
+            let displacement = &orbit.initial_state[..system.dofs()];
+            let distances: Vec<f64> = held.iter().map(|(axis, value)| value - axis.component(displacement)).collect();
+            let farthest = distances.iter().fold(0.0f64, |farthest, distance| farthest.max(distance.abs()));
+            if farthest <= 1e-12 * largest {
+                return Some(made(orbit));
+            }
+            if farthest > 0.1 * left {
+                spring *= 100.0;
+            }
+            left = farthest;
+            targets.iter_mut().zip(&distances).for_each(|(target, distance)| *target += distance);
+        }
+        None
     }
 
     /// Computes the static equilibrium; returns `None` also if no constant force, imposed
@@ -71,12 +145,12 @@ impl StaticEquilibrium {
 
     /// Returns the forces of each joint along its directions, N.
     pub fn forces(&self) -> Vec<[f64; MAX_DIRECTIONS]> {
-        self.orbit.sample(0.0).joints.iter().map(|joint| joint.force).collect()
+        self.orbit.sample(0.0).joints.iter().take(self.joints).map(|joint| joint.force).collect()
     }
 
     /// Returns the internal states of all joints, in the order of the joints.
     pub fn joint_states(&self) -> &[f64] {
-        &self.orbit.initial_state[2 * self.dofs..]
+        &self.orbit.initial_state[2 * self.dofs..][..self.states]
     }
 }
 

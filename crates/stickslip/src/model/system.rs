@@ -507,6 +507,14 @@ impl System {
         builder.build()
     }
 
+    /// Returns the same system with further joints in one direction, after its own.
+    pub(crate) fn with_joints(&self, joints: impl IntoIterator<Item = (SharedLaw, Axis)>) -> System {
+        let mut system = System { cyclic: None, ..self.clone() };
+        let further = joints.into_iter().map(|(law, axis)| SystemJoint { name: String::new(), law, axes: vec![axis] });
+        system.joints.extend(further);
+        system
+    }
+
     /// Returns the same system in terms of a lower base frequency, for subharmonic orbits.
     ///
     /// Harmonic h becomes `h · periods`. A motion that repeats after `periods` periods of the

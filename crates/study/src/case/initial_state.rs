@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use stickslip::method::StaticEquilibrium;
-use stickslip::model::{Model, Motion, System};
+use stickslip::model::{Axis, System};
 
 /// The values of the key `begin`.
 pub(crate) const EQUILIBRIUM: &str = "equilibrium";
@@ -43,18 +43,10 @@ pub(crate) fn state_vector(system: &System, given: Option<&BTreeMap<String, f64>
 }
 
 /// Returns the static equilibrium with the places of `start` held; `None` if it is not found.
-pub(crate) fn held_equilibrium(model: &Model, system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
-    let mut held = model.clone();
-    for (place, value) in start.into_iter().flatten() {
-        held.motions.push(Motion { on: place.clone(), amplitude: *value, phase: 0.0, harmonic: 0 });
-    }
-    let held = held.assemble().ok()?;
-    let fixed = values_by_row(system, start);
-    let equilibrium = StaticEquilibrium::of(&held)?;
-    // restores the held rows, which the equilibrium does not contain
-    let mut free = equilibrium.displacement().iter();
-    let row = |row: usize| fixed.get(&row).copied().or_else(|| free.next().copied());
-    let displacement: Vec<f64> = (0..system.dofs()).map(row).collect::<Option<_>>()?;
-    let complete = held.dofs() + fixed.len() == system.dofs();
-    complete.then(|| Start { displacement, states: equilibrium.joint_states().to_vec() })
+pub(crate) fn held_equilibrium(system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
+    let places = system.places().iter().zip(system.place_axes());
+    let held: Vec<(Axis, f64)> =
+        places.filter_map(|(place, along)| Some((along.clone(), *start?.get(place)?))).collect();
+    let equilibrium = StaticEquilibrium::holding(system, &held)?;
+    Some(Start { displacement: equilibrium.displacement().to_vec(), states: equilibrium.joint_states().to_vec() })
 }

@@ -74,14 +74,15 @@ impl ModelNames {
         names
     }
 
-    /// The displacements of masses and bodies whose motion is not imposed.
+    /// The displacements of masses, bodies and places whose motion is not imposed.
     pub fn free_displacements(model: &Model) -> ModelNames {
-        let displacements = body_places(model).map(|(name, mut places)| {
+        let of_places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
+        let displacements = body_places(model).chain(of_places).map(|(name, mut places)| {
             places.retain(|place| !model.is_rotation(place));
             (name, places)
         });
-        let of_bodies = displacements.filter(|(_, places)| !places.is_empty());
-        let mut names = ModelNames { known: mass_places(model).chain(of_bodies).collect() };
+        let named = displacements.filter(|(_, places)| !places.is_empty());
+        let mut names = ModelNames { known: mass_places(model).chain(named).collect() };
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names

@@ -130,7 +130,7 @@ fn stated_reduction(reduce: &Values) -> Result<Reduction, (&'static str, &'stati
 ///
 /// With a given number of modes, the error is stated up to the highest excited frequency,
 /// because no reduction is accurate near its last modes. A small structure with joints is not
-/// reduced if `method` treats all laws exactly.
+/// reduced if `method` treats all laws exactly, or if the study has no excitation frequency.
 pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &Values) {
     let harmonic =
         model.forces.iter().map(|force| force.harmonic).chain(model.motions.iter().map(|motion| motion.harmonic));
@@ -145,6 +145,14 @@ pub(crate) fn set_frequency_range(model: &mut Model, values: &Values, method: &V
     let Some(Substructure { component, reduction, disk, .. }) = model.substructure.as_mut() else { return };
     if joints && exact && disk.is_none() && *reduction == Reduction::up_to(0.0) && is_unreduced(component) {
         *reduction = UNREDUCED;
+    }
+    if excited == 0.0
+        && is_unreduced(component)
+        && matches!(*reduction, Reduction::UpTo { up_to: 0.0, kind: None, .. } | UNREDUCED)
+    {
+        // a free decay has no excitation frequency, and a small structure keeps all its modes
+        *reduction = Reduction::None { up_to: 1.01 * highest_frequency(component) };
+        return;
     }
     match reduction {
         Reduction::UpTo { up_to, .. } | Reduction::None { up_to } if *up_to <= 0.0 => {
@@ -172,6 +180,11 @@ fn is_unreduced(component: &Component) -> bool {
     //   and more with ten;
     // - all rows, `auto`: 0.02 to 0.1.
     component.dofs() <= 100 && component.has_definite_mass()
+}
+
+/// Returns the highest natural frequency of a small structure, rad/s; zero if it is not found.
+fn highest_frequency(component: &Component) -> f64 {
+    component.frequencies(component.dofs()).ok().and_then(|all| all.last().copied()).unwrap_or(0.0)
 }
 
 /// Returns the upper end of the frequency range with joints, rad/s: the highest odd harmonic of

@@ -987,3 +987,67 @@ fn reduction_error_of_joint_harmonics_is_measured() {
     assert!(!stuck.notes.iter().any(|note| note.contains("slip")), "{:?}", stuck.notes);
     assert!(numbers(&stuck, "reduction_error").iter().all(|error| *error < Reduction::TOLERANCE));
 }
+
+/// The tip of a blade is pulled to 2 mm and released, without a frequency range for the reduction
+/// or the damping. The pulled shape is `K⁻¹ f` with the tip at 2 mm, from the dense matrices, for
+/// all rows and for a reduced model, and it decays with the stated damping ratio. A stuck joint
+/// at the middle is a spring.
+#[test]
+fn a_pulled_place_is_in_equilibrium() {
+    let folder = tempfile::tempdir().unwrap();
+    let brick = Brick::new([4, 1, 1], [0.08, 0.02, 0.004], true);
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    let number = |x: usize| 101 + brick.row([x, 0, 0], 0).unwrap() / 3;
+    let row = |x: usize| brick.row([x, 0, 0], 2).unwrap();
+    let (tip, middle, joint) = (row(4), row(2), 2e5);
+    let mut stiffness = full(&brick.stiffness);
+    stiffness[(middle, middle)] += joint;
+    let mut force = DVector::zeros(brick.dofs());
+    force[tip] = 1.0;
+    let shape = stiffness.lu().solve(&force).unwrap();
+    let expected = 2e-3 * shape[middle] / shape[tip];
+    for reduce in ["reduce = false", "reduce = { up_to = \"20 kHz\" }", ""] {
+        let text = format!(
+            "{}modal_damping = \"0.3 %\"\n{reduce}\n[[place]]\nname = \"tip\"\ndof = \"{}.z\"\n\
+             [[place]]\nname = \"middle\"\ndof = \"{}.z\"\n[[joint]]\nname = \"j\"\nbetween = [\"middle\", \"ground\"]\n\
+             law = {{ kind = \"jenkins\", stiffness = \"200 N/mm\", limit = \"10 kN\" }}\n\
+             [study]\nkind = \"transient\"\nstart = {{ tip = \"2 mm\" }}\nduration = \"40 ms\"\ntime_step = \"0.1 ms\"\n",
+            structure("mtx", "rows.csv", "m-kg-s", ""),
+            number(4),
+            number(2),
+        );
+        let path = folder.path().join("study.toml");
+        std::fs::write(&path, text).unwrap();
+        let found = run(
+            &read_file(&path, &[]).unwrap_or_else(|error| panic!("{reduce}: {error}")),
+            &Context::without_progress(1),
+        )
+        .unwrap();
+        let start = |place: &str| found.tables[0].numbers(&format!("{place}_displacement_m")).unwrap()[0];
+        assert!((start("tip") - 2e-3).abs() < 1e-14, "{reduce}: {}", start("tip"));
+        assert!((start("middle") / expected - 1.0).abs() < 1e-3, "{reduce}: {} {expected}", start("middle"));
+    }
+}
+
+/// The place of a structure does not determine an unloaded beginning or a velocity.
+#[test]
+fn a_place_of_a_structure_is_held_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let brick = Brick::new([4, 1, 1], [0.08, 0.02, 0.004], true);
+    write_pair(folder.path(), &brick, "mtx", (1.0, 1.0));
+    let tip = 101 + brick.row([4, 0, 0], 0).unwrap() / 3;
+    for (start, key) in [
+        ("start = { tip = \"2 mm\" }\nbegin = \"unloaded\"", "start"),
+        ("start_velocity = { tip = \"1 m/s\" }", "start_velocity"),
+    ] {
+        let text = format!(
+            "{}modal_damping = \"0.3 %\"\n[[place]]\nname = \"tip\"\ndof = \"{tip}.z\"\n[study]\nkind = \"transient\"\n{start}\n\
+             duration = \"4 ms\"\ntime_step = \"0.1 ms\"\n",
+            structure("mtx", "rows.csv", "m-kg-s", ""),
+        );
+        let path = folder.path().join("study.toml");
+        std::fs::write(&path, text).unwrap();
+        let error = read_file(&path, &[]).unwrap_err().to_string();
+        assert!(error.contains(key) && error.contains("the place `tip` alone"), "{error}");
+    }
+}

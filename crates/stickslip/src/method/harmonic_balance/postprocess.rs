@@ -179,7 +179,8 @@ pub(super) fn orbit(
     let contracts = orbit_check.as_ref().is_some_and(|orbit_check| orbit_check.proves());
     let top = harmonics.last().copied();
     let stuck_names = measured.stuck_names();
-    let path = FourierPath { system: system.clone(), omega, harmonics, x, force, contact, stuck: measured.stuck.clone() };
+    let path =
+        FourierPath { system: system.clone(), omega, harmonics, x, force, contact, stuck: measured.stuck.clone() };
     let ReturnEvidence { derivative, defect } = orbit_check.map_or_else(ReturnEvidence::default, |orbit_check| {
         orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck)
     });
@@ -553,13 +554,8 @@ impl Path for FourierPath {
     }
 
     fn return_map(&self, start: &[f64], symmetry: Symmetry) -> Option<DMatrix<f64>> {
-        let judged = OrbitCheck::of_any_size(&self.system).check(
-            &self.system,
-            self.omega,
-            (self, symmetry),
-            start,
-            &self.stuck,
-        );
+        let judged =
+            OrbitCheck::of_any_size(&self.system).check(&self.system, self.omega, (self, symmetry), start, &self.stuck);
         judged.derivative
     }
 

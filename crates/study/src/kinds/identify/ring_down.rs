@@ -70,7 +70,7 @@ impl Target for RingDown {
         let values = &case.values;
         let start = values.by_name("start");
         let begin = values.text("begin").unwrap_or(if start.is_some() { EQUILIBRIUM } else { UNLOADED });
-        let held = if begin == EQUILIBRIUM { held_equilibrium(&case.model, &system, start) } else { None };
+        let held = if begin == EQUILIBRIUM { held_equilibrium(&system, start) } else { None };
         let held = held.unwrap_or_else(|| Start { displacement: state_vector(&system, start), states: Vec::new() });
         let history = TimeHistory {
             displacement: held.displacement,

@@ -71,7 +71,7 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "start",
                 ValueType::ByName(Dimension::LENGTH),
-                "initial displacements of masses that are pulled and released, see `begin`; default: zero",
+                "initial displacements of masses and places that are pulled and released, see `begin`; default: zero",
                 "{ blade1 = \"1 mm\" }",
             ),
             optional(
@@ -84,7 +84,7 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "start_velocity",
                 ValueType::ByName(Dimension::VELOCITY),
-                "initial velocities; default: zero",
+                "initial velocities of masses; default: zero",
                 "{ blade1 = \"0.1 m/s\" }",
             ),
             default(
@@ -185,7 +185,14 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let free = ModelNames::free_displacements(model);
     for key in ["start", "start_velocity"] {
         for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
-            free.single_label(key, "free mass", name)?;
+            free.single_label(key, "free mass or place", name)?;
+            let is_place = model.places.iter().any(|place| place.places().contains(name));
+            if is_place && (key != "start" || values.text("begin") == Some(UNLOADED)) {
+                let message =
+                    format!("the place `{name}` alone does not determine the motion of its structure or body");
+                let help = "hold it with `start` and begin = \"equilibrium\", or push it with a [[force]]";
+                return Err(KeyError::new(key, message, help));
+            }
         }
     }
     let unknown =
@@ -256,8 +263,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     let start_values = values.by_name("start");
     let begin = values.text("begin").unwrap_or(if start_values.is_some() { EQUILIBRIUM } else { UNLOADED });
-    let start_state =
-        if begin == EQUILIBRIUM { held_equilibrium(&case.model, &prepared.system, start_values) } else { None };
+    let start_state = if begin == EQUILIBRIUM { held_equilibrium(&prepared.system, start_values) } else { None };
     if begin == EQUILIBRIUM && start_state.is_none() {
         let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
             with begin = \"unloaded\"";
