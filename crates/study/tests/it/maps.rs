@@ -192,3 +192,23 @@ fn wrong_ranges_are_reported_at_their_place() {
     let error = read(&drawn).unwrap_err();
     assert!(error.to_string().contains("no random draws"), "{error}");
 }
+
+/// The range ends below the resonance of the stuck oscillator, at 0.19 Hz. These cells have the
+/// lowest amplitudes, but they are no peaks: a warning names them, and the mark is at another
+/// cell.
+#[test]
+fn an_amplitude_at_the_end_of_the_range_is_no_lowest_peak() {
+    let study = "kind = \"map\"\nfrequency = { from = \"0.14 Hz\", to = \"0.17 Hz\", points = 31 }\n\
+         over = { F0 = { from = \"0.001 N\", to = \"4 N\", points = 2 }, Ft = { from = \"0.001 N\", to = \"5 N\", points = 3 } }";
+    let data = dataset(study);
+    let table = data.tables.iter().find(|table| table.name == "map").unwrap();
+    let (at_end, height) = (table.flags("at_range_end").unwrap(), table.numbers("amplitude_m").unwrap());
+    let cells = |wanted: bool| (0..table.rows()).filter(move |row| at_end[*row] == Some(wanted));
+    let lowest = cells(false).min_by(|a, b| height[*a].total_cmp(&height[*b])).unwrap();
+    assert!(cells(true).any(|row| height[row] < height[lowest]), "{height:?} {at_end:?}");
+    let warned = data.notes.iter().filter(|note| note.contains("at an end of `frequency`")).count();
+    assert_eq!(warned, 1, "{:?}", data.notes);
+    let marks = data.figure.panels[0].series.iter().find(|series| series.label.contains("lowest")).unwrap();
+    let value = |name: &str| table.numbers(name).unwrap()[lowest];
+    assert_eq!((marks.x[0], marks.y[0]), (value("F0_N"), value("Ft_N")));
+}

@@ -4,7 +4,7 @@ use super::MAP;
 use super::contours::{Grid, levels};
 use crate::case::study::VariedValue;
 use crate::compile::compiled::RangeScale;
-use crate::results::columns::AMPLITUDE;
+use crate::results::columns::{AMPLITUDE, AT_RANGE_END};
 use crate::results::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Table};
 use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, evenly_chosen, join_title, largest, numbers};
 use crate::syntax::format::plural_suffix;
@@ -30,7 +30,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
             let axis = axis.with_range(points[0], points[points.len() - 1]);
             if axes[which].1 == Some(RangeScale::Log) { axis.log() } else { axis }
         };
-        Some(panel(&grid, [axis(0, &grid.x), axis(1, &grid.y)], label, &peak.unit))
+        Some(panel(&grid, map.lowest(&grid), [axis(0, &grid.x), axis(1, &grid.y)], label, &peak.unit))
     });
     let mut panels: Vec<Panel> = panels.collect();
     if maps.len() > panels.len()
@@ -70,6 +70,20 @@ impl Map<'_> {
         let values = (0..y.len()).map(|row| (0..x.len()).map(|column| peak(row, column)).collect()).collect();
         (x.len() > 1 && y.len() > 1).then_some(Grid { x, y, values })
     }
+
+    /// Returns the values of both parameters at the lowest peak. Largest amplitudes at an end of
+    /// the frequency range may not be peaks and do not count.
+    fn lowest(&self, grid: &Grid) -> Option<[f64; 2]> {
+        let at_end = self.table.flags(AT_RANGE_END).unwrap_or_default();
+        let is_peak = |(column, row): &(usize, usize)| {
+            let at = self.rows.rows.start + column * self.columns + row;
+            at_end.get(at) == Some(&Some(false)) && grid.values[*row][*column].is_finite()
+        };
+        let cells = (0..grid.x.len()).flat_map(|column| (0..grid.y.len()).map(move |row| (column, row)));
+        let height = |(column, row): &(usize, usize)| grid.values[*row][*column];
+        let lowest = cells.filter(is_peak).min_by(|a, b| height(a).total_cmp(&height(b)));
+        lowest.map(|(column, row)| [grid.x[column], grid.y[row]])
+    }
 }
 
 /// Removes the rounding error of a change of units.
@@ -77,7 +91,7 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
 }
 
-fn panel(grid: &Grid, [x, y]: [Axis; 2], label: String, unit: &str) -> Panel {
+fn panel(grid: &Grid, lowest: Option<[f64; 2]>, [x, y]: [Axis; 2], label: String, unit: &str) -> Panel {
     let edges = edges(&grid.y, y.scale);
     let mut series: Vec<Series> = grid
         .values
@@ -97,10 +111,8 @@ fn panel(grid: &Grid, [x, y]: [Axis; 2], label: String, unit: &str) -> Panel {
     if failed > 0 {
         title = join_title([title, format!("{failed} empty tile{} without a peak", plural_suffix(failed))]);
     }
-    let cells =
-        grid.values.iter().zip(&grid.y).flat_map(|(row, y)| row.iter().zip(&grid.x).map(move |(v, x)| (v, x, y)));
-    if let Some((_, x, y)) = cells.filter(|cell| cell.0.is_finite()).min_by(|a, b| a.0.total_cmp(b.0)) {
-        series.push(Series::marks("lowest peak of the grid", vec![*x], vec![*y], 1));
+    if let Some([x, y]) = lowest {
+        series.push(Series::marks("lowest peak of the grid", vec![x], vec![y], 1));
     }
     Panel { title, x, y, series, ..Panel::default() }
 }

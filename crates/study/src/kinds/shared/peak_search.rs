@@ -6,7 +6,7 @@ use super::peak_of::check_peak_of;
 use crate::case::values::{Values, hertz};
 use crate::kinds::info::KeyError;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY, REVERSE_SWEEP};
-use crate::results::notes::Note;
+use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, PreparedCase, UnitResult, UnitTask};
 use stickslip::curve::bidirectional_sweep;
@@ -52,6 +52,10 @@ pub(in crate::kinds) fn count(prepared: &PreparedCase, row: &PerformanceRow, par
             row.inaccurate
         );
         Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
+    }
+    if row.peak.is_some_and(|peak| peak.at_end && peak.value > 0.0) {
+        let text = "the largest amplitude is at an end of `frequency`, so the peak may lie outside; widen the range.";
+        Note::for_case(&prepared.case.label(), format!("{WARNING}{text}")).merge_into(&mut part.notes);
     }
 }
 
