@@ -70,15 +70,11 @@ impl<'a> Request<'a> {
         Request { seed, ..self }
     }
 
-    /// Skips an error estimate that costs extra: for searches between orbits with known errors.
+    /// Skips the error estimate, and the check by a time integration of an orbit that another
+    /// method found: for searches between orbits with known errors, and for fits, which compare
+    /// thousands of orbits with measured values.
     pub fn without_estimate(self) -> Self {
         Request { estimate: ErrorEstimate::Skipped, ..self }
-    }
-
-    /// Skips the error estimate, and the check of the orbit by a time integration where another
-    /// method found it: for fits, which compare thousands of orbits with measured values.
-    pub fn unchecked(self) -> Self {
-        Request { estimate: ErrorEstimate::Unchecked, ..self }
     }
 }
 
@@ -87,10 +83,8 @@ impl<'a> Request<'a> {
 pub enum ErrorEstimate {
     /// Every orbit gets an error estimate, if the method has one.
     Required,
-    /// The orbit may have no error estimate.
+    /// The orbit may have no error estimate, no stability and no return defect.
     Skipped,
-    /// The orbit may have no error estimate, no stability, and no return defect.
-    Unchecked,
 }
 
 /// Finds orbits of one system.

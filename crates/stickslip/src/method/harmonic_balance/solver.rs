@@ -388,7 +388,7 @@ impl HarmonicBalanceSolver {
     /// Finds the orbit of a request within the work limit that is set.
     fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
         let series = request.seed.and_then(|seed| self.series_of(seed));
-        if let (ErrorEstimate::Skipped | ErrorEstimate::Unchecked, Some((top, motion))) = (request.estimate, &series) {
+        if let (ErrorEstimate::Skipped, Some((top, motion))) = (request.estimate, &series) {
             // the number of harmonics of the neighbouring orbit is sufficient
             return self.solve_nearby(*top, omega, motion);
         }
@@ -419,7 +419,7 @@ impl Solver for HarmonicBalanceSolver {
             return Err(OrbitError::Frequency { omega });
         }
         self.begin_point(omega, budget.remaining());
-        self.is_checked = request.estimate != ErrorEstimate::Unchecked;
+        self.is_checked = request.estimate == ErrorEstimate::Required;
         let found = self.solve_point(request, omega / self.periods as f64);
         budget.charge(self.work_fraction());
         found

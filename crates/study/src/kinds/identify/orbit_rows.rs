@@ -107,7 +107,7 @@ impl OrbitRows {
                 for row in rows {
                     let own = starts.get(first + states.len()).and_then(Option::as_ref);
                     let seed = own.or(before.as_ref());
-                    let request = Request::at(row.omega).unchecked();
+                    let request = Request::at(row.omega).without_estimate();
                     let found = solver.solve(&request.near(seed), &mut Budget::default());
                     let found = match (found, seed) {
                         // an orbit of other parameters may be no good initial guess
