@@ -105,7 +105,9 @@ pub(crate) fn build_model(
             stiffness: number(&values, "stiffness"),
             damping: number(&values, "damping"),
         };
-        if let Some(ratio) = values.quantity(DAMPING_RATIO) {
+        // an unknown end is reported when the model is checked
+        let is_known = spring.between.iter().all(|end| is_known_end(end, lists, &model));
+        if let Some(ratio) = values.quantity(DAMPING_RATIO).filter(|_| is_known) {
             match critical_damping(&spring, lists, &model.masses) {
                 Ok(critical) => spring.damping = ratio * critical,
                 Err(why) => wrong.push(damping_ratio_problem(table, &why)),
@@ -163,16 +165,33 @@ pub(crate) fn build_model(
     (model, forces, motions)
 }
 
+/// Tells whether a key of a table has this text as its value.
+fn has_text(table: &CompiledTable, key: &str, text: &str) -> bool {
+    let value = table.entry(key).map(|entry| &entry.value);
+    matches!(value, Some(CompiledValue::Fixed(ResolvedValue::Text(stated))) if stated == text)
+}
+
+/// Returns the node of an end of a spring, without its direction.
+fn node_of(end: &str) -> &str {
+    end.strip_prefix(NEXT).unwrap_or(end).split('.').next().unwrap_or_default()
+}
+
+/// Tells whether the end of a spring is the ground, a moved place, or a mass, body or place of
+/// the file, perhaps with a direction.
+fn is_known_end(end: &str, lists: &ModelLists, model: &Model) -> bool {
+    let node = node_of(end);
+    end == GROUND
+        || model.masses.iter().any(|mass| mass.name == node)
+        || model.bodies.iter().any(|body| body.name == node)
+        || lists.place.iter().any(|table| has_text(table, "name", node))
+        || lists.motion.iter().any(|table| has_text(table, "on", end))
+}
+
 /// Returns the critical damping `2 sqrt(k m)` of a spring, kg/s, with `m` the mass at its end.
 /// Between two masses, `m = m1 m2/(m1 + m2)`. The error says in words which value is missing.
 fn critical_damping(spring: &Spring, lists: &ModelLists, masses: &[Mass]) -> Result<f64, String> {
-    let node = |name: &str| name.strip_prefix(NEXT).unwrap_or(name).split('.').next().unwrap_or_default().to_owned();
-    let moved = |name: &str| {
-        lists.motion.iter().any(
-            |table| matches!(table.entry("on").map(|on| &on.value), Some(CompiledValue::Fixed(ResolvedValue::Text(on))) if on == name),
-        )
-    };
-    let inverse_mass = |name: &String| match masses.iter().find(|mass| mass.name == node(name)) {
+    let moved = |name: &str| lists.motion.iter().any(|table| has_text(table, "on", name));
+    let inverse_mass = |name: &String| match masses.iter().find(|mass| mass.name == node_of(name)) {
         Some(mass) => Ok(1.0 / mass.mass),
         None if name == GROUND || moved(name) => Ok(0.0),
         None => Err(format!("the mass of `{name}` is unknown here")),

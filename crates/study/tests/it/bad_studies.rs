@@ -669,7 +669,10 @@ fn damping_ratio_of_a_spring() {
         ("between = [\"m\", \"ground\"]\nstiffness", "between = [\"x\", \"ground\"]\nstiffness"),
         ("damping = \"2 N s/m\"", "damping = \"2 %\""),
     ];
-    refused(&other, "damping_ratio", &["the mass of `x` is unknown", "2*zeta*sqrt(k*m)"]);
+    refused(&other, "between", &["`x`"]);
+    let body = "[[body]]\nname = \"b\"\nmass = \"3 kg\"\ninertia = \"1 kg m^2\"\ndirections = [\"x\", \"z\"]\n\
+         [[spring]]\nbetween = [\"b.x\", \"ground\"]\nstiffness = \"10 N/mm\"\ndamping = \"2 %\"\n[[joint]]";
+    refused(&[("[[joint]]", body)], "damping_ratio", &["the mass of `b.x` is unknown", "2*zeta*sqrt(k*m)"]);
     let massless = [("1 kg", "0 kg"), ("damping = \"2 N s/m\"", "damping = \"2 %\"")];
     refused(&massless, "damping_ratio", &["no end of this spring has a mass"]);
 }
