@@ -64,18 +64,18 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
 }
 
 /// The widths of the fields of a block, from its format `(3i9,6e21.13e3)`.
-struct Widths {
+struct FieldWidths {
     integers: usize,
     integer: usize,
     real: usize,
 }
 
-impl Widths {
-    fn new(line: &Line) -> Result<Widths, Error> {
+impl FieldWidths {
+    fn new(line: &Line) -> Result<FieldWidths, Error> {
         let text = String::from_utf8_lossy(line.text).to_lowercase();
         let wrong = || line.malformed("a format such as (3i9,6e21.13e3)", &quoted(line.text));
         let inside = text.trim().strip_prefix('(').and_then(|text| text.strip_suffix(')')).ok_or_else(wrong)?;
-        let mut widths = Widths { integers: 0, integer: 0, real: 0 };
+        let mut widths = FieldWidths { integers: 0, integer: 0, real: 0 };
         for part in inside.split(',') {
             let (count, rest) = part.split_once(['i', 'e']).ok_or_else(wrong)?;
             let width = rest.split('.').next().and_then(|width| width.parse().ok());
@@ -105,7 +105,7 @@ fn ends(line: &Line) -> bool {
 
 fn nodes(lines: &mut Lines, builder: &mut MeshBuilder) -> Result<(), Error> {
     let head = lines.expect("the format of the nodes")?;
-    let widths = Widths::new(&head)?;
+    let widths = FieldWidths::new(&head)?;
     for line in lines.by_ref() {
         if ends(&line) {
             return Ok(());
@@ -124,7 +124,7 @@ fn nodes(lines: &mut Lines, builder: &mut MeshBuilder) -> Result<(), Error> {
 
 fn elements(lines: &mut Lines, types: &HashMap<i64, i64>, builder: &mut MeshBuilder) -> Result<(), Error> {
     let head = lines.expect("the format of the elements")?;
-    let widths = Widths::new(&head)?;
+    let widths = FieldWidths::new(&head)?;
     while let Some(line) = lines.next() {
         if ends(&line) {
             return Ok(());
@@ -204,7 +204,7 @@ fn component(line: &Line, lines: &mut Lines, kind: &str, builder: &mut MeshBuild
     let count = count.split('!').next().unwrap_or_default().trim();
     let count = line.count(count.as_bytes())?;
     let head = lines.expect("the format of a component")?;
-    let widths = Widths::new(&head)?;
+    let widths = FieldWidths::new(&head)?;
     let kind = match kind.get(..4) {
         Some("NODE") => SetKind::Nodes,
         _ => SetKind::Elements,

@@ -33,7 +33,7 @@ fn sniff(bytes: &[u8]) -> bool {
 }
 
 /// An element type of Gmsh.
-struct ElementType {
+struct GmshElement {
     code: i64,
     /// The shape; `None` for points and lines, which only carry nodes into groups.
     shape: Option<Shape>,
@@ -41,7 +41,7 @@ struct ElementType {
     order: &'static [usize],
 }
 
-fn element_type(code: i64) -> Option<ElementType> {
+fn element_type(code: i64) -> Option<GmshElement> {
     let (shape, order): (Option<Shape>, &[usize]) = match code {
         1 | 8 | 15 => (None, &[]),
         2 => (Shape::face(3), &[]),
@@ -58,7 +58,7 @@ fn element_type(code: i64) -> Option<ElementType> {
         19 => (Shape::solid(13), &[0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12]),
         _ => return None,
     };
-    Some(ElementType { code, shape, order })
+    Some(GmshElement { code, shape, order })
 }
 
 /// A group or an entity: dimension and number.
@@ -222,7 +222,7 @@ impl Gmsh<'_, '_> {
         let kind = element_type(code);
         match &kind {
             None => self.builder.leave_out(&format!("{code} of Gmsh")),
-            Some(ElementType { shape: Some(shape), order, .. }) => {
+            Some(GmshElement { shape: Some(shape), order, .. }) => {
                 if !order.is_empty() && nodes.len() == order.len() {
                     let ordered: Vec<i64> = order.iter().map(|position| nodes[*position]).collect();
                     self.builder.element(number, *shape, &ordered, line)?;
@@ -233,8 +233,8 @@ impl Gmsh<'_, '_> {
             Some(_) => {}
         }
         let dimension = match kind {
-            Some(ElementType { shape: Some(shape), .. }) => 2 + i64::from(shape.is_solid()),
-            Some(ElementType { code, .. }) => i64::from(code != 15),
+            Some(GmshElement { shape: Some(shape), .. }) => 2 + i64::from(shape.is_solid()),
+            Some(GmshElement { code, .. }) => i64::from(code != 15),
             // a type that is not read has nodes in its group, whose name is not known
             None => return Ok(()),
         };

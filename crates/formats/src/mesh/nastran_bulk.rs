@@ -37,13 +37,13 @@ fn name(line: &Line) -> String {
 }
 
 /// A card with the fields of all its lines.
-struct Card<'a> {
+struct BulkCard<'a> {
     name: String,
     fields: Vec<&'a [u8]>,
     line: Line<'a>,
 }
 
-impl Card<'_> {
+impl BulkCard<'_> {
     fn field(&self, at: usize) -> &[u8] {
         self.fields.get(at).copied().unwrap_or_default()
     }
@@ -54,7 +54,7 @@ impl Card<'_> {
 }
 
 fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
-    let mut card: Option<Card> = None;
+    let mut card: Option<BulkCard> = None;
     let mut sets: Vec<StatedSet> = Vec::new();
     let mut lines = Lines::new(file.bytes);
     while let Some(line) = lines.next() {
@@ -76,7 +76,7 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
                 return Err(Error::new(ErrorKind::Unsupported, line.location(), problem, remedy));
             }
             "" => {}
-            name => card = Some(Card { name: name.to_owned(), fields: fields(&line), line }),
+            name => card = Some(BulkCard { name: name.to_owned(), fields: fields(&line), line }),
         }
     }
     card.map_or(Ok(()), |card| add(&card, &mut sets, builder))?;
@@ -86,7 +86,7 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
 }
 
 /// Adds what a card states.
-fn add(card: &Card, sets: &mut Vec<StatedSet>, builder: &mut MeshBuilder) -> Result<(), Error> {
+fn add(card: &BulkCard, sets: &mut Vec<StatedSet>, builder: &mut MeshBuilder) -> Result<(), Error> {
     let solids = ["CTETRA", "CPYRAM", "CPENTA", "CHEXA"];
     let faces = ["CTRIA3", "CTRIA6", "CTRIAR", "CQUAD4", "CQUAD8", "CQUADR"];
     match card.name.as_str() {
@@ -107,7 +107,7 @@ fn add(card: &Card, sets: &mut Vec<StatedSet>, builder: &mut MeshBuilder) -> Res
     Ok(())
 }
 
-fn grid(card: &Card, builder: &mut MeshBuilder) -> Result<(), Error> {
+fn grid(card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
     for at in [1, 5] {
         if !card.field(at).is_empty() && card.integer(at)? != 0 {
             let problem = format!("grid point {} has the coordinate system {}", card.integer(0)?, card.integer(at)?);
@@ -122,7 +122,7 @@ fn grid(card: &Card, builder: &mut MeshBuilder) -> Result<(), Error> {
     builder.node(card.integer(0)?, position, &card.line)
 }
 
-fn element(card: &Card, builder: &mut MeshBuilder) -> Result<(), Error> {
+fn element(card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
     let (number, property) = (card.integer(0)?, card.field(1));
     // corners and most nodes; thickness and offsets follow the nodes of linear plates
     let (linear, quadratic) = match card.name.as_str() {
@@ -171,7 +171,7 @@ struct StatedSet {
 
 impl StatedSet {
     /// Reads the set of a card with its members from a field on; `None` without a number.
-    fn of_card(card: &Card, first: usize) -> Option<StatedSet> {
+    fn of_card(card: &BulkCard, first: usize) -> Option<StatedSet> {
         let number = integer(card.field(0))?;
         let words = card.fields.iter().skip(first).filter(|field| !field.is_empty());
         Some(StatedSet { name: format!("set_{number}"), words: words.map(|word| word.to_vec()).collect() })

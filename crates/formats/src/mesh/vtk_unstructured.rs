@@ -108,7 +108,7 @@ struct Encoding<'a> {
 }
 
 /// An array: its numbers, and whether they are integers.
-struct Array {
+struct DataArray {
     values: Vec<f64>,
     is_integer: bool,
 }
@@ -130,7 +130,7 @@ fn number_type(name: &str) -> Option<NumberType> {
 }
 
 impl Encoding<'_> {
-    fn array(&self, tag: &Tag) -> Result<Array, Error> {
+    fn array(&self, tag: &Tag) -> Result<DataArray, Error> {
         let kind = tag.attribute("type").unwrap_or_default();
         let number = number_type(&kind).ok_or_else(|| tag.malformed(format!("an array has the type `{kind}`")))?;
         let is_integer = !matches!(number, NumberType::F32 | NumberType::F64);
@@ -141,7 +141,7 @@ impl Encoding<'_> {
                 let number = |word: &[u8]| {
                     real(word).ok_or_else(|| tag.malformed(format!("`{}` is no number", String::from_utf8_lossy(word))))
                 };
-                return Ok(Array { values: words.map(number).collect::<Result<_, _>>()?, is_integer });
+                return Ok(DataArray { values: words.map(number).collect::<Result<_, _>>()?, is_integer });
             }
             "binary" => self.decode(tag, tag.text.trim_ascii(), true)?,
             "appended" => {
@@ -157,7 +157,7 @@ impl Encoding<'_> {
         while cursor.remaining() >= number.size() {
             values.push(number.real(&mut cursor)?);
         }
-        Ok(Array { values, is_integer })
+        Ok(DataArray { values, is_integer })
     }
 
     /// Decodes one array: a header with its size, or the sizes of its compressed blocks, then the
@@ -286,7 +286,7 @@ impl<'a> Piece<'a> {
                 (b"DataArray", b"PointData" | b"CellData", _)
                     if tag.attribute("type").is_some_and(|t| t.contains("Int")) =>
                 {
-                    let Array { values, is_integer } = encoding.array(tag)?;
+                    let DataArray { values, is_integer } = encoding.array(tag)?;
                     if is_integer && values.contains(&1.0) && values.iter().all(|value| *value == 0.0 || *value == 1.0)
                     {
                         let kind = if section == b"PointData" { SetKind::Nodes } else { SetKind::Elements };

@@ -136,12 +136,12 @@ impl ExactPath {
     /// Adds `Re Σ G_h e^{jhΩt}` to a signal of the piece.
     fn add_imposed(&self, piece: &PathSegment, imposed: &[(u32, Complex64)], signal: &mut [Complex64]) {
         for &(harmonic, amplitude) in imposed {
-            self.add_harmonic(piece, (f64::from(harmonic) * self.omega, amplitude), signal);
+            self.add_harmonic(piece, f64::from(harmonic) * self.omega, amplitude, signal);
         }
     }
 
     /// Adds `Re a e^{jωt}` of (ω, a) to a signal of the piece.
-    fn add_harmonic(&self, piece: &PathSegment, (rate, amplitude): (f64, Complex64), signal: &mut [Complex64]) {
+    fn add_harmonic(&self, piece: &PathSegment, rate: f64, amplitude: Complex64, signal: &mut [Complex64]) {
         if rate == 0.0 {
             signal[piece.basis().constant()].re += amplitude.re;
             return;
@@ -333,7 +333,9 @@ impl PathSignals for ExactMeasurement<'_> {
         })
     }
     fn harmonics(&self, parts: &[(f64, Complex64)]) -> Vec<Complex64> {
-        self.made(|piece, out| parts.iter().for_each(|part| self.path.add_harmonic(piece, *part, out)))
+        self.made(|piece, out| {
+            parts.iter().for_each(|(rate, amplitude)| self.path.add_harmonic(piece, *rate, *amplitude, out))
+        })
     }
     fn add(&self, to: &mut Vec<Complex64>, signal: &Vec<Complex64>, factor: f64) {
         to.iter_mut().zip(signal).for_each(|(to, value)| *to += value * factor);

@@ -109,7 +109,7 @@ impl Trajectory {
     }
 
     /// Returns the contact state of a joint at `s` in [0, 1] of a step.
-    fn contact(&self, joint: usize, (step, s): (usize, f64)) -> Contact {
+    fn contact(&self, joint: usize, step: usize, s: f64) -> Contact {
         if self.steps.jumps {
             return self.steps.contact_at_end(step)[joint];
         }
@@ -131,7 +131,7 @@ impl Trajectory {
         // remains.
         for _ in 0..20 {
             let between = 0.5 * (low + high);
-            if self.contact(joint, (step, between)) == from.1 { low = between } else { high = between }
+            if self.contact(joint, step, between) == from.1 { low = between } else { high = between }
         }
         high
     }
@@ -141,7 +141,7 @@ impl Trajectory {
     /// between others.
     fn contact_intervals(&self, joint: usize, step: usize) -> impl Iterator<Item = (Contact, f64)> {
         let (count, length) = (self.steps.nodes.len(), self.steps.spans[step].1);
-        let mut last = (0.0, self.contact(joint, (step, 0.0)));
+        let mut last = (0.0, self.contact(joint, step, 0.0));
         (0..count).flat_map(move |i| {
             let next = (self.steps.nodes[i].0, self.steps.node(step * count + i).contact[joint]);
             let (from, to) = (std::mem::replace(&mut last, next), next);
@@ -152,7 +152,7 @@ impl Trajectory {
 
     /// Returns the motion of the joints at `s` in [0, 1] of a step, for this time and state of
     /// the structure; mirrored if `sign` is -1.
-    fn joints(&self, (step, s): (usize, f64), time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
+    fn joints(&self, step: usize, s: f64, time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
         let sample = |(q, joint): (usize, &IndexedLaw)| {
             let mut motion = RelativeMotion::along(0.0, 0.0);
@@ -193,7 +193,7 @@ impl Path for Trajectory {
             let [from, to] = self.ends(step, |values| values[row]);
             (state[row], state[n + row], acceleration[row]) = quintic(s, length, from, to);
         }
-        let joints = self.joints((step, s), time, &state, sign);
+        let joints = self.joints(step, s, time, &state, sign);
         let forces: Vec<f64> = joints
             .iter()
             .zip(&self.assembly.joints)

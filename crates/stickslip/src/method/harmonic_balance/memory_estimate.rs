@@ -19,7 +19,7 @@ fn option_to_reduce(periods: usize) -> (&'static str, &'static str) {
 }
 
 /// Returns an error if `bytes` for this number of harmonics exceed the limit.
-pub(super) fn check_memory(bytes: f64, ports: &Ports, (harmonics, periods): (usize, usize)) -> Result<(), MethodError> {
+pub(super) fn check_memory(bytes: f64, ports: &Ports, harmonics: usize, periods: usize) -> Result<(), MethodError> {
     if bytes <= MEMORY {
         return Ok(());
     }

@@ -102,7 +102,7 @@ impl HarmonicBalanceSolver {
         let steep = ports.has_steep();
         let samples = method.samples_at(method.harmonics.unwrap_or(first), &ports, steep);
         let bytes = level_memory(banded.as_ref(), &ports, &dynamics, (harmonics.len(), samples));
-        check_memory(bytes, &ports, (harmonics.len(), periods))?;
+        check_memory(bytes, &ports, harmonics.len(), periods)?;
         let mut static_start = None;
         if kept.contains(0)
             && let Some(SolvedEquilibrium { orbit, states }) =

@@ -283,7 +283,7 @@ impl ReturnSymmetry {
 
     /// Returns the index of a coordinate of a state after a rotation by this number of sectors.
     /// Displacements, velocities and joint states are stored sector by sector.
-    fn place(&self, at: usize, (dofs, states): (usize, usize), turned: usize) -> usize {
+    fn place(&self, at: usize, dofs: usize, states: usize, turned: usize) -> usize {
         let (first, length) = match at / dofs.max(1) {
             0 => (0, dofs),
             1 => (dofs, dofs),
@@ -295,7 +295,7 @@ impl ReturnSymmetry {
     /// Transforms the end of a return so that it can be compared with the start.
     fn returned(&self, end: &[f64], dofs: usize) -> Vec<f64> {
         let mut out = vec![0.0; end.len()];
-        end.iter().enumerate().for_each(|(i, z)| out[self.place(i, (dofs, end.len()), self.turned)] = self.sign * z);
+        end.iter().enumerate().for_each(|(i, z)| out[self.place(i, dofs, end.len(), self.turned)] = self.sign * z);
         out
     }
 
@@ -307,7 +307,7 @@ impl ReturnSymmetry {
     fn rows_turned(&self, matrix: &DMatrix<f64>, dofs: usize, turned: usize) -> DMatrix<f64> {
         let mut out = matrix.clone();
         let states = matrix.nrows();
-        (0..states).for_each(|i| out.set_row(self.place(i, (dofs, states), turned), &matrix.row(i)));
+        (0..states).for_each(|i| out.set_row(self.place(i, dofs, states, turned), &matrix.row(i)));
         out
     }
 

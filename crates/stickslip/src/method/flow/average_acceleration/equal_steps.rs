@@ -148,7 +148,7 @@ impl AverageAccelerationFlow {
         self.assembly.accelerate(state, &mut self.load, force, acceleration);
     }
 
-    fn keep_step(&mut self, state: &[f64], (time, h): (f64, f64)) {
+    fn keep_step(&mut self, state: &[f64], time: f64, h: f64) {
         let n = self.assembly.n;
         let velocity: Vec<f64> = (0..self.assembly.axes.len())
             .map(|axis| self.assembly.relative(axis, state, &self.excitation, time + h).1)
@@ -225,7 +225,7 @@ impl Flow for AverageAccelerationFlow {
                 carried.advance(&self.assembly, &eliminated, &self.step.laws, &self.step.lu);
             }
             if self.keep {
-                self.keep_step(state, (time, h));
+                self.keep_step(state, time, h);
             }
         }
         if let (Some(carried), Some(sensitivity)) = (carried, sensitivity) {

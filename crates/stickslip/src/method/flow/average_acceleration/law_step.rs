@@ -12,14 +12,14 @@ use stickslip_numerics::small_lu::SmallLu;
 
 /// The view used to evaluate a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum View {
+enum LawView {
     Pieces,
     Step,
     Rate,
 }
 
 /// Returns the view of a law, if it has one: pieces without rigid sliders, a step, or a rate.
-fn view(law: &SharedLaw) -> Option<View> {
+fn view(law: &SharedLaw) -> Option<LawView> {
     let steps = |piece: &IdealElement| match piece {
         IdealElement::Slider(slider) => {
             slider.static_limit == 0.0 || (slider.stiffness.is_some() && slider.static_limit == slider.limit)
@@ -27,11 +27,11 @@ fn view(law: &SharedLaw) -> Option<View> {
         IdealElement::Stop { .. } => true,
     };
     if law.ideal_elements().is_some_and(|pieces| pieces.iter().all(steps)) {
-        return Some(View::Pieces);
+        return Some(LawView::Pieces);
     }
     match (law.step(), law.rate()) {
-        (Some(_), _) => Some(View::Step),
-        (None, Some(_)) => Some(View::Rate),
+        (Some(_), _) => Some(LawView::Step),
+        (None, Some(_)) => Some(LawView::Rate),
         (None, None) => None,
     }
 }
@@ -45,7 +45,7 @@ fn pieces(law: &SharedLaw) -> Vec<IdealElement> {
 /// Returns stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law
 /// evaluated by its pieces, in their order.
 pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
-    if view(law) != Some(View::Pieces) {
+    if view(law) != Some(LawView::Pieces) {
         return Vec::new();
     }
     let slider = |piece: IdealElement| match piece {
@@ -77,7 +77,7 @@ pub(crate) fn states_after_motion(
     let mut follower = LawIntegrator::new(&placed);
     // Number of steps of a slow motion for a law with a rate view. The trapezoidal rule then has a
     // relative error below 1e-6.
-    let steps = if follower.view == View::Rate { 2000 } else { 1 };
+    let steps = if follower.view == LawView::Rate { 2000 } else { 1 };
     let at = |step: usize| RelativeMotion {
         displacement: std::array::from_fn(|a| from[a] + (to[a] - from[a]) * step as f64 / steps as f64),
         velocity: std::array::from_fn(|a| to[a] - from[a]),
@@ -97,13 +97,13 @@ pub(crate) fn states_after_motion(
 /// Returns the number of states of a law in this method, and their scale.
 pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     match view(law)? {
-        View::Pieces => {
+        LawView::Pieces => {
             let sliders = pieces(law).iter().filter(|piece| matches!(piece, IdealElement::Slider(_))).count();
             let scale = law.force_scale();
             Some((sliders, if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }))
         }
-        View::Step => law.step().map(|step| (step.states(), step.state_scale())),
-        View::Rate => law.rate().map(|rate| (rate.states(), rate.state_scale())),
+        LawView::Step => law.step().map(|step| (step.states(), step.state_scale())),
+        LawView::Rate => law.rate().map(|rate| (rate.states(), rate.state_scale())),
     }
 }
 
@@ -117,7 +117,7 @@ pub(super) struct LawInstant<'a> {
 /// Integrates one law, with its scratch memory.
 #[derive(Debug, Clone)]
 pub(super) struct LawIntegrator {
-    view: View,
+    view: LawView,
     pieces: Vec<IdealElement>,
     directions: usize,
     states: usize,
@@ -162,7 +162,7 @@ impl LawIntegrator {
     pub fn new(joint: &IndexedLaw) -> Self {
         let (directions, states) = (joint.directions, joint.states);
         LawIntegrator {
-            view: view(&joint.law).unwrap_or(View::Rate),
+            view: view(&joint.law).unwrap_or(LawView::Rate),
             pieces: pieces(&joint.law),
             directions,
             states,
@@ -183,7 +183,7 @@ impl LawIntegrator {
     /// Sets the limits of its sliders from the next values of the iterator, N.
     pub fn limit(&mut self, limits: &mut impl Iterator<Item = f64>) {
         for piece in &mut self.pieces {
-            if let (View::Pieces, IdealElement::Slider(slider)) = (self.view, piece)
+            if let (LawView::Pieces, IdealElement::Slider(slider)) = (self.view, piece)
                 && let Some(limit) = limits.next()
             {
                 (slider.limit, slider.static_limit) = (limit, limit);
@@ -212,7 +212,7 @@ impl LawIntegrator {
         match self.slipping {
             Some(sign) => Contact::slip(sign),
             // a slider below its limit sticks
-            None if self.view == View::Pieces && self.states > 0 => Contact::Stick,
+            None if self.view == LawView::Pieces && self.states > 0 => Contact::Stick,
             None => law.contact_state(velocity, &self.force[..self.directions]),
         }
     }
@@ -220,7 +220,7 @@ impl LawIntegrator {
     /// Evaluates the force of a state, as a step of zero length. The derivatives with respect
     /// to the motion are stored at u₁ and u₁'.
     pub fn evaluate(&mut self, law: &SharedLaw, at: LawInstant) {
-        if self.view == View::Rate {
+        if self.view == LawView::Rate {
             self.slopes.fill(0.0);
             let (directions, states, width) = (self.directions, self.states, self.arguments());
             if let Some(rate) = law.rate() {
@@ -243,7 +243,7 @@ impl LawIntegrator {
     /// Prepares for a step from this instant.
     pub fn begin(&mut self, law: &SharedLaw, from: LawInstant) {
         self.state.copy_from_slice(from.z);
-        if let (View::Rate, Some(rate)) = (self.view, law.rate()) {
+        if let (LawView::Rate, Some(rate)) = (self.view, law.rate()) {
             rate.evaluate_with_derivatives(self.directions, &from.motion, from.z, &mut self.before);
         }
     }
@@ -253,15 +253,15 @@ impl LawIntegrator {
     pub fn advance(&mut self, law: &SharedLaw, from: LawInstant, to: &RelativeMotion<f64>, h: f64) -> bool {
         self.slopes.fill(0.0);
         match self.view {
-            View::Pieces => {
+            LawView::Pieces => {
                 self.evaluate_pieces(from, to);
                 true
             }
-            View::Step => {
+            LawView::Step => {
                 self.step_over(law, from, to);
                 true
             }
-            View::Rate => self.integrate(law, from, to, h),
+            LawView::Rate => self.integrate(law, from, to, h),
         }
     }
 

@@ -341,7 +341,7 @@ impl RadauFlow {
     /// The motion diverges (in finite time if a force grows faster than the displacement), a
     /// law returns NaN, or the equations are too stiff. `speed` is the velocity scale at the
     /// start, m/s.
-    fn stalled(&self, state: &[f64], (time, step): (f64, f64), speed: f64) -> IntegrationError {
+    fn stalled(&self, state: &[f64], time: f64, step: f64, speed: f64) -> IntegrationError {
         let n = self.assembly.n;
         let fastest = state[n..2 * n].iter().fold(0.0f64, |fast, v| fast.max(v.abs()));
         if fastest > self.settings.unbounded_ratio * speed {
@@ -497,8 +497,7 @@ impl Flow for RadauFlow {
         let mut last = None;
         while position < total {
             let time = position as f64 * tick;
-            let h =
-                self.attempt(lengths, tick).ok_or_else(|| self.stalled(state, (time, self.length(tick)), scale.1))?;
+            let h = self.attempt(lengths, tick).ok_or_else(|| self.stalled(state, time, self.length(tick), scale.1))?;
             let ticks = 1u64 << (self.settings.levels - self.level);
             self.set_loads(time, h);
             self.predict(state, h, last, time);
@@ -515,7 +514,7 @@ impl Flow for RadauFlow {
             self.again = !error.is_finite() || error > 1.0;
             if self.again {
                 if !self.shorten(lengths, error) {
-                    return Err(self.stalled(state, (time, h), scale.1));
+                    return Err(self.stalled(state, time, h, scale.1));
                 }
                 continue;
             }

@@ -348,7 +348,7 @@ impl SetValuedFlow {
 
     /// Sets the initial guess of the step's unknowns: the extrapolated collocation polynomial
     /// of the last step, or the initial state.
-    fn predict(&mut self, state: &[f64], (time, h): (f64, f64), last: Option<f64>) {
+    fn predict(&mut self, state: &[f64], time: f64, h: f64, last: Option<f64>) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         if let Some(length) = last {
             for (i, c) in NODES.iter().enumerate() {
@@ -383,7 +383,7 @@ impl SetValuedFlow {
     ) -> bool {
         self.tried += 1;
         self.set_loads(begin.time, eliminated.length);
-        self.predict(state, (begin.time, eliminated.length), last);
+        self.predict(state, begin.time, eliminated.length, last);
         let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, (scale, derivatives));
         if solved {
             self.step.end(&self.assembly, eliminated, &self.loads, &mut self.next);
@@ -474,7 +474,7 @@ impl SetValuedFlow {
 
     /// Returns the margin of a joint's mode and its rate (1/s) at the end of the last solved
     /// step. Sets `slope` to the time derivative there.
-    fn at_end(&mut self, switch: Switch, time: f64, (h, scale): (f64, f64)) -> Option<(f64, f64)> {
+    fn at_end(&mut self, switch: Switch, time: f64, h: f64, scale: f64) -> Option<(f64, f64)> {
         let next = self.next.clone();
         if !self.set_slope(&next, time) {
             return None;
@@ -518,7 +518,7 @@ impl SetValuedFlow {
             {
                 return None;
             }
-            let (margin, rate) = self.at_end(switch, begin.time + h, (h, scale))?;
+            let (margin, rate) = self.at_end(switch, begin.time + h, h, scale)?;
             let change = -margin / rate;
             // rounding of the time, and of the zero
             if margin.abs() <= self.settings.rounding || change.abs() <= f64::EPSILON * self.stretch {
@@ -618,7 +618,7 @@ impl SetValuedFlow {
         (end as f64 * tick - begin.time, end)
     }
 
-    fn stalled(&self, (time, step): (f64, f64)) -> IntegrationError {
+    fn stalled(&self, time: f64, step: f64) -> IntegrationError {
         match self.step.joint_with_nan(&self.assembly) {
             Some(joint) => joint.not_finite_error(time),
             None => IntegrationError::Stalled { time, step },
@@ -652,7 +652,7 @@ impl SetValuedFlow {
         loop {
             let (h, end) = self.length(begin);
             if self.tried >= self.settings.step_limit || self.level > self.settings.levels {
-                return Err(self.stalled((begin.time, h)));
+                return Err(self.stalled(begin.time, h));
             }
             let (eliminated, level) = (self.elimination(begin, h), self.level);
             let solved = self.attempt(&eliminated, state, (begin, last), (scale.1, columns > 0));

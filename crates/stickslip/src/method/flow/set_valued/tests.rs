@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// A mass of 1 kg on a spring (N/m) and a damper (N s/m) under a force, with laws to the ground.
-fn oscillator(laws: &[SharedLaw], (stiffness, damping): (f64, f64), force: f64) -> System {
+fn oscillator(laws: &[SharedLaw], stiffness: f64, damping: f64, force: f64) -> System {
     let one = |value: f64| dmatrix![value];
     let structure = Structure::new(vec!["m".into()], one(1.0), one(damping), one(stiffness)).unwrap();
     let mut builder = System::builder(structure);
@@ -54,7 +54,7 @@ const STRIBECK: [(f64, f64, f64); 7] = [
 #[test]
 fn falling_friction_has_its_orbits() {
     let law: SharedLaw = Arc::new(Stribeck { limit: 2.0, static_limit: 3.0, velocity: 0.02 });
-    let system = oscillator(&[law], (1e4, 3.0), 6.0);
+    let system = oscillator(&[law], 1e4, 3.0, 6.0);
     assert_eq!(IntegratorKind::of(&system, None), IntegratorKind::Switched);
     assert_eq!(Auto.choice(&system).method, "shooting");
     for (frequency, amplitude, multiplier) in STRIBECK {
@@ -76,7 +76,7 @@ fn constant_friction_has_den_hartogs_orbit() {
     for (share, ratio, amplitude) in
         [(0.2, 0.8, 2.711_415_255_4), (0.5, 0.8, 2.332_234_987_5), (0.5, 1.2, 1.657_467_471_1)]
     {
-        let system = oscillator(&[Arc::new(Coulomb { limit: share }), nothing()], (1.0, 0.0), 1.0);
+        let system = oscillator(&[Arc::new(Coulomb { limit: share }), nothing()], 1.0, 0.0, 1.0);
         let found = orbit(&Shooting::default(), &system, ratio);
         let off = found.places[0].amplitude() - amplitude;
         assert!(off.abs() < 2e-10, "{share} {ratio}: {off:.1e} {:?}", found.evidence);

@@ -12,6 +12,24 @@ use crate::method::MethodError;
 use crate::method::harmonic_balance::NAME;
 use crate::model::{CollinearAxis, PARALLEL, SystemJoint};
 
+/// Compliance and scales of a new port.
+#[derive(Clone, Copy)]
+struct PortScales {
+    /// Compliance in series with the law, m/N.
+    series_compliance: f64,
+    /// Typical force of the law, N.
+    force: f64,
+    /// Smallest penalty of the resolvent, N/m.
+    least_penalty: f64,
+}
+
+impl PortScales {
+    /// Returns the scales of a port without compliance and without a smallest penalty.
+    fn of_force(force: f64) -> PortScales {
+        PortScales { series_compliance: 0.0, force, least_penalty: 0.0 }
+    }
+}
+
 /// The ports of the joints added so far.
 #[derive(Default)]
 pub(super) struct PortBuilder {
@@ -42,19 +60,23 @@ impl PortBuilder {
         }
         let scale = law.force_scale();
         if joint.axes().len() == 1 && law.masing().is_some() {
-            self.add(j, joint, Kernel::Masing(law.clone()), (0.0, scale, 0.0));
+            self.add(j, joint, Kernel::Masing(law.clone()), PortScales::of_force(scale));
             return Ok(());
         }
         if let Some(prox) = law.prox() {
             if !(scale.is_finite() && scale > 0.0) {
                 return Err(unsupported("its force scale is not finite and positive, which its resolvent needs"));
             }
-            let measures = (prox.compliance(), scale, prox.minimum_penalty());
-            self.add_force(j, joint, Kernel::Prox(ScaledLaw { law: law.clone(), times: 1.0 }), measures);
+            let scales = PortScales {
+                series_compliance: prox.compliance(),
+                force: scale,
+                least_penalty: prox.minimum_penalty(),
+            };
+            self.add_force(j, joint, Kernel::Prox(ScaledLaw { law: law.clone(), times: 1.0 }), scales);
         } else if law.step().is_some() {
-            self.add(j, joint, Kernel::Step(law.clone()), (0.0, scale, 0.0));
+            self.add(j, joint, Kernel::Step(law.clone()), PortScales::of_force(scale));
         } else if law.rate().is_some() {
-            self.add(j, joint, Kernel::Rate(law.clone()), (0.0, scale, 0.0));
+            self.add(j, joint, Kernel::Rate(law.clone()), PortScales::of_force(scale));
         } else {
             return Err(unsupported(
                 "it defines none of the views prox, step and rate, and no pieces along one direction",
@@ -63,7 +85,8 @@ impl PortBuilder {
         Ok(())
     }
 
-    fn add(&mut self, j: usize, joint: &SystemJoint, kernel: Kernel, (series, scale, least_penalty): (f64, f64, f64)) {
+    fn add(&mut self, j: usize, joint: &SystemJoint, kernel: Kernel, scales: PortScales) {
+        let PortScales { series_compliance, force: scale, least_penalty } = scales;
         let (first, axes) = (self.ports.axes.len(), joint.axes().len());
         self.ports.axes.extend((0..axes).map(|a| (j, a)));
         let members = vec![PortMember { joint: j, motion_ratio: 1.0, force_ratio: 1.0 }];
@@ -71,7 +94,7 @@ impl PortBuilder {
             members,
             first_axis: first,
             axes,
-            series_compliance: series,
+            series_compliance,
             scale,
             least_penalty,
             static_state: StaticState::default(),
@@ -103,15 +126,15 @@ impl PortBuilder {
             }
         }
         if !parts.is_empty() {
-            self.add(j, joint, Kernel::Sliders(parts), (0.0, scale, 0.0));
+            self.add(j, joint, Kernel::Sliders(parts), PortScales::of_force(scale));
         }
         if rigid > 0.0 {
-            self.add_force(j, joint, Kernel::Rigid(RigidFriction { limit: rigid }), (0.0, rigid, 0.0));
+            self.add_force(j, joint, Kernel::Rigid(RigidFriction { limit: rigid }), PortScales::of_force(rigid));
         }
     }
 
     /// Adds a force port, or adds the joint to an existing port with a proportional motion.
-    fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, measures: (f64, f64, f64)) {
+    fn add_force(&mut self, joint: usize, of: &SystemJoint, kernel: Kernel, scales: PortScales) {
         let lines: Vec<CollinearAxis> = of.axes().iter().map(CollinearAxis::of).collect();
         let found = self.lines.iter().find_map(|(port, its)| {
             let factor = motion_ratio(&lines, its)?;
@@ -122,7 +145,7 @@ impl PortBuilder {
             self.ports.list[port].members.push(PortMember { joint, motion_ratio: factor, force_ratio: share });
         } else {
             self.lines.push((self.ports.list.len(), lines));
-            self.add(joint, of, kernel, measures);
+            self.add(joint, of, kernel, scales);
         }
     }
 

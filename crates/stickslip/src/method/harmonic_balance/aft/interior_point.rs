@@ -106,7 +106,7 @@ impl InteriorPort {
     /// Sets the targets of the products to `gap`. With `corrected`, the targets include the
     /// second-order terms of the last step (Mehrotra's corrector). Writes the harmonics of the
     /// force after a step with an unchanged argument into `image`.
-    pub fn set_targets(&mut self, (gap, corrected): (f64, bool), aft: &mut FrequencyTime, image: &mut [Complex64]) {
+    pub fn set_targets(&mut self, gap: f64, corrected: bool, aft: &mut FrequencyTime, image: &mut [Complex64]) {
         let product = gap * self.unit;
         for (s, force) in self.samples.iter_mut().zip(&mut aft.force[0]) {
             let [step, upper, lower] = if corrected { s.step } else { [0.0; 3] };
@@ -167,7 +167,7 @@ mod tests {
             while barrier.remaining_gap() > 1e-10 {
                 let gap = barrier.gap(0.0);
                 barrier.linearise(&mut aft, &argument, &mut tangent);
-                barrier.set_targets((0.1 * gap, false), &mut aft, &mut image);
+                barrier.set_targets(0.1 * gap, false, &mut aft, &mut image);
                 let share = barrier.step(&mut aft, &argument);
                 assert!(share > 0.0 && share <= 1.0);
                 barrier.advance(share);

@@ -88,7 +88,7 @@ impl MasingBranches {
         self.memory.clear();
     }
 
-    fn push(&mut self, (begin, end): (f64, f64), sign: f64, turns: bool) {
+    fn push(&mut self, begin: f64, end: f64, sign: f64, turns: bool) {
         let first = self.points.len();
         self.points.extend_from_slice(&self.memory);
         self.list.push(MasingBranch {
@@ -199,7 +199,7 @@ impl FrequencyTime {
         if count == 0 {
             let last = branches.memory[branches.memory.len() - 1].value;
             let sign = if self.grid.value[0] < last { -1.0 } else { 1.0 };
-            branches.push((0.0, TAU), sign, false);
+            branches.push(0.0, TAU, sign, false);
         }
         for leg in 0..2 * count {
             let phase = |leg: usize| self.extremes[leg % count].phase + TAU * (leg / count) as f64;
@@ -226,9 +226,9 @@ impl FrequencyTime {
             let Some(from) = begin else { return };
             let to = value.map_or(end.phase, |value| {
                 let inside = (end.value - value) * sign > 0.0;
-                if inside { self.passage(series, (from, end.phase), value, sign) } else { end.phase }
+                if inside { self.passage(series, from, end.phase, value, sign) } else { end.phase }
             });
-            branches.push((from, to), sign, turns);
+            branches.push(from, to, sign, turns);
             (begin, turns) = (Some(to), false);
         };
         while let [.., before, here] = branches.memory[..] {
@@ -317,7 +317,7 @@ impl FrequencyTime {
             }
             row(&mut self.row, harmonics, points.last().map(|point| (point, -1.0)));
             add_product(tangent, &own, &self.row, harmonics);
-            integrate_over((branch.begin, branch.end), integrals);
+            integrate_over(branch.begin, branch.end, integrals);
             for (value, &h) in own.iter_mut().zip(harmonics) {
                 *value = integrals[h] * share(h);
             }
@@ -378,9 +378,9 @@ mod tests {
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
-    const LAWS: [(f64, f64); 5] = [(-0.5, 0.3), (-0.95, 0.0), (-0.2, 0.0), (0.0, 2.0), (-0.99, 0.1)];
+    const LAWS: [[f64; 2]; 5] = [[-0.5, 0.3], [-0.95, 0.0], [-0.2, 0.0], [0.0, 2.0], [-0.99, 0.1]];
 
-    fn law((chi, beta): (f64, f64)) -> Iwan {
+    fn law([chi, beta]: [f64; 2]) -> Iwan {
         Iwan { stiffness: 10.0, limit: 1.0, chi, beta, elements: 0 }
     }
 

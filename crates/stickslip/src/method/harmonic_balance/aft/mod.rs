@@ -507,7 +507,7 @@ impl FrequencyTime {
     }
 
     /// Samples the forces of a port in a converged motion, see [`FrequencyTime::force`].
-    pub fn sample(&mut self, port: &Port, (omega, penalty): (f64, f64), (c, force): (&[Complex64], &[Complex64])) {
+    pub fn sample(&mut self, port: &Port, omega: f64, penalty: f64, c: &[Complex64], force: &[Complex64]) {
         if let Kernel::Sliders(parts) = &port.kernel {
             return self.sample_slides(parts, &port.static_state, c);
         }

@@ -238,7 +238,7 @@ impl FrequencyTime {
             let trial = hold + kt * (value - from);
             if trial.abs() > limit {
                 let slip = limit.copysign(trial);
-                let onset = self.passage(series, (before, end), from + (slip - hold) / kt, slip.signum());
+                let onset = self.passage(series, before, end, from + (slip - hold) / kt, slip.signum());
                 self.intervals.push(hold_at(hold, from, anchor, begin, onset));
                 self.intervals.push(drag(onset, end, slip));
                 (hold, from, anchor, begin) = (slip, value, OffsetSource::At(end), end);
@@ -265,7 +265,7 @@ impl FrequencyTime {
             let end = b.phase + if leg + 1 == count { TAU } else { 0.0 };
             // the first passage out of the gap, into contact
             if a.value <= gap && b.value > gap {
-                opened = Some((leg, self.passage(series, (a.phase, end), gap, 1.0)));
+                opened = Some((leg, self.passage(series, a.phase, end, gap, 1.0)));
                 break;
             }
         }
@@ -281,11 +281,11 @@ impl FrequencyTime {
             let turns = |leg: usize| TAU * (leg / count) as f64;
             let (from, to) = (a.phase + turns(leg), b.phase + turns(leg + 1));
             if touching && b.value <= gap {
-                let end = self.passage(series, (from, to), gap, -1.0);
+                let end = self.passage(series, from, to, gap, -1.0);
                 self.intervals.push(closed(begin, end));
                 touching = false;
             } else if !touching && b.value > gap && leg < first + count {
-                begin = self.passage(series, (from, to), gap, 1.0);
+                begin = self.passage(series, from, to, gap, 1.0);
                 touching = true;
             }
         }
@@ -293,7 +293,7 @@ impl FrequencyTime {
 
     /// Returns the phase between two adjacent turning points at which the
     /// motion passes `value`. `upwards` is 1 or -1.
-    pub(super) fn passage(&self, series: HarmonicSeries, (before, after): (f64, f64), value: f64, upwards: f64) -> f64 {
+    pub(super) fn passage(&self, series: HarmonicSeries, before: f64, after: f64, value: f64, upwards: f64) -> f64 {
         let n = self.grid.value.len() as isize;
         let angle = TAU / n as f64;
         let u = |i: isize| self.grid.value[i.rem_euclid(n) as usize];
@@ -331,7 +331,7 @@ impl FrequencyTime {
         let [stiffness, integrals, _] = &mut self.spectra;
         stiffness.fill(ZERO);
         for interval in &self.intervals {
-            integrate_over((interval.begin, interval.end), integrals);
+            integrate_over(interval.begin, interval.end, integrals);
             for (sum, integral) in stiffness.iter_mut().zip(&*integrals) {
                 *sum += integral * (interval.stiffness / TAU);
             }
@@ -389,7 +389,7 @@ pub(super) fn add_multiple(to: &mut [f64], f: f64, row: &[Complex64]) {
 }
 
 /// Computes `∫ e^{-jmθ} dθ` over an interval, for m = 0, 1, …
-pub(super) fn integrate_over((begin, end): (f64, f64), out: &mut [Complex64]) {
+pub(super) fn integrate_over(begin: f64, end: f64, out: &mut [Complex64]) {
     let width = end - begin;
     if width >= TAU {
         out.fill(ZERO);

@@ -25,14 +25,14 @@ impl HarmonicSet {
     pub fn new(system: &System, counts: impl Fn(Complex64) -> bool) -> Self {
         let present = HarmonicSet::excitation_harmonics(system, counts);
         let unit = present.iter().fold(0, |a, &b| common_divisor(a, b)).max(1);
-        HarmonicSet::from_harmonics(system, &present, (unit, unit))
+        HarmonicSet::from_harmonics(system, &present, unit, unit)
     }
 
     /// Returns the set for an orbit of `periods` excitation periods: all harmonics of the
     /// orbit's frequency, except those that vanish by the symmetry of the laws.
     pub fn subharmonic(system: &System, periods: usize) -> Self {
         let present = HarmonicSet::excitation_harmonics(system, |z| z != Complex64::new(0.0, 0.0));
-        HarmonicSet::from_harmonics(system, &present, (1, periods))
+        HarmonicSet::from_harmonics(system, &present, 1, periods)
     }
 
     /// Returns the harmonics of the excitation whose amplitude `counts` accepts.
@@ -40,7 +40,7 @@ impl HarmonicSet {
         system.harmonics_of_excitation(counts).into_iter().map(|h| h as usize).collect()
     }
 
-    fn from_harmonics(system: &System, present: &[usize], (unit, scale): (usize, usize)) -> Self {
+    fn from_harmonics(system: &System, present: &[usize], unit: usize, scale: usize) -> Self {
         let highest = present.iter().copied().max().unwrap_or(0);
         let laws = system.joints().iter().all(|joint| joint.law().is_odd());
         HarmonicSet { unit, count_factor: scale, odd: laws && present.iter().all(|h| (h / unit) % 2 == 1), highest }

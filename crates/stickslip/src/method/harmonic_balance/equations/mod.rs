@@ -571,7 +571,7 @@ impl Discretization {
         }
         self.aft.static_share = 1.0;
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
-        self.aft.sample(port, (omega, self.linear.penalty[p]), (&motion.c[range.clone()], &motion.force[range]));
+        self.aft.sample(port, omega, self.linear.penalty[p], &motion.c[range.clone()], &motion.force[range]);
     }
 
     /// Returns the forces along all axes at the harmonics `wanted`, per harmonic, from the

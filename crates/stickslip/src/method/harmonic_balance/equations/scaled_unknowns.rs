@@ -18,7 +18,7 @@ impl Discretization {
         residual: &mut [f64],
         jacobian: Option<&mut [f64]>,
     ) {
-        self.unpack(ports, (unknowns, length), motion);
+        self.unpack(ports, unknowns, length, motion);
         let slopes = if jacobian.is_some() { DerivativeScope::All } else { DerivativeScope::None };
         self.evaluate(SearchContext::given(ports, omega), motion, length, slopes);
         for ((out, r), unit) in residual.iter_mut().zip(&self.workspace.residual).zip(&self.workspace.units) {
@@ -48,7 +48,7 @@ impl Discretization {
     }
 
     /// Writes unknowns into a motion: the inverse of [`Discretization::pack`].
-    pub fn unpack(&self, ports: &Ports, (unknowns, length): (&[f64], f64), motion: &mut HarmonicSolution) {
+    pub fn unpack(&self, ports: &Ports, unknowns: &[f64], length: f64, motion: &mut HarmonicSolution) {
         let nh = self.harmonics().len();
         for port in ports.iter() {
             let values = if port.is_force() { &mut motion.force } else { &mut motion.c };

@@ -160,7 +160,7 @@ impl Discretization {
         let corrected = gap > 0.0;
         for (p, port) in ports.iter().enumerate() {
             let Some(barrier) = &mut along.barriers[p] else { continue };
-            barrier.set_targets((gap, corrected), &mut along.aft, &mut self.workspace.image[..nh]);
+            barrier.set_targets(gap, corrected, &mut along.aft, &mut self.workspace.image[..nh]);
             let range = port.first_axis * nh..(port.first_axis + 1) * nh;
             for (at, (force, image)) in range.clone().zip(motion.force[range].iter().zip(&self.workspace.image)) {
                 let r = force - image;

@@ -307,7 +307,7 @@ impl LinearizedEquations<'_> {
 
     /// Returns the complex mean of a port's tangent at harmonic number `k`,
     /// between two of its axes.
-    fn mean(&self, tangent: &[f64], axes: usize, (a, b): (usize, usize), k: usize) -> Complex64 {
+    fn mean(&self, tangent: &[f64], axes: usize, a: usize, b: usize, k: usize) -> Complex64 {
         let pair = 2 * self.harmonics.len();
         let wide = pair * axes;
         let at = |i: usize, j: usize| tangent[(a * pair + 2 * k + i) * wide + b * pair + 2 * k + j];
@@ -352,7 +352,7 @@ impl LinearizedEquations<'_> {
                         |p, port, a, b| {
                             let tangent = self.tangent(p, port);
                             let (first, count) = (usize::from(modal.closed.is_some()), self.harmonics.len());
-                            let means = (first..count).map(|k| self.mean(tangent, port.axes, (a, b), k).re);
+                            let means = (first..count).map(|k| self.mean(tangent, port.axes, a, b, k).re);
                             means.sum::<f64>() / (count - first).max(1) as f64
                         },
                         self.ports,
@@ -388,7 +388,7 @@ impl LinearizedEquations<'_> {
                     continue;
                 }
                 for a in 0..port.axes {
-                    let stiffness = self.mean(self.tangent(p, port), port.axes, (a, b), k);
+                    let stiffness = self.mean(self.tangent(p, port), port.axes, a, b, k);
                     column.iter_mut().zip(moved(port.first_axis + a)).for_each(|(out, r)| *out += r * stiffness);
                 }
             }
@@ -402,7 +402,7 @@ impl LinearizedEquations<'_> {
             let penalty = self.penalty[p];
             let rate = if penalty.is_finite() { Complex64::new(0.0, penalty * h as f64 * self.omega) } else { ZERO };
             let turn: Vec<Complex64> = (0..port.axes * port.axes)
-                .map(|ab| self.mean(self.tangent(p, port), port.axes, (ab / port.axes, ab % port.axes), k))
+                .map(|ab| self.mean(self.tangent(p, port), port.axes, ab / port.axes, ab % port.axes, k))
                 .collect();
             for column in matrix.chunks_exact_mut(size) {
                 let moved: Vec<Complex64> = port.range().map(|q| column[q] * rate).collect();

@@ -93,7 +93,7 @@ impl<'a> BranchEquations<'a> {
             .with_matrix()
         };
         let harmonics = harmonic_set.up_to(top).len();
-        check_memory(unbanded_memory(&ports, &dynamics, harmonics, true), &ports, (harmonics, 1))?;
+        check_memory(unbanded_memory(&ports, &dynamics, harmonics, true), &ports, harmonics, 1)?;
         let few = 2 * ports.count() * harmonic_set.up_to(harmonic_set.doubled(top)).len() <= MOST_ELIMINATED_UNKNOWNS;
         let (finer, discretization) = (few.then(|| discretization(harmonic_set.doubled(top))), discretization(top));
         let motion = HarmonicSolution::zero(discretization.linear.motion.len());
@@ -184,7 +184,7 @@ impl<'a> BranchEquations<'a> {
         if !self.set_parameter(value) {
             return None;
         }
-        self.discretization.unpack(&self.ports, (x, self.length), &mut self.motion);
+        self.discretization.unpack(&self.ports, x, self.length, &mut self.motion);
         self.discretization.begin_point();
         self.discretization.newton_from(&self.ports, self.omega, &mut self.motion, 10).ok()?;
         let places = postprocess::places(&mut self.discretization, &self.dynamics, self.omega, &self.motion).ok()?;
@@ -268,7 +268,7 @@ impl ParametricEquations for BranchEquations<'_> {
             return false;
         }
         let mut start = self.motion.clone();
-        self.discretization.unpack(&self.ports, (x, self.length), &mut start);
+        self.discretization.unpack(&self.ports, x, self.length, &mut start);
         self.discretization.begin_point();
         let Ok(motion) = self.discretization.solve(&self.ports, self.omega, start) else { return false };
         self.motion = motion;

@@ -219,7 +219,7 @@ impl ModeEquations<'_> {
         while iteration <= settings.iterations {
             interrupt::check();
             let solved = now <= enough;
-            self.border((&point, &scale), &jacobian, row, &mut bordered);
+            self.border(&point, &scale, &jacobian, row, &mut bordered);
             if solved {
                 right.fill(0.0);
                 right[size] = 1.0;
@@ -272,7 +272,7 @@ impl ModeEquations<'_> {
 
     /// Sets `out` to the Jacobian by shape, forces, ω, ζ and `ln a`, in units of `scale`, with
     /// the last row `row`.
-    fn border(&self, (point, scale): (&ModeArc, &[f64]), jacobian: &[f64], row: &[f64], out: &mut [f64]) {
+    fn border(&self, point: &ModeArc, scale: &[f64], jacobian: &[f64], row: &[f64], out: &mut [f64]) {
         let size = self.size();
         let motions = 2 * point.state.x.len();
         for i in 0..size {
