@@ -12,10 +12,12 @@
 
 use super::return_map::{newton_step, norm};
 use super::vibration_share;
+use crate::method::IntegrationError;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::NEAR_REST;
 use crate::method::flow::average_acceleration::equal_steps::AverageAccelerationFlow;
 use crate::method::flow::integrator_choice::{self, IntegratorKind};
+use crate::method::flow::step_record::extrapolate;
 use crate::model::{CyclicSymmetry, System};
 use crate::orbit::{Path, Symmetry};
 use nalgebra::{DMatrix, DVector};
@@ -47,7 +49,8 @@ struct OrbitCheckSettings {
     largest_ratio: f64,
     /// Relative error per step of the integration of smooth laws.
     tolerance: f64,
-    /// Equal steps per return for laws with a step only; they follow the motion to about 1e-6.
+    /// Equal steps per return for laws with a step only. With the extrapolation from half as many
+    /// steps they follow the motion to about 1e-6.
     steps: usize,
 }
 
@@ -61,7 +64,7 @@ impl Default for OrbitCheckSettings {
             newton_steps: 3,
             largest_ratio: 0.5,
             tolerance: 1e-8,
-            steps: 4096,
+            steps: 1024,
         }
     }
 }
@@ -70,6 +73,8 @@ impl Default for OrbitCheckSettings {
 pub(crate) struct OrbitCheck {
     /// `None` if the system is too large, or if no integration takes its laws.
     flow: Option<Box<dyn Flow>>,
+    /// True if the flow takes equal steps, whose error it does not control.
+    has_equal_steps: bool,
     /// True if stability is proven: no two motions of the system separate.
     proven: bool,
 }
@@ -89,7 +94,7 @@ impl OrbitCheck {
         let settings = OrbitCheckSettings::default();
         let proven = system.is_incrementally_stable();
         if system.dofs() > settings.dofs || (proven && system.joints().len() > settings.joints) {
-            return OrbitCheck { flow: None, proven };
+            return OrbitCheck { flow: None, has_equal_steps: false, proven };
         }
         OrbitCheck { proven, ..OrbitCheck::of_any_size(system) }
     }
@@ -99,7 +104,8 @@ impl OrbitCheck {
     pub fn of_any_size(system: &System) -> Self {
         let settings = OrbitCheckSettings::default();
         let name = "the judge of stability"; // this name appears in no message
-        let flow: Option<Box<dyn Flow>> = match IntegratorKind::of(system, None) {
+        let kind = IntegratorKind::of(system, None);
+        let flow: Option<Box<dyn Flow>> = match kind {
             _ if system.dofs() == 0 => None,
             IntegratorKind::Incremental => {
                 AverageAccelerationFlow::new(system, None, name).ok().map(|mut flow| -> Box<dyn Flow> {
@@ -111,7 +117,7 @@ impl OrbitCheck {
                 integrator_choice::integrator(system, None, settings.tolerance, name).ok()
             }
         };
-        OrbitCheck { flow, proven: false }
+        OrbitCheck { flow, has_equal_steps: kind == IntegratorKind::Incremental, proven: false }
     }
 
     /// Returns true if stability is proven.
@@ -180,6 +186,7 @@ impl OrbitCheck {
         sensitive: Option<&[usize]>,
     ) -> ReturnEvidence {
         let settings = OrbitCheckSettings::default();
+        let has_equal_steps = self.has_equal_steps;
         let Some(flow) = &mut self.flow else { return ReturnEvidence::default() };
         let back = ReturnSymmetry::of(system, symmetry);
         flow.set_excitation(system, omega);
@@ -190,11 +197,11 @@ impl OrbitCheck {
         let mut state = start.to_vec();
         state.resize(states, 0.0);
         let duration = back.part * TAU / omega;
-        flow.set_step_fraction(back.share);
+        let one_return = OneReturn { duration, step_fraction: back.share, has_equal_steps };
         let mut derivative = sensitive.map(|_| DMatrix::identity(states, states));
         let stuck = sensitive.unwrap_or_default();
         let alone = derivative.as_mut().filter(|_| stuck.is_empty());
-        if flow.run(&mut state, duration, alone).is_err() {
+        if one_return.run(&mut **flow, &mut state, alone).is_err() {
             return ReturnEvidence::default();
         }
         // a joint may stick right up to its limit. The error of the orbit would make it slip
@@ -228,7 +235,7 @@ impl OrbitCheck {
                 &mut **flow,
                 (start, gap, of_series),
                 (&back, system.dofs()),
-                (duration, &weights),
+                (one_return, &weights),
             );
             of_return = near.or(of_return);
         }
@@ -236,6 +243,42 @@ impl OrbitCheck {
             derivative: of_return.map(|derivative| back.over_full_cycle(&derivative, system.dofs())),
             defect,
         }
+    }
+}
+
+/// The integration over one return.
+#[derive(Clone, Copy)]
+struct OneReturn {
+    /// Duration of the return, s.
+    duration: f64,
+    /// Fraction of the steps of a full period.
+    step_fraction: f64,
+    has_equal_steps: bool,
+}
+
+impl OneReturn {
+    /// Integrates from `state` to its end, with the derivative if there is memory for it.
+    ///
+    /// The end of equal steps is extrapolated from half as many steps. The derivative is that of
+    /// the steps, because an extrapolation would make undamped multipliers larger than one.
+    fn run(
+        self,
+        flow: &mut dyn Flow,
+        state: &mut [f64],
+        derivative: Option<&mut DMatrix<f64>>,
+    ) -> Result<(), IntegrationError> {
+        let mut coarse = state.to_vec();
+        if self.has_equal_steps {
+            flow.set_step_fraction(0.5 * self.step_fraction);
+            flow.run(&mut coarse, self.duration, None)?;
+        }
+        flow.set_step_fraction(self.step_fraction);
+        flow.run(state, self.duration, derivative)?;
+        if self.has_equal_steps {
+            extrapolate(&mut coarse, state);
+            state.copy_from_slice(&coarse);
+        }
+        Ok(())
     }
 }
 
@@ -327,7 +370,7 @@ fn derivative_at_nearby_orbit(
     flow: &mut dyn Flow,
     (start, mut gap, of_series): (&[f64], DVector<f64>, &DMatrix<f64>),
     (back, dofs): (&ReturnSymmetry, usize),
-    (duration, weights): (f64, &[f64]),
+    (one_return, weights): (OneReturn, &[f64]),
 ) -> Option<DMatrix<f64>> {
     let settings = OrbitCheckSettings::default();
     let (mut state, mut nearer) = (start.to_vec(), None);
@@ -335,7 +378,7 @@ fn derivative_at_nearby_orbit(
         let step = newton_step(nearer.as_ref().unwrap_or(of_series), &gap, back.sign, weights);
         let from: Vec<f64> = state.iter().zip(step.iter()).map(|(z, d)| z + d).collect();
         let (mut end, mut derivative) = (from.clone(), DMatrix::identity(from.len(), from.len()));
-        flow.run(&mut end, duration, Some(&mut derivative)).ok()?;
+        one_return.run(flow, &mut end, Some(&mut derivative)).ok()?;
         let end = back.returned(&end, dofs);
         let left = DVector::from_iterator(from.len(), from.iter().zip(&end).map(|(z, end)| z - end));
         let share = norm(weights, left.as_slice()) / norm(weights, gap.as_slice());
