@@ -114,11 +114,16 @@ impl StaticEquilibrium {
                 let imposed = axis.clone().with_imposed_motion([(0, Complex64::from(-target))]);
                 (Arc::new(Jenkins { stiffness, limit }) as SharedLaw, imposed)
             });
-            let orbit = harmonic_balance::static_equilibrium_of(&system.with_joints(springs))?;
+            let mut orbit = harmonic_balance::static_equilibrium_of(&system.with_joints(springs))?;
             let displacement = &orbit.initial_state[..system.dofs()];
             let distances: Vec<f64> = held.iter().map(|(axis, value)| value - axis.component(displacement)).collect();
             let farthest = distances.iter().fold(0.0f64, |farthest, distance| farthest.max(distance.abs()));
             if farthest <= 1e-12 * largest {
+                for (axis, value) in held {
+                    if let [(row, 1.0)] = *axis.rows() {
+                        orbit.initial_state[row] = *value;
+                    }
+                }
                 return Some(made(orbit));
             }
             if farthest > 0.1 * left {

@@ -374,7 +374,7 @@ impl CompiledTable {
 }
 
 impl CompiledValue {
-    fn evaluate(
+    pub(super) fn evaluate(
         &self,
         key: &'static str,
         environment: &Environment<'_>,

@@ -7,8 +7,9 @@
 //!
 //! `δ = 2 ln((s + s')/(s' + s''))`, with the next swing `s''`.
 //!
-//! The formula is exact for a linear oscillator. A last cycle without a next swing has no
-//! decrement and is left out; a decay of two swings only compares these. `ζ = δ/√(4π² + δ²)` is
+//! The formula is exact for a linear oscillator. The next swing of a motion that comes to rest is
+//! zero. If the record ends during the motion, the last cycle without a next swing is left out; a
+//! decay of two swings only compares these. `ζ = δ/√(4π² + δ²)` is
 //! the damping ratio of the linear oscillator with the same decrement.
 
 use std::f64::consts::TAU;
@@ -76,7 +77,8 @@ impl Decay {
         let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
         let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
         let (swings, turns) = (&swings[..moves], &self.turns);
-        let complete = if swings.len() == 2 { 2 } else { swings.len().saturating_sub(1) };
+        let rests = moves + 1 < turns.len() || self.last.is_some_and(|[_, _, velocity]| velocity == 0.0);
+        let complete = if rests || moves == 2 { moves } else { moves.saturating_sub(1) };
         let cycles = (1..complete).step_by(2).map_while(|second| {
             let duration = turns[second + 1].0 - turns[second - 1].0;
             (duration > 0.0).then(|| {
@@ -95,10 +97,10 @@ impl Decay {
 
 /// Returns the logarithmic decrement of the cycle whose second swing has index `second`.
 fn decrement(swings: &[f64], second: usize) -> f64 {
-    match swings.get(second + 1) {
-        Some(next) => 2.0 * ((swings[second - 1] + swings[second]) / (swings[second] + next)).ln(),
-        // the decay has two swings only
-        None => 2.0 * (swings[second - 1] / swings[second]).ln(),
+    let pair = |first: usize| swings[first] + swings.get(first + 1).copied().unwrap_or(0.0);
+    match swings.len() {
+        2 => 2.0 * (swings[0] / swings[1]).ln(),
+        _ => 2.0 * (pair(second - 1) / pair(second)).ln(),
     }
 }
 

@@ -510,7 +510,8 @@ const CONTACT: &[Key] = &[
     required(
         "between",
         ValueType::Rows,
-        "two sets of the mesh, or one and \"ground\"; the nodes of the first meet the faces of the second",
+        "two sets of the mesh, or one and \"ground\"; the nodes of the first meet the faces of the second; on a disk \
+         `next.SET` is the set of the next sector",
         "[\"PADS\", \"ground\"]",
     ),
     required(

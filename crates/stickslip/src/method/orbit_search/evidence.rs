@@ -499,8 +499,9 @@ mod tests {
         let defect = all.defect.unwrap();
         assert!(defect > 1e-9 && defect < 1e-2, "{defect}");
         assert!((of_part - of_all).abs() < 10.0 * defect * of_all, "{of_part} {of_all} {defect}");
-        let apart = (part.derivative.unwrap() - all.derivative.unwrap()).amax();
-        assert!(apart < 0.05, "{apart}");
+        let apart = (part.derivative.unwrap() - all.derivative.as_ref().unwrap()).amax();
+        // the steps of a part of the period are not those of the whole period
+        assert!(apart < 1e-4 * all.derivative.unwrap().amax(), "{apart}");
         // three parts of the period may have three times the defect of one part, or a third of
         // it
         let left = part.defect.unwrap();

@@ -1,7 +1,8 @@
 //! Contacts from geometry: a pair of faces becomes a joint for every node of the first face.
 //!
 //! The node `a` is joined to the closest point of the second face, as a sum of that face's nodes
-//! with the values of their shape functions, or to the ground. The normal is the mean of the
+//! with the values of their shape functions, or to the ground. The second face may belong to the
+//! next sector of a disk. The normal is the mean of the
 //! normal of the node and the opposite of that of the face. The law states stiffnesses, forces and
 //! dampings per area; the joint has them times the area of the node
 //! ([`stickslip_formats::mesh::Face`] tells how areas are shared).
@@ -14,7 +15,7 @@ use crate::syntax::format::{format_significant, plural_suffix};
 use crate::syntax::key::Bounds;
 use serde_json::{Value as Json, json};
 use stickslip::dimension::Dimension;
-use stickslip::model::GROUND;
+use stickslip::model::{Frame, GROUND, NEXT};
 use stickslip_formats::mesh::{Patch, PatchNode, ProjectedPoint};
 use stickslip_numerics::vector::dot;
 
@@ -45,33 +46,83 @@ pub(crate) struct ExpandedContact {
     pub summary: ContactSummary,
 }
 
-/// A node of the first face with its counterpart.
-struct Pair<'a> {
-    node: &'a PatchNode,
+/// A node of the first face with its counterpart, in the axes of the second face's sector.
+struct Pair {
+    node: PatchNode,
     /// The point of the second face; `None` on the ground.
     opposite: Option<ProjectedPoint>,
     /// Unit normal out of the first face.
     normal: [f64; 3],
 }
 
+/// The rotation between the axes of a sector and those of the next one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SectorRotation {
+    /// The axis of the disk: 0 to 2 for x, y, z.
+    pub axis: usize,
+    /// Angle of a sector, rad.
+    pub angle: f64,
+}
+
+impl SectorRotation {
+    /// Returns a vector of the sector along the axes of the next one.
+    fn in_next(self, vector: [f64; 3]) -> [f64; 3] {
+        self.rotated(vector, -self.angle)
+    }
+
+    /// Returns a vector of the next sector along the axes of this one.
+    fn in_own(self, vector: [f64; 3]) -> [f64; 3] {
+        self.rotated(vector, self.angle)
+    }
+
+    fn rotated(self, vector: [f64; 3], angle: f64) -> [f64; 3] {
+        let (i, j) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let (sin, cos) = angle.sin_cos();
+        let mut rotated = vector;
+        rotated[i] = cos * vector[i] - sin * vector[j];
+        rotated[j] = sin * vector[i] + cos * vector[j];
+        rotated
+    }
+}
+
+/// The environment of values that no parameter may change.
+const NO_PARAMETERS: Environment<'static> = Environment { names: &[], values: Vec::new() };
+
 /// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
-/// Returns the places and joints that an entry of `[[contact]]` states.
-pub(crate) fn expand(contact: &CompiledTable, source: &MeshSource) -> Result<ExpandedContact, Problem> {
+/// Returns the places and joints that an entry of `[[contact]]` states. `rotation` is that of the
+/// sectors of a disk, if it is known.
+pub(crate) fn expand(
+    contact: &CompiledTable,
+    source: &MeshSource,
+    rotation: Option<SectorRotation>,
+) -> Result<ExpandedContact, Problem> {
     let (sets, location) = between(contact)?;
     let patch = |set: &str| source.mesh.patch(set).map_err(|error| set_problem(error, "between", location));
     let first = patch(&sets[0])?;
-    let second = if sets[1] == GROUND { None } else { Some(patch(&sets[1])?) };
+    let next_set = sets[1].strip_prefix(NEXT);
+    let rotation = match (next_set, rotation) {
+        (None, _) => None,
+        (Some(_), Some(rotation)) => Some(rotation),
+        (Some(_), None) => {
+            let message = "a contact with the next sector needs the rotation of the sectors";
+            let help = "write [disk] with a number of `sectors`, and the `axis` of the disk";
+            return Err(Problem::new(location, "between", message).help(help));
+        }
+    };
+    let in_next = |vector: [f64; 3]| rotation.map_or(vector, |rotation| rotation.in_next(vector));
+    let second = if sets[1] == GROUND { None } else { Some(patch(next_set.unwrap_or(&sets[1]))?) };
     let limit = match distance(contact)? {
         Some(meters) => meters / source.length,
         None => second.as_ref().map_or(0.0, default_distance),
     };
     let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
-    for node in first.nodes() {
+    for own in first.nodes() {
+        let node = PatchNode { position: in_next(own.position), normal: in_next(own.normal), ..*own };
         match &second {
             None => pairs.push(Pair { node, opposite: None, normal: node.normal }),
-            Some(second) => match second.closest(node).filter(|found| found.point.distance <= limit) {
+            Some(second) => match second.closest(&node).filter(|found| found.point.distance <= limit) {
                 Some(found) => {
                     let normal = unit([0, 1, 2].map(|axis| node.normal[axis] - found.point.normal[axis]));
                     pairs.push(Pair { node, opposite: Some(found), normal });
@@ -93,14 +144,22 @@ pub(crate) fn expand(contact: &CompiledTable, source: &MeshSource) -> Result<Exp
     for pair in &pairs {
         let number = source.number(pair.node.node);
         let area = pair.node.area * source.length * source.length;
-        let mut side = |suffix: &str, rows: CompiledEntry| {
-            expanded.places.push(place(contact, &format!("{number}_{suffix}"), rows, Some(pair.normal)));
-        };
-        side("a", node_entry(number, location));
-        if let Some(opposite) = &pair.opposite {
-            side("b", opposite_rows(opposite, source, location));
+        let mut frames = [pair.normal; 2].map(|normal| FrameVectors { normal, tangent: None });
+        if let Some(rotation) = rotation {
+            // both tangents are the same direction in space
+            frames[0].normal = rotation.in_own(pair.normal);
+            let tangent = tangent(contact, frames[0].normal)?;
+            frames[0].tangent = Some(tangent);
+            frames[1].tangent = Some(rotation.in_next(tangent));
         }
-        expanded.joints.push(joint(contact, number, pair.opposite.is_some(), area));
+        let mut side = |suffix: &str, rows: CompiledEntry, frame: FrameVectors| {
+            expanded.places.push(place(contact, &format!("{number}_{suffix}"), rows, Some(frame)));
+        };
+        side("a", node_entry(number, location), frames[0]);
+        if let Some(opposite) = &pair.opposite {
+            side("b", opposite_rows(opposite, source, location), frames[1]);
+        }
+        expanded.joints.push(joint(contact, number, &sets[1], area));
     }
     Ok(expanded)
 }
@@ -114,7 +173,7 @@ pub(crate) fn placeholders(contact: &CompiledTable, numbers: &[i64]) -> Result<E
         for suffix in ["a", "b"].into_iter().take(1 + usize::from(is_pair)) {
             expanded.places.push(place(contact, &format!("{number}_{suffix}"), node_entry(*number, location), None));
         }
-        expanded.joints.push(joint(contact, *number, is_pair, 1.0));
+        expanded.joints.push(joint(contact, *number, &sets[1], 1.0));
     }
     Ok(expanded)
 }
@@ -127,7 +186,7 @@ fn between(contact: &CompiledTable) -> Result<([String; 2], &Location), Problem>
             Ok(([names[0].0.clone(), names[1].0.clone()], location))
         }
         _ => Err(Problem::new(location, "between", "a contact is between two sets of the mesh")
-            .help("write between = [\"PADS\", \"DAMPER_TOP\"], or [\"PADS\", \"ground\"]")),
+            .help("write between = [\"PADS\", \"DAMPER_TOP\"], [\"PADS\", \"ground\"] or, on a disk, [\"HIGH\", \"next.LOW\"]")),
     }
 }
 
@@ -143,7 +202,7 @@ fn distance(contact: &CompiledTable) -> Result<Option<f64>, Problem> {
             .help("write a number with its unit"));
     }
     let expected = Expected { dimension: Dimension::LENGTH, within: Bounds::Positive };
-    quantity.number("distance", expected, example, &Environment { names: &[], values: Vec::new() }).map(Some)
+    quantity.number("distance", expected, example, &NO_PARAMETERS).map(Some)
 }
 
 /// Returns a tenth of the size of a face, the square root of its area.
@@ -169,13 +228,39 @@ fn opposite_rows(opposite: &ProjectedPoint, source: &MeshSource, location: &Loca
     entry("sum", ResolvedValue::Sums(["x", "y", "z"].map(row).to_vec()), location)
 }
 
-fn place(contact: &CompiledTable, ending: &str, rows: CompiledEntry, normal: Option<[f64; 3]>) -> CompiledTable {
+/// The vectors that define the frame of a place.
+#[derive(Clone, Copy)]
+struct FrameVectors {
+    normal: [f64; 3],
+    /// `None`: the tangent of the contact.
+    tangent: Option<[f64; 3]>,
+}
+
+/// Returns the first tangent of a node with this normal. It is a direction of the first sector,
+/// so no parameter may change it.
+fn tangent(contact: &CompiledTable, normal: [f64; 3]) -> Result<[f64; 3], Problem> {
+    let location = contact.location_of("tangent", None);
+    let value = |entry: &CompiledEntry| entry.value.evaluate("tangent", &NO_PARAMETERS, &mut Vec::new());
+    let stated = match contact.entry("tangent").map(value) {
+        Some(Ok(ResolvedValue::Vector(vector))) => Some(vector),
+        None => None,
+        Some(_) => {
+            let message = "a parameter cannot turn the tangent of a contact with the next sector";
+            return Err(Problem::new(location, "tangent", message).help("write three numbers"));
+        }
+    };
+    let frame = Frame::new(normal, stated).map_err(|error| Problem::new(location, "tangent", error.to_string()))?;
+    Ok(frame.axes()[0])
+}
+
+fn place(contact: &CompiledTable, ending: &str, rows: CompiledEntry, frame: Option<FrameVectors>) -> CompiledTable {
     let name = format!("{}_{ending}", contact.name().unwrap_or_default());
     let location = rows.location.clone();
     let mut entries = vec![entry("name", ResolvedValue::Text(name.clone()), contact.location_of("name", None)), rows];
-    entries.extend(normal.map(|normal| entry("normal", ResolvedValue::Vector(normal), &location)));
-    if normal.is_some() {
-        entries.extend(contact.entry("tangent").cloned());
+    if let Some(FrameVectors { normal, tangent }) = frame {
+        entries.push(entry("normal", ResolvedValue::Vector(normal), &location));
+        let own = tangent.map(|tangent| entry("tangent", ResolvedValue::Vector(tangent), &location));
+        entries.extend(own.or_else(|| contact.entry("tangent").cloned()));
     } else {
         let frame = ["t1", "t2", "n"].map(str::to_owned).to_vec();
         entries.push(entry("directions", ResolvedValue::Names(frame), &location));
@@ -183,10 +268,16 @@ fn place(contact: &CompiledTable, ending: &str, rows: CompiledEntry, normal: Opt
     table_of_node(contact, &name, entries)
 }
 
-fn joint(contact: &CompiledTable, number: i64, is_pair: bool, area: f64) -> CompiledTable {
+/// Returns the joint of a node with the face `second`.
+fn joint(contact: &CompiledTable, number: i64, second: &str, area: f64) -> CompiledTable {
     let name = format!("{}_{number}", contact.name().unwrap_or_default());
     let location = contact.location_of("between", None);
-    let ends = [format!("{name}_a"), if is_pair { format!("{name}_b") } else { GROUND.to_owned() }];
+    let opposite = match second {
+        GROUND => GROUND.to_owned(),
+        second if second.starts_with(NEXT) => format!("{NEXT}{name}_b"),
+        _ => format!("{name}_b"),
+    };
+    let ends = [format!("{name}_a"), opposite];
     let ends = CompiledValue::Names(ends.into_iter().map(|end| (end, location.clone())).collect());
     let mut entries = vec![entry("name", ResolvedValue::Text(name.clone()), contact.location_of("name", None))];
     entries.push(CompiledEntry { key: "between", location: location.clone(), value: ends });

@@ -4,18 +4,37 @@
 use super::reader::Reader;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
+use crate::compile::mesh::contact::SectorRotation;
 use crate::compile::mesh::{MeshSource, MeshUse, contact, mentioned_nodes, sets};
 use crate::compile::source_model::ModelLists;
+use crate::syntax::document::{TomlTable, TomlValue};
 use crate::syntax::error::Problem;
 use crate::syntax::schema::MAX_ELEMENTS;
 use crate::syntax::unit_sets;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 use stickslip_formats::mesh;
+
+/// Returns the rotation between two sectors of `[disk]`, if the number of sectors is a plain
+/// number and the axis is stated.
+pub(super) fn sector_rotation(root: &TomlTable) -> Option<SectorRotation> {
+    let value = |table: &TomlTable, key: &str| table.get(key).map(|entry| entry.node.value.clone());
+    let Some(TomlValue::Table(disk)) = value(root, "disk") else { return None };
+    let Some(TomlValue::Number { value: sectors, .. }) = value(&disk, "sectors") else { return None };
+    let Some(TomlValue::Text { text, .. }) = value(&disk, "axis") else { return None };
+    let axis = ["x", "y", "z"].iter().position(|axis| *axis == text)?;
+    (sectors > 0.0).then(|| SectorRotation { axis, angle: TAU / sectors })
+}
 
 impl Reader {
     /// Replaces all places and contacts on sets of the mesh of `structure`. Returns the
     /// mesh and the contacts; `None` if a problem was found.
-    pub(super) fn expand_sets(&mut self, lists: &mut ModelLists, structure: Option<&CompiledTable>) -> Option<MeshUse> {
+    pub(super) fn expand_sets(
+        &mut self,
+        lists: &mut ModelLists,
+        structure: Option<&CompiledTable>,
+        rotation: Option<SectorRotation>,
+    ) -> Option<MeshUse> {
         let before = self.problems.len();
         let mesh = if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table)) };
         let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
@@ -28,7 +47,7 @@ impl Reader {
         }
         for contact in &contacts {
             let expanded = match &mesh {
-                Some(mesh) => contact::expand(contact, mesh),
+                Some(mesh) => contact::expand(contact, mesh, rotation),
                 None if self.study_file_only => contact::placeholders(contact, &self.mentioned(contact)),
                 None => Err(no_mesh(contact, "between")),
             };

@@ -370,7 +370,11 @@ impl Reader {
             }
             None => None,
         };
-        let mesh = self.expand_sets(&mut lists, matrices.as_ref().map(|matrices| &matrices.table))?;
+        let mesh = self.expand_sets(
+            &mut lists,
+            matrices.as_ref().map(|matrices| &matrices.table),
+            mesh::sector_rotation(root),
+        )?;
         Some(SourceModel { lists, template: None, matrices, mesh })
     }
 }
