@@ -2,7 +2,9 @@
 //! and a file `.vtu` of VTK for each. Several orbits have a list each, `fields_1.pvd` ….
 //!
 //! The point data are `displacement` (m) and, at the nodes of contacts, `contact`: 0 none, 1 open,
-//! 2 touching, 3 sticking, 4 slipping. Nodes that are not in the table are at rest.
+//! 2 touching, 3 sticking, 4 slipping. At the nodes of contacts between meshes there are also
+//! `pressure` and `friction` (Pa), and `loss`, the dissipated energy per period and area (J/m²).
+//! Nodes that are not in the table are at rest.
 //! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
 
 use crate::output::result_file::{File, Output, ReportError};
@@ -48,6 +50,8 @@ struct Fields<'a> {
     node: &'a [u64],
     displacement: [&'a [f64]; 3],
     contact: &'a [String],
+    /// Names and columns of quantities per area; results of earlier versions have none.
+    per_area: Vec<(&'static str, &'a [f64])>,
 }
 
 impl<'a> Fields<'a> {
@@ -59,6 +63,10 @@ impl<'a> Fields<'a> {
             node: table.integers("node")?,
             displacement: [x?, y?, z?],
             contact: table.texts("contact")?,
+            per_area: [("pressure", "pressure_Pa"), ("friction", "friction_Pa"), ("loss", "loss_J_per_m2")]
+                .into_iter()
+                .filter_map(|(name, column)| Some((name, table.numbers(column)?)))
+                .collect(),
         })
     }
 
@@ -121,10 +129,14 @@ impl<'a> Grid<'a> {
     fn file(&self, fields: &Fields, rows: Range<usize>) -> String {
         let mut displacement = vec![[0.0; 3]; self.mesh.nodes().len()];
         let mut contact = vec![0u8; displacement.len()];
+        let mut per_area = vec![vec![0.0; displacement.len()]; fields.per_area.len()];
         for row in rows {
             let node = i64::try_from(fields.node[row]).ok().and_then(|number| self.mesh.node(number));
             let Some(node) = node else { continue };
             displacement[node] = fields.displacement.map(|column| column[row]);
+            for (values, (_, column)) in per_area.iter_mut().zip(&fields.per_area) {
+                values[node] = column[row];
+            }
             contact[node] = match fields.contact[row].as_str() {
                 "" => 0,
                 "open" => 1,
@@ -137,6 +149,9 @@ impl<'a> Grid<'a> {
         let mut text = self.head.clone() + "<PointData Vectors=\"displacement\">\n";
         text += &array("Float64", "displacement", 3, bytes);
         text += &array("UInt8", "contact", 1, contact.into_iter());
+        for ((name, _), values) in fields.per_area.iter().zip(per_area) {
+            text += &array("Float64", name, 1, values.into_iter().flat_map(f64::to_le_bytes));
+        }
         text + "</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
     }
 }

@@ -271,11 +271,12 @@ fn fields_are_the_displacements_of_all_nodes() {
     let of = |head: &str| {
         let found = dataset(folder.path(), &[head, &study, CONTACT, corner]);
         let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap().clone();
-        (table("orbit"), table("fields"))
+        let friction = found.tables.iter().find_map(|table| table.numbers("friction_J")).unwrap()[0];
+        (table("orbit"), table("fields"), friction)
     };
     let whole = of(HEAD);
     let reduced = of(&HEAD.replace("reduce = false", "reduce = { modes = 20 }"));
-    for (orbit, fields) in [&whole, &reduced] {
+    for (orbit, fields, _) in [&whole, &reduced] {
         assert_eq!(fields.rows(), 8 * 36);
         let (times, at) = (fields.numbers("time_s").unwrap(), orbit.numbers("time_s").unwrap());
         let nodes = fields.integers("node").unwrap();
@@ -296,11 +297,29 @@ fn fields_are_the_displacements_of_all_nodes() {
         assert!(states.iter().zip(nodes).all(|(state, node)| state.is_empty() != (10..=18).contains(node)));
         assert!(states.iter().any(|state| state.starts_with("slip")) && states.iter().any(|state| state == "stick"));
     }
+    // the joint of node 14, in the middle of the face, has the area of 1 mm²
+    let (orbit, fields, grid) = (&whole.0, &whole.1, nodes(0.01, true));
+    let (times, at) = (fields.numbers("time_s").unwrap(), orbit.numbers("time_s").unwrap());
+    let numbers = fields.integers("node").unwrap();
+    let force = |along: &str, instant: usize| orbit.numbers(&format!("pad_14_{along}_force_N")).unwrap()[instant];
+    for row in (0..fields.rows()).filter(|row| numbers[*row] == 14) {
+        let instant = at.iter().position(|time| (time - times[row]).abs() < 1e-15).unwrap();
+        let expected = [force("n", instant) / 1e-6, force("t1", instant).hypot(force("t2", instant)) / 1e-6];
+        for (name, expected) in ["pressure_Pa", "friction_Pa"].iter().zip(expected) {
+            let found = fields.numbers(name).unwrap()[row];
+            assert!((found - expected).abs() < 1e-9 * expected.abs(), "{name}: {found} {expected}");
+        }
+    }
+    // the losses of all areas are the loss of the joints
+    let loss = fields.numbers("loss_J_per_m2").unwrap();
+    let area_of = |number: u64| 1e-6 * area(grid.iter().find(|(known, _)| *known as u64 == number).unwrap().1);
+    let lost: f64 = (0..36).map(|row| loss[row] * area_of(numbers[row])).sum();
+    assert!(lost > 0.0 && (lost / whole.2 - 1.0).abs() < 1e-9, "{lost} {}", whole.2);
     // the error of all nodes falls with the number of modes
     let values = |fields: &Table| ["x_m", "y_m", "z_m"].map(|axis| fields.numbers(axis).unwrap().to_vec()).concat();
     let expected = values(&whole.1);
     let size = expected.iter().fold(0.0f64, |size, x| size.max(x.abs()));
-    let error = |(_, fields): &(Table, Table)| {
+    let error = |(_, fields, _): &(Table, Table, f64)| {
         values(fields).iter().zip(&expected).map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max)
     };
     let finer = of(&HEAD.replace("reduce = false", "reduce = { modes = 45 }"));

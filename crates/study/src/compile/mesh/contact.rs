@@ -43,6 +43,8 @@ pub struct ContactSummary {
 pub(crate) struct ExpandedContact {
     pub places: Vec<CompiledTable>,
     pub joints: Vec<CompiledTable>,
+    /// Area of each joint, by name, m².
+    pub areas: Vec<(String, f64)>,
     pub summary: ContactSummary,
 }
 
@@ -139,6 +141,7 @@ pub(crate) fn expand(
     let mut expanded = ExpandedContact {
         places: Vec::new(),
         joints: Vec::new(),
+        areas: Vec::new(),
         summary: summary(contact, source, &first, &pairs, unpaired),
     };
     for pair in &pairs {
@@ -160,6 +163,7 @@ pub(crate) fn expand(
             side("b", opposite_rows(opposite, source, location), frames[1]);
         }
         expanded.joints.push(joint(contact, number, &sets[1], area));
+        expanded.areas.push((name_of_node(contact, number), area));
     }
     Ok(expanded)
 }
@@ -168,7 +172,12 @@ pub(crate) fn expand(
 pub(crate) fn placeholders(contact: &CompiledTable, numbers: &[i64]) -> Result<ExpandedContact, Problem> {
     let (sets, location) = between(contact)?;
     let is_pair = sets[1] != GROUND;
-    let mut expanded = ExpandedContact { places: Vec::new(), joints: Vec::new(), summary: ContactSummary::default() };
+    let mut expanded = ExpandedContact {
+        places: Vec::new(),
+        joints: Vec::new(),
+        areas: Vec::new(),
+        summary: ContactSummary::default(),
+    };
     for number in numbers {
         for suffix in ["a", "b"].into_iter().take(1 + usize::from(is_pair)) {
             expanded.places.push(place(contact, &format!("{number}_{suffix}"), node_entry(*number, location), None));
@@ -268,9 +277,14 @@ fn place(contact: &CompiledTable, ending: &str, rows: CompiledEntry, frame: Opti
     table_of_node(contact, &name, entries)
 }
 
+/// Returns the name of the joint of a node.
+fn name_of_node(contact: &CompiledTable, number: i64) -> String {
+    format!("{}_{number}", contact.name().unwrap_or_default())
+}
+
 /// Returns the joint of a node with the face `second`.
 fn joint(contact: &CompiledTable, number: i64, second: &str, area: f64) -> CompiledTable {
-    let name = format!("{}_{number}", contact.name().unwrap_or_default());
+    let name = name_of_node(contact, number);
     let location = contact.location_of("between", None);
     let opposite = match second {
         GROUND => GROUND.to_owned(),

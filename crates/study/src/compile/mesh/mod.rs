@@ -11,6 +11,7 @@ use super::compiled::{CompiledEntry, CompiledTable, CompiledValue};
 use crate::case::values::ResolvedValue;
 use crate::syntax::error::{Location, Problem};
 use contact::ContactSummary;
+use std::collections::HashMap;
 use std::sync::Arc;
 use stickslip_formats::Error;
 use stickslip_formats::mesh::Mesh;
@@ -30,6 +31,8 @@ pub(crate) struct MeshUse {
     pub source: Option<Arc<MeshSource>>,
     /// The contacts between its faces; their joints are in the lists.
     pub contacts: Vec<ContactSummary>,
+    /// Area of each of these joints, by name, m².
+    pub areas: HashMap<String, f64>,
 }
 
 impl MeshSource {

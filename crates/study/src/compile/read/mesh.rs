@@ -11,6 +11,7 @@ use crate::syntax::document::{TomlTable, TomlValue};
 use crate::syntax::error::Problem;
 use crate::syntax::schema::MAX_ELEMENTS;
 use crate::syntax::unit_sets;
+use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use stickslip_formats::mesh;
@@ -38,7 +39,7 @@ impl Reader {
         let before = self.problems.len();
         let mesh = if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table)) };
         let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
-        let mut summaries = Vec::new();
+        let (mut summaries, mut areas) = (Vec::new(), HashMap::new());
         for place in places {
             match self.places_on_sets(place, mesh.as_ref()) {
                 Ok(places) => lists.place.extend(places),
@@ -55,6 +56,7 @@ impl Reader {
                 Ok(expanded) => {
                     lists.place.extend(expanded.places);
                     lists.joint.extend(expanded.joints);
+                    areas.extend(expanded.areas);
                     summaries.push(expanded.summary);
                 }
                 // a mesh that cannot be read was reported already
@@ -68,7 +70,7 @@ impl Reader {
             self.problems
                 .push(Problem::new(&contact.location, "contact", message).help("use a coarser mesh of the faces"));
         }
-        (self.problems.len() == before).then(|| MeshUse { source: mesh.map(Arc::new), contacts: summaries })
+        (self.problems.len() == before).then(|| MeshUse { source: mesh.map(Arc::new), contacts: summaries, areas })
     }
 
     /// Reads the mesh of a structure; `None` without a mesh, or if it cannot be read.

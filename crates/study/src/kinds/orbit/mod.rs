@@ -83,7 +83,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
     let mut of_nodes = TableBuilder::default();
     let prepared = work.case();
-    let nodes = fields::Fields::new(prepared, &mut part);
+    let nodes = fields::Fields::new(work.study, prepared, &mut part);
     for (orbit, stable) in orbit_sweep::converged_orbits(work, &mut part)? {
         let omega = orbit.omega;
         continuum_note(prepared, &orbit).into_iter().for_each(|note| note.merge_into(&mut part.notes));
