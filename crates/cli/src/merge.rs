@@ -32,7 +32,10 @@ pub fn merge(folders: &[PathBuf], out: &Path, options: &MergeOptions<'_>) -> Exi
         Err(error) => return wrong(error.to_string()),
     };
     let Some(first) = journals.first() else {
-        return wrong("nothing to merge: the folders contain no parts".to_owned());
+        return wrong(
+            "nothing to merge: the folders contain no parts; give the folders that `stickslip run --shard` wrote"
+                .to_owned(),
+        );
     };
     let mut outline = first.head().outline.clone();
     // The wall time includes those of all parts and of their checks.

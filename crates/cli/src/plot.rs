@@ -72,7 +72,8 @@ fn with_figure_of(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     };
     if study.kind().name != run.dataset.kind {
         complain!(
-            "error: {} is a study of the kind `{}`, but {} contains results of the kind `{}`",
+            "error: {} is a study of the kind `{}`, but {} contains results of the kind `{}`: give the file of this \
+             run",
             file.display(),
             study.kind().name,
             run.folder.display(),
@@ -88,8 +89,8 @@ fn with_figure_of(mut run: Stored, file: Option<&Path>) -> Result<Stored, ()> {
     }
     if !run.apply_figure_of(&study) {
         complain!(
-            "warning: {} differs from the run in more than its figure; the figure shows the computed results in \
-             {}. Run the study again for the other changes",
+            "warning: {} differs from the run in more than its figure; the figure shows the results stored in {}. \
+             Run the study again to compute the other changes",
             file.display(),
             run.folder.display()
         );

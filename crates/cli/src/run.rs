@@ -297,7 +297,12 @@ fn one(
                 "from": range.start, "to": range.end, "kept": journal.units().len() }),
     );
     if !journal.units().is_empty() {
-        complain!("{}: {} of {} units come from an earlier run", study.name(), journal.units().len(), range.len());
+        complain!(
+            "{}: {} of {} units of work come from an earlier run",
+            study.name(),
+            journal.units().len(),
+            range.len()
+        );
     }
     let progress = ProgressDisplay::new(options.progress, points, done, study.name());
     let counter = progress.clone();

@@ -300,20 +300,20 @@ mod tests {
     fn rounding_of_the_largest_entry_is_no_negative_mass() {
         let link = 1e-6;
         let cases = [([link, link * link - 2e-16], Some(1)), ([0.0, -1e-16], Some(1)), ([link, 0.0], None)];
-        for ([beside, own], expected) in cases.into_iter().chain([([0.0, -1e-12], None)]) {
+        for ([coupling, own], expected) in cases.into_iter().chain([([0.0, -1e-12], None)]) {
             for size in [2, 2 * BLOCKED_FROM] {
                 // The 2 × 2 block of the link, repeated.
                 let mut mass = DMatrix::zeros(size, size);
                 for i in (0..size).step_by(2) {
                     (mass[(i, i)], mass[(i + 1, i + 1)]) = (3.0, 3.0 * own);
-                    (mass[(i, i + 1)], mass[(i + 1, i)]) = (3.0 * beside, 3.0 * beside);
+                    (mass[(i, i + 1)], mass[(i + 1, i)]) = (3.0 * coupling, 3.0 * coupling);
                 }
-                assert_eq!(rank_scaled(&mass), None, "the rows by themselves say it is negative");
-                assert_eq!(semidefinite_rank(&mass), expected.map(|rank: usize| rank * size / 2), "{beside} {own}");
-                assert_eq!(is_semidefinite(&mass), expected.is_some(), "{beside} {own}");
+                assert_eq!(rank_scaled(&mass), None, "judged row by row, the mass is negative");
+                assert_eq!(semidefinite_rank(&mass), expected.map(|rank: usize| rank * size / 2), "{coupling} {own}");
+                assert_eq!(is_semidefinite(&mass), expected.is_some(), "{coupling} {own}");
                 let all = (0..size * size).map(|at| (at / size, at % size, mass[at]));
                 let sparse = SparseMatrix::from_triplets(size, all).unwrap();
-                assert_eq!(sparse_definite(&sparse), expected.map(|_| false), "{beside} {own}");
+                assert_eq!(sparse_definite(&sparse), expected.map(|_| false), "{coupling} {own}");
             }
         }
     }

@@ -158,6 +158,6 @@ mod tests {
     fn threads_without_a_flag_continue() {
         StopFlag::new().set();
         check();
-        throw(Box::new("nobody hears it"));
+        throw(Box::new("without a flag"));
     }
 }

@@ -267,15 +267,15 @@ pub(crate) fn hostile() -> Dataset {
     Dataset {
         mesh: None,
         name: "hostile".into(),
-        title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž 位移, with a title that has so many words that it must be broken into more than one line of text to fit".into(),
-        source: Some("<i>nobody</i> & sons".into()),
+        title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž 位移, with a title whose large number of words must be broken into more than one line of text to fit".into(),
+        source: Some("<i>anybody</i> & sons".into()),
         kind: "orbit".into(),
         tables: vec![
             Table { name: "peaks".into(), columns: vec![Column::numbers("frequency_Hz", vec![f64::NAN, 1e-300, 121.25]), text("mass", &["<b>", "a,b", "位移"]), Column::numbers("amplitude_m", vec![1e300, -0.0, 0.0487321])] },
             Table { name: "empty".into(), columns: vec![Column::numbers("a_m", vec![])] },
             Table { name: "none".into(), columns: vec![] },
         ],
-        figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title that has so many words that it must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels, ..Figure::default() },
+        figure: Figure { title: "Ω < ω₀ & </title><script>alert('Příčka')</script> – \"quoted\" ůž, with a title whose large number of words must be broken into more than one line of text to fit the figure, which is not all that narrow".into(), panels, ..Figure::default() },
         notes: vec!["A <note> & more.".into()],
         failures: (0..9).map(|i| Failure { location: format!("Ft = 2 N, frequency = {} Hz", 121.0 + 0.25 * f64::from(i)),
             reason: "shooting stopped after 50 iterations, residual 3.1e-4; try more harmonics <or> start from a neighbour".into() }).collect(),

@@ -1,4 +1,4 @@
-//! Measured curves of `[[data]]` beside the computed ones.
+//! Measured curves of `[[data]]`, drawn with the computed ones.
 //!
 //! A table with the columns `frequency` and `response`, or a column with the name of a place,
 //! belongs to the curves of a response. A table with the columns `displacement` and `force`
@@ -86,7 +86,7 @@ mod tests {
     use stickslip_study::run::{Context, run};
     use stickslip_study::{read_study, templates};
 
-    /// The figure of a study beside a measured file.
+    /// The figure of a study with a measured file.
     fn figure(study: &str, data: &str) -> Figure {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("rig.csv"), data).unwrap();

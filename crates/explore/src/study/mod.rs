@@ -6,7 +6,7 @@
 //! - `view`: what is computed: the study itself, an orbit, a performance curve or a map;
 //! - `description`: a study for the page: its quantities, its cases and its model;
 //! - `answer`: the results of a run for the page;
-//! - `measured`: measured curves of `[[data]]` beside the computed ones;
+//! - `measured`: measured curves of `[[data]]`, drawn with the computed ones;
 //! - `response_quantity`: curves of velocities, accelerations, receptances and joint quantities.
 
 pub mod answer;

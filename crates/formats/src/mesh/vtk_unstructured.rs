@@ -97,7 +97,7 @@ fn tags(bytes: &[u8]) -> (Vec<Tag<'_>>, &[u8]) {
     (tags, &[])
 }
 
-/// How the arrays of a file are encoded.
+/// Encoding of the arrays of a file.
 struct Encoding<'a> {
     header: NumberType,
     order: ByteOrder,

@@ -19,10 +19,10 @@ use crate::orbit::{ObservedMotion, Orbit, OrbitError};
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "auto",
-    summary: "picks a method: event-driven for exact laws; shooting for smooth laws and for friction that falls with \
+    summary: "selects a method: event-driven for exact laws; shooting for smooth laws and for friction that falls with \
               velocity along a smooth curve, up to 12 joints and 24 degrees of freedom; harmonic balance for all \
-              other systems, for places without mass, for travelling waves on a tuned disk, and where it is cheaper; \
-              picks another method if this one refuses the system, and tries a second fast one if it finds no orbit",
+              other systems, for places without mass, for travelling waves on a tuned disk, and if it is faster; \
+              another method if the selected one refuses the system, and a second fast one if it finds no orbit",
     options: &[],
     build: |_| Ok(Box::new(Auto)),
 };

@@ -29,7 +29,12 @@ use std::sync::Arc;
 ///     substructure: Some(Substructure {
 ///         component: Component::new(vec![String::new(); n], mass, None, stiffness)?,
 ///         damping: SubstructureDamping::Own,
-///         reduction: Reduction::Modes { modes: 2, kind: ReductionKind::Rubin, orders: 1, up_to: 0.0 },
+///         reduction: Reduction::Modes {
+///             modes: 2,
+///             kind: ReductionKind::Rubin,
+///             orders: 1,
+///             up_to: 0.0,
+///         },
 ///         earlier_reduction: None,
 ///         disk: None,
 ///     }),

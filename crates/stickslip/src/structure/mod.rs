@@ -691,7 +691,7 @@ mod tests {
         };
         assert!(error(&|_, c, _| c[(2, 5)] = f64::NAN).contains("damping matrix has NaN in row 3, column 6"));
         assert!(error(&|_, _, k| k[(2, 3)] = -0.9).contains("stiffness matrix is not symmetric"));
-        assert!(error(&|m, _, _| m[(4, 4)] = 0.01).contains("semidefinite"), "beside 0.2");
+        assert!(error(&|m, _, _| m[(4, 4)] = 0.01).contains("semidefinite"), "coupled by 0.2");
         assert!(error(&|m, _, _| m[(4, 4)] = -1.0).contains("semidefinite"));
         // matrices from a file with ten digits: the mean of both triangles is used
         let mut rounded = k.clone();

@@ -56,13 +56,14 @@ pub(crate) fn ring_of(
         };
         let most = MAX_MASSES / (first.masses.len() + first.bodies.len()).max(1);
         if sectors > most {
-            let message = format!("{sectors} sectors of {} masses; the limit is {MAX_MASSES}", first.masses.len());
+            let message =
+                format!("{sectors} sectors of {} masses: the limit is {MAX_MASSES} masses", first.masses.len());
             return Err(vec![Problem::new(disk.table.location_of("sectors", None), "sectors", message)]);
         }
         let rows = first.substructure.as_ref().filter(|own| matches!(own.reduction, Reduction::None { .. }));
         let rows = rows.map_or(0, |own| own.component.dofs());
         if rows * sectors > max_rows {
-            let message = format!("{sectors} sectors of {rows} rows; the limit without a reduction is {max_rows}");
+            let message = format!("{sectors} sectors of {rows} rows: the limit without a reduction is {max_rows} rows");
             let problem = Problem::new(disk.table.location_of("sectors", None), "sectors", message);
             return Err(vec![
                 problem.help("remove `reduce = false` from [structure]: all sectors then share one reduced model"),

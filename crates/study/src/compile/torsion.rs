@@ -105,11 +105,11 @@ pub(crate) fn use_moments_of_inertia(
         return problem(
             body,
             "name",
-            format!("the mass `{inertia}` is a moment of inertia (kg m^2) beside a [[body]]"),
+            format!("the mass `{inertia}` is a moment of inertia (kg m^2), but a [[body]] has displacements"),
         );
     }
     if let Some(matrices) = &structure.matrices {
-        let message = format!("the mass `{inertia}` is a moment of inertia (kg m^2) beside a [structure] in metres");
+        let message = format!("the mass `{inertia}` is a moment of inertia (kg m^2), but a [structure] is in metres");
         return problem(&matrices.table, "mass", message);
     }
     let ModelLists { mass, spring, joint, force, motion, is_torsional, .. } = &mut structure.lists;

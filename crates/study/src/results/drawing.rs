@@ -114,8 +114,8 @@ impl<'a> FigureInput<'a> {
         (if options.text(scale_key) == Some("log") { axis.log() } else { axis }, factor)
     }
 
-    /// Returns the unit of a displacement (m) or a force (N) of this study: rad or N m in a model of
-    /// rotation.
+    /// Returns the unit of a displacement (m) or a force (N) of this study: rad or N m in a model
+    /// of rotation.
     pub(crate) fn unit(&self, si: &'static str) -> &'static str {
         match (self.study.is_torsional(), si) {
             (true, "m") => "rad",

@@ -163,7 +163,8 @@ impl CheckedStudy {
     /// let text = stickslip_study::templates::find("blade-couple").unwrap().study;
     /// let checked = check(&read_study("couple.toml", text, &[]).unwrap()).unwrap();
     /// let mut rows = Vec::new();
-    /// checked.run_in_parts(&Context::without_progress(1), &mut |block| rows.push(block.tables[0].rows())).unwrap();
+    /// let context = Context::without_progress(1);
+    /// checked.run_in_parts(&context, &mut |block| rows.push(block.tables[0].rows())).unwrap();
     /// assert!(rows.is_sorted() && rows.last() == Some(&964));
     /// ```
     pub fn run_in_parts(&self, context: &Context, seen: &mut dyn FnMut(&Block)) -> Result<Dataset, StudyError> {

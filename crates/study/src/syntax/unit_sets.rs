@@ -1,5 +1,5 @@
-//! Consistent unit sets of finite-element programs: their units of length, mass, time, stiffness and
-//! damping in SI.
+//! Consistent unit sets of finite-element programs: their units of length, mass, time, stiffness
+//! and damping in SI.
 
 /// A consistent set of units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -133,12 +133,11 @@ fn methods_by_laws() -> String {
     list
 }
 
-/// Builds the table of the laws with their descriptions.
+/// Builds the list of the laws with their descriptions.
 fn laws() -> String {
-    let mut table = "| law | what it is | directions |\n| --- | --- | --- |\n".to_owned();
+    let mut list = String::new();
     for row in law::TABLE {
         let law = row.sample();
-        let (name, summary) = (row.name, row.summary.replace('|', "\\|"));
         // the smallest and the largest number of tangents that a law without a fixed number can
         // have
         let directions: BTreeSet<_> = [1.0, 2.0]
@@ -146,9 +145,13 @@ fn laws() -> String {
             .map(|count| law.with_value(law::TANGENTS, *count).unwrap_or(law.clone()).directions())
             .collect();
         let directions: Vec<_> = directions.iter().map(usize::to_string).collect();
-        table += &format!("| [`{name}`](#{name}) | {summary} | {} |\n", directions.join(" or "));
+        let directions = match directions.join(" or ") {
+            one if one == "1" => String::new(),
+            several => format!(", {several} directions"),
+        };
+        list += &format!("- [`{0}`](#{0}){directions}: {1}\n", row.name, row.summary);
     }
-    table
+    list
 }
 
 /// Replaces the text between two lines of a page.
@@ -160,7 +163,7 @@ fn with_generated(page: &str, [begin, end]: [&str; 2], generated: &str) -> Strin
 
 const LAWS: [&str; 2] = ["<!-- begin generated: laws -->\n", "<!-- end generated: laws -->"];
 
-/// The table is generated. A law without a section gets one with its summary, to be completed
+/// The list is generated. A law without a section gets one with its summary, to be completed
 /// by an author.
 #[test]
 fn the_page_of_laws_has_every_law() {

@@ -61,7 +61,7 @@ fn estimate(dataset: &Dataset, name: &str) -> Estimate {
     }
 }
 
-/// Force of a spring beside a Jenkins element under displacements of growing amplitude.
+/// Force of a spring parallel to a Jenkins element under displacements of growing amplitude.
 fn loops(spring: f64, stiffness: f64, limit: f64, largest: f64) -> Vec<(f64, f64)> {
     let (mut held, mut before) = (0.0f64, 0.0);
     (1..=300)

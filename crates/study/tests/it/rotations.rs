@@ -112,7 +112,7 @@ fn mixed_units_are_refused() {
         (
             "[[spring]]",
             "[[body]]\nname = \"b\"\nmass = \"1 kg\"\ninertia = \"1 kg m^2\"\ndirections = [\"x\", \"y\"]\n[[spring]]",
-            "beside a [[body]]",
+            "but a [[body]] has displacements",
         ),
         ("J = \"0.05 kg m^2\"", "J = \"0.05 kg\"", "moment of inertia in kg m^2"),
     ] {

@@ -216,7 +216,8 @@ pub(super) struct SlipHomotopySettings {
     /// iteration from static equilibrium reaches the solution in which all joints stick, if the
     /// limits are high enough.
     pub stuck_iterations: usize,
-    /// Total Newton iterations while slip limits are lowered. Default 3000; a few hundred are usual.
+    /// Total Newton iterations while slip limits are lowered. Default 3000; a few hundred are
+    /// usual.
     pub iterations: usize,
 }
 

@@ -106,12 +106,12 @@ impl ModelSummary {
             let ranges = ranges.join(", ");
             text += &match resonant {
                 true => {
-                    format!("; {slip} at {ranges}; any excitation is enough at its undamped resonance{at}")
+                    format!("; {slip} at {ranges}; any excitation makes it slip at its undamped resonance{at}")
                 }
-                false => format!("; {slip} at {ranges}; {factor} of the excitation is enough{at}"),
+                false => format!("; {slip} at {ranges}; {factor} of the excitation makes it slip{at}"),
             };
         } else {
-            text += &format!("; {slip} occurs; {factor} of the excitation is enough");
+            text += &format!("; {slip} occurs; {factor} of the excitation makes it slip");
         }
         text
     }

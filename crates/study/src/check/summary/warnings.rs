@@ -48,7 +48,7 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
         let names = list_names(&one.masses);
         let them = pronoun(one.masses.len());
         if one.held_by_friction {
-            format!("no spring holds {names}: only friction keeps {them} in place, and nothing does if all joints slip")
+            format!("no spring holds {names}: only friction keeps {them} in place, as long as not all joints slip")
         } else {
             format!("{names} can move freely: no spring and no joint connects {them} to `ground`")
         }

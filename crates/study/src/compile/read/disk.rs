@@ -235,7 +235,7 @@ mod tests {
     fn nodes_are_read_from_tables_and_decks() {
         let expected = vec![("7".to_owned(), [1.0, -25.0, 0.0]), ("12".to_owned(), [0.5, 0.0, 3.0])];
         assert_eq!(csv_nodes("x,y,node,z\n1,-2.5e1,7,0\n0.5,0,12,3\n").unwrap(), expected);
-        let deck = "** a sector\n*HEADING\n1, 2, 3\n*Node, NSET=all\n7, 1.0, -2.5D1\n** beside\n12, .5, , 3.\n*NODE PRINT\nU\n";
+        let deck = "** a sector\n*HEADING\n1, 2, 3\n*Node, NSET=all\n7, 1.0, -2.5D1\n** a comment\n12, .5, , 3.\n*NODE PRINT\nU\n";
         let mesh = stickslip_formats::mesh::read_bytes(deck.as_bytes()).unwrap();
         assert_eq!(mesh_nodes(&mesh), expected);
         assert!(csv_nodes("node,x,y,z\n7,1,2\n").unwrap_err().1.contains("expected node,x,y,z"));

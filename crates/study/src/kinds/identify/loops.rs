@@ -30,7 +30,10 @@ impl LoopTarget {
             && let Some(row) = time.windows(2).position(|pair| pair[0] >= pair[1])
         {
             let row = input.measured(row + 1, 0.0, 0.0, 1.0).row;
-            return error(format!("the time of row {row} does not rise"), "sort the rows, or remove the column `time`");
+            return error(
+                format!("the time in row {row} is not later than in the row before"),
+                "sort the rows, or remove the column `time`",
+            );
         }
         let model = &input.case.model;
         let joint = model.joints.iter().find(|joint| joint.name == input.at);

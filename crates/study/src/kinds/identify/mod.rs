@@ -144,15 +144,14 @@ pub(super) const KIND: Kind = Kind {
                 "loss",
                 ValueType::Choice(search::losses),
                 "squares",
-                "weight of residuals that are larger than their standard deviation; other than `squares` for data \
-                 with outliers",
+                "weight of large residuals; for data with outliers, use another value than `squares`",
                 "\"huber\"",
             ),
             default(
                 "profile",
                 ValueType::Flag,
                 "false",
-                "true: profile likelihood, the rise of the loss over each parameter while the others are fitted anew",
+                "true: profile likelihood, the rise of the loss over each parameter while the others are fitted again",
                 "true",
             ),
             optional(

@@ -1,8 +1,8 @@
 //! The least-squares problem: weighted residuals over scaled parameters, and their derivatives.
 //!
 //! A scaled parameter runs from 0 to 1 over its range, by differences or by ratios. Derivatives
-//! are central differences of a fraction [`FitProblem::DIFFERENCE`] of the range; the orbits at both
-//! ends begin from the orbit between them.
+//! are central differences of a fraction [`FitProblem::DIFFERENCE`] of the range; the orbits at
+//! both ends begin from the orbit between them.
 
 use super::targets::{Fitted, RowStates, Target};
 use crate::case::study::{Case, Study};
@@ -170,7 +170,8 @@ impl FitProblem {
     }
 
     /// Returns the derivatives of all numbers of all targets by the scaled parameters, one column
-    /// each; of predicted targets only if `which` says so. NaN where the model has none.
+    /// each; of predicted targets only for [`DerivativesOf::AllTargets`]. NaN where the model has
+    /// none.
     pub fn derivatives(&self, x: &[f64], columns: &[usize], which: DerivativesOf) -> Vec<DMatrix<f64>> {
         let used = |target: &dyn Target| which == DerivativesOf::AllTargets || !target.is_predicted();
         let before = self.states.lock().map(|states| states.clone()).unwrap_or_default();

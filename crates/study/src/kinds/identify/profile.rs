@@ -1,8 +1,8 @@
 //! Profile likelihood: the rise of the loss over one parameter, while the others are fitted anew.
 //!
 //! With the loss `S/2` and the variance `s²` of the residuals, `(S(θ) - S_min)/s²` is the square of
-//! a distance in standard errors. Where it reaches the square of Student's quantile, the interval of
-//! 95 % ends. Unlike the standard error, the profile holds for curved models, and it shows a
+//! a distance in standard errors. The 95 % interval ends where it reaches the square of Student's
+//! quantile. Unlike the standard error, the profile is valid for nonlinear models, and it shows a
 //! parameter that is bounded on one side only.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), section 5.2.
 

@@ -14,7 +14,8 @@ use std::sync::atomic::AtomicBool;
 /// ```
 /// use stickslip_study::{kinds::identify::Residuals, read_file};
 /// let folder = tempfile::tempdir().unwrap();
-/// std::fs::write(folder.path().join("rig.csv"), "displacement_m,force_N\n0,0\n1e-3,2.5\n0,0.1\n").unwrap();
+/// let rows = "displacement_m,force_N\n0,0\n1e-3,2.5\n0,0.1\n";
+/// std::fs::write(folder.path().join("rig.csv"), rows).unwrap();
 /// let text = r#"
 /// schema = 1
 /// data = [{ name = "rig", file = "rig.csv" }]

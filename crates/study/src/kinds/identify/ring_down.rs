@@ -28,7 +28,7 @@ impl RingDown {
         let time = input.column("time", Dimension::TIME)?;
         let response = input.column("response", quantity.dimension())?;
         let sampling = Column { values: time.clone(), ..Column::default() }.sampling().ok_or_else(|| ColumnError {
-            message: format!("the times of `{}` do not rise in equal steps", input.data.name),
+            message: format!("the times of `{}` do not increase in equal steps", input.data.name),
             help: "resample the decay; a record with a gap, or a second record, needs a separate `group`".to_owned(),
         })?;
         let deviations = input.deviations(&response, quantity.dimension())?;

@@ -321,7 +321,7 @@ impl Undetermined {
             [one] => format!("the data do not determine {}: the residuals do not depend on it.", name(one)),
             several => {
                 let names: Vec<String> = several.iter().map(name).collect();
-                // relative changes: a step of the scaled parameter on a logarithmic scale is a ratio
+                // relative changes: a step of a logarithmically scaled parameter is a ratio
                 let relative = |k: usize| {
                     let range = &problem.ranges[k];
                     if range.is_log { direction[k] * (range.to / range.from).ln() } else { direction[k] }

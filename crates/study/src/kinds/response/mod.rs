@@ -107,9 +107,9 @@ pub(super) const KIND: Kind = Kind {
 
 fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (points, values) = (inputs.points(), &inputs.case.values);
-    let sought = values.flag("peaks") != Some(false) && inputs.frequencies > 2.0;
+    let refines = values.flag("peaks") != Some(false) && inputs.frequencies > 2.0;
     let peaks = match values.names("peak_of") {
-        _ if !sought => 0.0,
+        _ if !refines => 0.0,
         Some(_) => inputs.cases,
         // Peaks per mass, as some have two.
         None => (inputs.cases * inputs.places * 1.3).floor(),
@@ -151,10 +151,10 @@ fn refines_peaks(study: &Study) -> bool {
 fn many_peaks_warning(cases: &[SurveyedCase]) -> Option<String> {
     let one = cases.first()?;
     let (values, places) = (&one.case.values, one.survey.system().places().len());
-    let sought = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
+    let refines = values.flag("peaks") != Some(false) && values.names("peak_of").is_none();
     // Number of places from which the warning is given. A disk of many blades needs all peaks;
     // the nodes of a contact rarely do.
-    (sought && places >= 1000).then(|| {
+    (refines && places >= 1000).then(|| {
         format!(
             "the peaks of {places} places are refined one by one, with about six orbits each; \
              peak_of = \"all\" in [study] refines only the largest amplitude, and peaks = false refines none"

@@ -221,8 +221,8 @@ mod tests {
         assert!((low / 0.54807 - 1.0).abs() < 1e-3 && (high / 2.37381 - 1.0).abs() < 4e-3, "{low} {high}");
     }
 
-    /// A sine on a resonant oscillator: `|y| = a sqrt(1 + 4ζ²)/(2ζ)`; a soft one hardly moves, and a
-    /// stiff one moves with its base.
+    /// A sine on a resonant oscillator: `|y| = a sqrt(1 + 4ζ²)/(2ζ)`; a soft one hardly moves, and
+    /// a stiff one moves with its base.
     #[test]
     fn a_shock_spectrum_has_its_resonance() {
         let values: Vec<f64> = (0..40_000).map(|i| 2.0 * (TAU * 1e-2 * f64::from(i)).sin()).collect();

@@ -51,7 +51,7 @@ fn sweep_scales() -> Vec<(&'static str, &'static str)> {
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
         name: "transient",
-        summary: "motion in time from rest or given displacements: free decay, switched-on excitation, run-up",
+        summary: "motion over time from rest or given displacements: free decay, switched-on excitation, run-up",
         keys: &[
             optional(
                 "frequency",
@@ -62,8 +62,8 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "run_up",
                 ValueType::Table(RUN_UP),
-                "excitation frequency that changes in time, in steps of one cycle: each cycle has a constant frequency \
-                 and ends when the cycle of the continuous change ends",
+                "excitation frequency that changes in time: it is constant in each cycle, and each cycle ends when that of \
+                 the continuous change ends",
                 "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
             ),
             optional("duration", DURATION, "computed time; default for a run-up: its duration", "\"2 s\""),
