@@ -93,10 +93,31 @@ fn drawn_law(
     row.sample()
 }
 
-/// Returns the laws of random systems: those of the table when the corpus was frozen, so that a
-/// seed keeps its system. The conformance tests run every law of the table.
+/// The laws of random systems. A law that is added to the table does not belong here, so that a
+/// seed keeps its system; the conformance tests run every law of the table.
+const LAWS_OF_SEEDS: &[&str] = &[
+    "coulomb",
+    "coulomb-arctan",
+    "stribeck",
+    "stribeck-arctan",
+    "jenkins",
+    "jenkins-arctan",
+    "iwan",
+    "dahl",
+    "bouc-wen",
+    "valanis",
+    "lugre",
+    "coulomb-2d",
+    "coulomb-2d-arctan",
+    "jenkins-2d",
+    "jenkins-2d-arctan",
+    "friction-contact",
+    "gap",
+    "cubic",
+];
+
 fn laws_of_seeds() -> Vec<&'static LawInfo> {
-    TABLE.iter().copied().filter(|row| row.name != "coulomb-tanh").collect()
+    TABLE.iter().copied().filter(|row| LAWS_OF_SEEDS.contains(&row.name)).collect()
 }
 
 /// Returns a system with one to four degrees of freedom, full matrices and one or two joints,

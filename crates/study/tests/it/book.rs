@@ -126,7 +126,7 @@ fn methods_by_laws() -> String {
         let laws = if every { "every law".to_owned() } else { accepted.join(", ") };
         list += &format!("- `{}`: {laws}", row.name);
         if !smoothed.is_empty() {
-            list += &format!(", {} only with `width`", smoothed.join(", "));
+            list += &format!("; {} with the option `width`", smoothed.join(", "));
         }
         list += "\n";
     }

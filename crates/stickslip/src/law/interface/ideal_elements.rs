@@ -1,4 +1,4 @@
-//! The pieces view: ideal sliders and stops in parallel.
+//! The view of ideal elements: ideal sliders and stops in parallel.
 
 /// An ideal part of a law. The parts of one law act in parallel and have the same displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -67,7 +67,7 @@ use solver::HarmonicBalanceSolver;
 pub(crate) use static_equilibrium::static_equilibrium_of;
 pub use subharmonic::Subharmonic;
 
-/// Entry of this method in [`super::TABLE`].
+/// Entry of this method in `super::list::LIST`.
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
     summary: "Fourier series of the joint motions, friction sampled over the period, with an error estimate",

@@ -194,61 +194,61 @@ impl Discretization {
             StopCriterion::Rough(solved) => solved,
             StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
         };
-        let mut sketched = self.search.uses_coarse && !rough;
-        let mut kept = self.search.keeps_tangents && sketched;
-        let mut rough_slopes = kept;
-        let mut course = Convergence::new(first);
+        let mut coarse = self.search.uses_coarse && !rough;
+        let mut same_derivatives = self.search.keeps_tangents && coarse;
+        let mut coarse_derivatives = same_derivatives;
+        let mut convergence = Convergence::new(first);
         // the proximal point method finds forces that do not settle
         let patience = if ports.has_forces() { newton.stagnation_iterations } else { settings.iterations };
         for _ in 0..settings.iterations {
             interrupt::check();
-            if course.is_solved(solved) || self.is_budget_used(ports) || course.stagnates_beyond(patience) {
+            if convergence.is_solved(solved) || self.is_budget_used(ports) || convergence.stagnates_beyond(patience) {
                 break;
             }
-            if !kept {
-                rough_slopes = self.complete_derivatives(context, motion, sketched);
+            if !same_derivatives {
+                coarse_derivatives = self.complete_derivatives(context, motion, coarse);
             }
-            let residual = course.residual;
-            let near = StepStart { length, residual, coarse: rough_slopes || rough, same_derivatives: kept };
+            let residual = convergence.residual;
+            let near = StepStart { length, residual, coarse: coarse_derivatives || rough, same_derivatives };
             self.workspace.previous.copy_from(motion);
             if !self.regularized_step(context, motion, near) {
                 break;
             }
             motion.iterations += 1;
-            let reference = if rough { course.largest_recent() } else { residual };
+            let reference = if rough { convergence.largest_recent() } else { residual };
             let after = self.line_search(context, motion, length, reference);
             if !after.is_finite() || after > newton.divergence * residual {
                 break;
             }
             let reduced = after < newton.coarse.reduction * residual;
-            sketched &= reduced || residual > newton.coarse.checked_from;
-            kept = rough_slopes && reduced && self.search.linearised;
-            if course.add(after, motion.iterations) {
+            coarse &= reduced || residual > newton.coarse.checked_from;
+            same_derivatives = coarse_derivatives && reduced && self.search.linearised;
+            if convergence.add(after, motion.iterations) {
                 self.workspace.best.copy_from(motion);
             }
             let now = self.motion_scale(motion);
             if now < 0.5 * length || now > 2.0 * length {
                 // the motion was far from its initial guess; rescale with its own size
                 length = now;
-                course.rescale(self.evaluate(context, motion, length, DerivativeScope::Cheap));
+                convergence.rescale(self.evaluate(context, motion, length, DerivativeScope::Cheap));
             }
         }
-        if course.residual > solved && course.least < f64::INFINITY {
+        if convergence.residual > solved && convergence.least < f64::INFINITY {
             let iterations = motion.iterations;
             motion.c.clone_from(&self.workspace.best.c);
             motion.force.clone_from(&self.workspace.best.force);
             motion.iterations = iterations;
-            course.residual = self.evaluate(context, motion, length, DerivativeScope::None);
+            convergence.residual = self.evaluate(context, motion, length, DerivativeScope::None);
         }
         self.search.reuses_states = false;
         self.search.keeps_tangents = false;
-        motion.residual = course.residual;
-        if course.residual <= solved || course.is_rounding(course.residual) {
+        motion.residual = convergence.residual;
+        if convergence.residual <= solved || convergence.is_rounding(convergence.residual) {
             Ok(())
         } else {
             Err(SolveError {
                 left_contacts: self.left_contacts(motion),
-                ..SolveError::not_converged(motion.iterations, course.residual)
+                ..SolveError::not_converged(motion.iterations, convergence.residual)
             })
         }
     }
@@ -440,7 +440,7 @@ impl Discretization {
         }
     }
 
-    /// Sets `motion` to `self.before` minus a fraction of the step.
+    /// Sets `motion` to `self.workspace.previous` minus a fraction of the step.
     pub(super) fn apply_step(&self, ports: &Ports, motion: &mut HarmonicSolution, fraction: f64, length: f64) {
         let nh = self.harmonics().len();
         for port in ports.iter() {

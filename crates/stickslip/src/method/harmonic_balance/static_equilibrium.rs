@@ -36,10 +36,10 @@ const SAMPLES: usize = 8;
 /// Returns the static equilibrium of a system, as an orbit at rest. Returns `None` as
 /// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
-    let (ports, around) = Ports::for_sector(system).ok()?;
+    let (ports, ring_ports) = Ports::for_sector(system).ok()?;
     let dynamics = LinearDynamics::new(system, &ports);
     let system = Arc::new(system.clone());
-    static_equilibrium(&system, (&ports, around.as_ref()), &dynamics).map(|found| found.orbit)
+    static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics).map(|found| found.orbit)
 }
 
 /// Static equilibrium of a system.
@@ -54,7 +54,7 @@ pub(super) struct SolvedEquilibrium {
 /// no joint and no spring carries a constant load.
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
-    (ports, around): (&Ports, Option<&Ports>),
+    (ports, ring_ports): (&Ports, Option<&Ports>),
     dynamics: &LinearDynamics,
 ) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
@@ -81,7 +81,7 @@ pub(super) fn static_equilibrium(
     let setting = postprocess::OrbitInput {
         system,
         ports,
-        ring_ports: around,
+        ring_ports,
         omega,
         excitation_harmonic: 1,
         half_period: false,

@@ -90,7 +90,7 @@ impl AverageAccelerationFlow {
                 Some((states, scale)) => Ok((chosen, states, scale)),
                 None if chosen
                     .ideal_elements()
-                    .is_some_and(|pieces| pieces.iter().any(IdealElement::has_force_drop)) =>
+                    .is_some_and(|elements| elements.iter().any(IdealElement::has_force_drop)) =>
                 {
                     Err(DROPS)
                 }

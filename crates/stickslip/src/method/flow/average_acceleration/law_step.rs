@@ -13,21 +13,21 @@ use stickslip_numerics::small_lu::SmallLu;
 /// The view used to evaluate a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum LawView {
-    Pieces,
+    IdealElements,
     Step,
     Rate,
 }
 
-/// Returns the view of a law, if it has one: pieces without rigid sliders, a step, or a rate.
+/// Returns the view of a law, if it has one: ideal elements without rigid sliders, a step, or a rate.
 fn view(law: &SharedLaw) -> Option<LawView> {
-    let steps = |piece: &IdealElement| match piece {
+    let steps = |element: &IdealElement| match element {
         IdealElement::Slider(slider) => {
             slider.static_limit == 0.0 || (slider.stiffness.is_some() && slider.static_limit == slider.limit)
         }
         IdealElement::Stop { .. } => true,
     };
-    if law.ideal_elements().is_some_and(|pieces| pieces.iter().all(steps)) {
-        return Some(LawView::Pieces);
+    if law.ideal_elements().is_some_and(|elements| elements.iter().all(steps)) {
+        return Some(LawView::IdealElements);
     }
     match (law.step(), law.rate()) {
         (Some(_), _) => Some(LawView::Step),
@@ -36,23 +36,24 @@ fn view(law: &SharedLaw) -> Option<LawView> {
     }
 }
 
-/// Returns the pieces with a nonzero force.
-fn pieces(law: &SharedLaw) -> Vec<IdealElement> {
-    let carries = |piece: &IdealElement| !matches!(piece, IdealElement::Slider(slider) if slider.static_limit == 0.0);
+/// Returns the ideal elements with a nonzero force.
+fn elements(law: &SharedLaw) -> Vec<IdealElement> {
+    let carries =
+        |element: &IdealElement| !matches!(element, IdealElement::Slider(slider) if slider.static_limit == 0.0);
     law.ideal_elements().unwrap_or_default().into_iter().filter(carries).collect()
 }
 
 /// Returns stiffness (N/m) and limit (N) of the sliders whose forces are the states of a law
-/// evaluated by its pieces, in their order.
+/// evaluated by its ideal elements, in their order.
 pub(super) fn springs(law: &SharedLaw) -> Vec<(f64, f64)> {
-    if view(law) != Some(LawView::Pieces) {
+    if view(law) != Some(LawView::IdealElements) {
         return Vec::new();
     }
-    let slider = |piece: IdealElement| match piece {
+    let slider = |element: IdealElement| match element {
         IdealElement::Slider(slider) => Some((slider.stiffness?, slider.limit)),
         IdealElement::Stop { .. } => None,
     };
-    pieces(law).into_iter().filter_map(slider).collect()
+    elements(law).into_iter().filter_map(slider).collect()
 }
 
 /// Returns the states of a law after a slow straight motion within one second.
@@ -97,8 +98,8 @@ pub(crate) fn states_after_motion(
 /// Returns the number of states of a law in this method, and their scale.
 pub(crate) fn states(law: &SharedLaw) -> Option<(usize, f64)> {
     match view(law)? {
-        LawView::Pieces => {
-            let sliders = pieces(law).iter().filter(|piece| matches!(piece, IdealElement::Slider(_))).count();
+        LawView::IdealElements => {
+            let sliders = elements(law).iter().filter(|element| matches!(element, IdealElement::Slider(_))).count();
             let scale = law.force_scale();
             Some((sliders, if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }))
         }
@@ -118,7 +119,7 @@ pub(super) struct LawInstant<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct LawIntegrator {
     view: LawView,
-    pieces: Vec<IdealElement>,
+    elements: Vec<IdealElement>,
     directions: usize,
     states: usize,
     state_scale: f64,
@@ -163,7 +164,7 @@ impl LawIntegrator {
         let (directions, states) = (joint.directions, joint.states);
         LawIntegrator {
             view: view(&joint.law).unwrap_or(LawView::Rate),
-            pieces: pieces(&joint.law),
+            elements: elements(&joint.law),
             directions,
             states,
             state_scale: joint.state_scale,
@@ -182,8 +183,8 @@ impl LawIntegrator {
 
     /// Sets the limits of its sliders from the next values of the iterator, N.
     pub fn limit(&mut self, limits: &mut impl Iterator<Item = f64>) {
-        for piece in &mut self.pieces {
-            if let (LawView::Pieces, IdealElement::Slider(slider)) = (self.view, piece)
+        for element in &mut self.elements {
+            if let (LawView::IdealElements, IdealElement::Slider(slider)) = (self.view, element)
                 && let Some(limit) = limits.next()
             {
                 (slider.limit, slider.static_limit) = (limit, limit);
@@ -212,7 +213,7 @@ impl LawIntegrator {
         match self.slipping {
             Some(sign) => Contact::slip(sign),
             // a slider below its limit sticks
-            None if self.view == LawView::Pieces && self.states > 0 => Contact::Stick,
+            None if self.view == LawView::IdealElements && self.states > 0 => Contact::Stick,
             None => law.contact_state(velocity, &self.force[..self.directions]),
         }
     }
@@ -253,8 +254,8 @@ impl LawIntegrator {
     pub fn advance(&mut self, law: &SharedLaw, from: LawInstant, to: &RelativeMotion<f64>, h: f64) -> bool {
         self.slopes.fill(0.0);
         match self.view {
-            LawView::Pieces => {
-                self.evaluate_pieces(from, to);
+            LawView::IdealElements => {
+                self.evaluate_ideal_elements(from, to);
                 true
             }
             LawView::Step => {
@@ -316,15 +317,15 @@ impl LawIntegrator {
     }
 
     /// Evaluates stops and ideal sliders in series with springs, whose forces are the states.
-    fn evaluate_pieces(&mut self, from: LawInstant, to: &RelativeMotion<f64>) {
+    fn evaluate_ideal_elements(&mut self, from: LawInstant, to: &RelativeMotion<f64>) {
         let (states, width) = (self.states, self.arguments());
         let (u0, u1) = (from.motion.displacement[0], to.displacement[0]);
         let (z, after) = (2, 2 + states); // arguments: u₀, u₀', z₀, u₁, u₁'
         self.force = [0.0; MAX_DIRECTIONS];
         self.slipping = None;
         let mut s = 0;
-        for piece in &self.pieces {
-            match *piece {
+        for element in &self.elements {
+            match *element {
                 IdealElement::Slider(slider) => {
                     let stiffness = slider.stiffness.unwrap_or(0.0);
                     let stuck = from.z[s] + stiffness * (u1 - u0);

@@ -164,20 +164,20 @@ impl HarmonicBalanceSolver {
         omega: f64,
         warm: Option<(usize, HarmonicSolution)>,
     ) -> Result<Orbit, OrbitError> {
-        let mut returned = None;
+        let mut inaccurate = None;
         // if the return defect exceeds the tolerance, the orbit is still returned, and its
         // evidence shows it
-        self.double_until_tolerance(top, omega, warm, &mut returned).or_else(|error| returned.ok_or(error))
+        self.double_until_tolerance(top, omega, warm, &mut inaccurate).or_else(|error| inaccurate.ok_or(error))
     }
 
-    /// Doubles the harmonics. `returned` keeps an orbit whose return defect exceeds the
+    /// Doubles the harmonics. `inaccurate` keeps an orbit whose return defect exceeds the
     /// tolerance.
     fn double_until_tolerance(
         &mut self,
         mut top: usize,
         omega: f64,
         warm: Option<(usize, HarmonicSolution)>,
-        returned: &mut Option<Orbit>,
+        inaccurate: &mut Option<Orbit>,
     ) -> Result<Orbit, OrbitError> {
         let settings = RefinementSettings::default();
         let tolerance = self.method.tolerance.unwrap_or(TOLERANCE);
@@ -210,15 +210,15 @@ impl HarmonicBalanceSolver {
             if error <= tolerance && shown {
                 let orbit = self.make_orbit(top, omega, motion.clone(), x.clone(), Some(error))?;
                 let judged = orbit.evidence.error_estimate.unwrap_or(error);
-                let before = returned.as_ref().and_then(|orbit| orbit.evidence.error_estimate);
+                let before = inaccurate.as_ref().and_then(|orbit| orbit.evidence.error_estimate);
                 let closer = before.is_none_or(|before| judged <= 0.5 * before);
                 if judged <= tolerance || !closer || !self.can_double(top) {
                     return Ok(orbit);
                 }
-                if returned.is_none() {
+                if inaccurate.is_none() {
                     self.limit = Some(self.work_used(None).times(WorkSettings::default().improvement));
                 }
-                *returned = Some(orbit);
+                *inaccurate = Some(orbit);
                 error = judged;
             }
             (checked, estimate) = (top, error);

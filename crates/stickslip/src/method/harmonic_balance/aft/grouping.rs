@@ -50,12 +50,12 @@ impl PortBuilder {
             return Ok(());
         }
         if joint.axes().len() == 1
-            && let Some(pieces) = law.ideal_elements()
+            && let Some(elements) = law.ideal_elements()
         {
-            if pieces.iter().any(IdealElement::has_force_drop) {
+            if elements.iter().any(IdealElement::has_force_drop) {
                 return Err(unsupported("its slip limit drops abruptly at the onset of slip"));
             }
-            self.add_pieces(j, joint, &pieces);
+            self.add_ideal_elements(j, joint, &elements);
             return Ok(());
         }
         let scale = law.force_scale();
@@ -79,7 +79,7 @@ impl PortBuilder {
             self.add(j, joint, Kernel::Rate(law.clone()), PortScales::of_force(scale));
         } else {
             return Err(unsupported(
-                "it defines none of the views prox, step and rate, and no pieces along one direction",
+                "it defines none of the views prox, step and rate, and no ideal elements along one direction",
             ));
         }
         Ok(())
@@ -106,12 +106,12 @@ impl PortBuilder {
 
     /// Adds one port for elastic sliders and stops, and one for rigid sliders.
     /// Both have the same motion.
-    fn add_pieces(&mut self, j: usize, joint: &SystemJoint, pieces: &[IdealElement]) {
+    fn add_ideal_elements(&mut self, j: usize, joint: &SystemJoint, elements: &[IdealElement]) {
         let mut parts = Vec::new();
         // parallel rigid sliders act as one
         let (mut rigid, mut scale) = (0.0, 0.0);
-        for piece in pieces {
-            match *piece {
+        for element in elements {
+            match *element {
                 IdealElement::Slider(Slider { limit: 0.0, .. }) => {}
                 IdealElement::Slider(Slider { stiffness: None, limit, .. }) => rigid += limit,
                 IdealElement::Slider(Slider { stiffness: Some(stiffness), limit, .. }) => {

@@ -423,19 +423,19 @@ impl FrequencyTime {
     /// [axis][harmonic], into `force`. Writes the derivative by (Re, Im) of the harmonics into
     /// `tangent` (row-major, 2 × axes × harmonics squared).
     ///
-    /// The law is evaluated at `1/share` of the motion, and its force is multiplied by `share`.
-    /// A large share raises the slip limits: every joint sticks, as in a very small motion.
+    /// The law is evaluated at `1/limit_factor` of the motion, and its force is multiplied by `limit_factor`.
+    /// A large factor raises the slip limits: every joint sticks, as in a very small motion.
     pub fn motion_port_force(
         &mut self,
         port: &Port,
-        (omega, share): (f64, f64),
+        (omega, limit_factor): (f64, f64),
         c: &[Complex64],
         force: &mut [Complex64],
         mut tangent: Option<&mut [f64]>,
     ) {
         let mut motion = std::mem::take(&mut self.argument);
         motion.clear();
-        motion.extend(c.iter().map(|c| c / share));
+        motion.extend(c.iter().map(|c| c / limit_factor));
         force.fill(ZERO);
         if let Some(tangent) = tangent.as_deref_mut() {
             tangent.fill(0.0);
@@ -463,19 +463,19 @@ impl FrequencyTime {
             }
             Kernel::Rigid(_) | Kernel::Prox(_) => {}
         }
-        force.iter_mut().for_each(|f| *f *= share);
-        self.by_frequency.iter_mut().flatten().for_each(|f| *f *= share);
+        force.iter_mut().for_each(|f| *f *= limit_factor);
+        self.by_frequency.iter_mut().flatten().for_each(|f| *f *= limit_factor);
         self.argument = motion;
     }
 
     /// Computes the image of the forces λ of a force port along a motion c: `P J(λ + ε c')`. If
     /// the motion is imposed (`penalty` infinite), the image is the law's force at that
     /// velocity, and λ does not change it. Writes the derivative of the image by `λ + ε c'`
-    /// into `tangent`. For `share`, see [`FrequencyTime::motion_port_force`].
+    /// into `tangent`. For `limit_factor`, see [`FrequencyTime::motion_port_force`].
     pub fn force_port_image(
         &mut self,
         port: &Port,
-        (omega, penalty, share): (f64, f64, f64),
+        (omega, penalty, limit_factor): (f64, f64, f64),
         (c, force): (&[Complex64], &[Complex64]),
         image: &mut [Complex64],
         mut tangent: Option<&mut [f64]>,
@@ -495,14 +495,14 @@ impl FrequencyTime {
             // applies where the motion along a contact is imposed, so that the structure cannot
             // move.
             let width = (1e-9 * speed).max(f64::MIN_POSITIVE);
-            signal.extend(c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) / share));
-            self.velocity(prox, port, width / share, &mut signal, image);
+            signal.extend(c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) / limit_factor));
+            self.velocity(prox, port, width / limit_factor, &mut signal, image);
         } else {
             let moved = c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) * penalty);
-            signal.extend(moved.zip(force).map(|(moved, force)| (force + moved) / share));
+            signal.extend(moved.zip(force).map(|(moved, force)| (force + moved) / limit_factor));
             self.resolve(prox, port, penalty, &signal, image, tangent);
         }
-        image.iter_mut().for_each(|f| *f *= share);
+        image.iter_mut().for_each(|f| *f *= limit_factor);
         self.argument = signal;
     }
 

@@ -191,34 +191,34 @@ impl FrequencyTime {
         }
     }
 
-    fn slider(&mut self, kt: f64, limit: f64, [rest, held]: [f64; 2], series: HarmonicSeries) {
+    fn slider(&mut self, kt: f64, limit: f64, [initial_position, initial_force]: [f64; 2], series: HarmonicSeries) {
         let count = self.extremes.len();
-        let hold_at = |hold: f64, from: f64, anchor: OffsetSource, begin: f64, end: f64| Interval {
+        let sticking = |force: f64, position: f64, anchor: OffsetSource, begin: f64, end: f64| Interval {
             begin,
             end,
             stiffness: kt,
-            offset: hold - kt * from,
+            offset: force - kt * position,
             anchor,
             slips: false,
         };
-        let drag = |begin: f64, end: f64, offset: f64| {
+        let slipping = |begin: f64, end: f64, offset: f64| {
             let anchor = OffsetSource::Nothing;
             Interval { begin, end, stiffness: 0.0, offset, anchor, slips: true }
         };
         // force and displacement at the anchor
-        let (mut hold, mut from, mut anchor) = (held, rest, OffsetSource::Nothing);
-        let still = held + kt * (self.grid.value[0] - rest);
-        if count == 0 && still.abs() > limit {
+        let (mut force, mut position, mut anchor) = (initial_force, initial_position, OffsetSource::Nothing);
+        let force_at_start = initial_force + kt * (self.grid.value[0] - initial_position);
+        if count == 0 && force_at_start.abs() > limit {
             // the slider was dragged to a position at which nothing moves any more
-            self.intervals.push(Interval { slips: false, ..drag(0.0, TAU, limit.copysign(still)) });
+            self.intervals.push(Interval { slips: false, ..slipping(0.0, TAU, limit.copysign(force_at_start)) });
             return;
         }
         let mut slipped = None;
         for leg in 0..2 * count {
             let TurningPoint { phase: at, value } = self.extremes[leg % count];
-            let trial = hold + kt * (value - from);
+            let trial = force + kt * (value - position);
             if trial.abs() > limit {
-                (hold, from, anchor) = (limit.copysign(trial), value, OffsetSource::At(at));
+                (force, position, anchor) = (limit.copysign(trial), value, OffsetSource::At(at));
                 if leg >= count {
                     slipped = Some(leg);
                     break;
@@ -226,7 +226,7 @@ impl FrequencyTime {
             }
         }
         let Some(first) = slipped else {
-            self.intervals.push(hold_at(hold, from, anchor, 0.0, TAU));
+            self.intervals.push(sticking(force, position, anchor, 0.0, TAU));
             return;
         };
         // one period from the end of that slip
@@ -235,16 +235,16 @@ impl FrequencyTime {
         for leg in first + 1..=first + count {
             let (before, end) = (phase(leg - 1, &self.extremes), phase(leg, &self.extremes));
             let value = self.extremes[leg % count].value;
-            let trial = hold + kt * (value - from);
+            let trial = force + kt * (value - position);
             if trial.abs() > limit {
                 let slip = limit.copysign(trial);
-                let onset = self.passage(series, before, end, from + (slip - hold) / kt, slip.signum());
-                self.intervals.push(hold_at(hold, from, anchor, begin, onset));
-                self.intervals.push(drag(onset, end, slip));
-                (hold, from, anchor, begin) = (slip, value, OffsetSource::At(end), end);
+                let onset = self.passage(series, before, end, position + (slip - force) / kt, slip.signum());
+                self.intervals.push(sticking(force, position, anchor, begin, onset));
+                self.intervals.push(slipping(onset, end, slip));
+                (force, position, anchor, begin) = (slip, value, OffsetSource::At(end), end);
             } else if leg == first + count {
                 // only reached through rounding
-                self.intervals.push(hold_at(hold, from, anchor, begin, end));
+                self.intervals.push(sticking(force, position, anchor, begin, end));
             }
         }
     }

@@ -469,7 +469,7 @@ impl Discretization {
         self.aft.law_steps = 0;
     }
 
-    /// Begins a search without known states of the laws with memory.
+    /// Begins a search: resets its work, and forgets the states of laws with memory.
     pub fn begin_search(&mut self, ports: &Ports) {
         self.work.begin_search(self.point_work_used(ports));
         self.aft.law_steps = 0;
@@ -515,7 +515,7 @@ impl Discretization {
     }
 
     /// Computes the forces minus those of the springs in the structure, into
-    /// `self.structure_forces`.
+    /// `self.workspace.acting`.
     fn compute_structure_forces(&mut self, motion: &HarmonicSolution, share: f64) {
         if !self.is_held_by_contacts() {
             return;
@@ -533,7 +533,7 @@ impl Discretization {
     }
 
     /// Returns the forces on the structure in a motion, [axis][harmonic], N,
-    /// see [`Discretization::closed_stiffness`].
+    /// see [`LinearPart::closed_stiffness`].
     pub fn structure_forces<'a>(&'a mut self, motion: &'a HarmonicSolution) -> &'a [Complex64] {
         self.compute_structure_forces(motion, 1.0);
         if self.is_held_by_contacts() { &self.workspace.acting } else { &motion.force }

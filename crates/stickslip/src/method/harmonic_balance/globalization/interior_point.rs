@@ -6,7 +6,7 @@
 //! variational inequality: in a dissipative structure the forces are monotone in the motions.
 //!
 //! The interior point method follows a central path, on which the complementarity products of
-//! all samples equal μ > 0, see `ports::barrier`. A product is the distance of a force from its
+//! all samples equal μ > 0, see [`InteriorPort`]. A product is the distance of a force from its
 //! limit times the multiplier of that limit. Each step first predicts the decrease of the
 //! products with μ = 0, chooses μ from it, and then corrects. The number of steps hardly depends
 //! on the number of joints. Newton's method takes a few steps from the end of the path to the

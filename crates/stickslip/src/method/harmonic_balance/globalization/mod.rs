@@ -1,9 +1,14 @@
 //! The solution of a point: Newton's method, then the searches of one table.
 //!
 //! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
-//! [`FALLBACKS`] follow in their order, each from the same initial guess. If all of them fail,
-//! the solver begins once more from a time integration (`time_start`). To add a search, write its
-//! file and add one row.
+//! [`FALLBACKS`] follow in their order; each receives the same initial guess, which the homotopy
+//! ignores. If all of them fail, the solver begins once more from a time integration
+//! (`time_start`), which is no row of the table.
+//!
+//! To add a search: its file and `mod` line, one row of [`FALLBACKS`], and a variant of [`FoundBy`]
+//! with its name, which [`Evidence::found_by`](crate::orbit::Evidence::found_by) and the book's
+//! page on harmonic balance list. Quick and general searches come first. The work limit of a point
+//! ([`WorkSettings`](super::settings::WorkSettings)) covers all of them together.
 //!
 //! - `homotopy`: parameters of the homotopies, and the tolerance of a solution
 //! - `interior_point`: interior point method for rigid friction
@@ -29,16 +34,19 @@ use homotopy::SearchContext;
 /// A search that follows if Newton's method fails.
 struct Fallback {
     found_by: FoundBy,
+    /// True if the search can help with these ports.
     applies: fn(&Ports) -> bool,
     /// True if the search also serves orbits between known ones. These can do without a failed
     /// point, so only quick searches do.
     between_orbits: bool,
-    /// Solves from the initial guess in the solution.
+    /// Replaces the initial guess in the last argument by a solution. The search begins with
+    /// [`Discretization::begin_search`] if it does not continue with the states of Newton's method,
+    /// and adds its iterations to those of the guess.
     search: fn(&mut Discretization, &Ports, f64, &mut HarmonicSolution) -> Result<(), SolveError>,
 }
 
 /// The searches that follow Newton's method, in the order in which they are tried.
-const FALLBACKS: [Fallback; 3] = [
+const FALLBACKS: &[Fallback] = &[
     Fallback {
         found_by: FoundBy::InteriorPoints,
         applies: Ports::has_forces,
