@@ -4,7 +4,7 @@
 //! colours.
 
 use crate::figure::axis::{AxisRange, MARGIN};
-use crate::figure::colour::Colour;
+use crate::figure::colour::{Colour, PALETTE};
 use stickslip_study::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Sharing, Style};
 
 /// Returns the number of columns and rows of the grid of panels.
@@ -76,11 +76,15 @@ pub(crate) fn drawing_order(panel: &Panel) -> Vec<&Series> {
     series
 }
 
-/// Returns the line style to draw. A solid reference becomes dashed.
+/// Returns the line style to draw. A solid reference becomes dashed. Solid lines whose colours
+/// repeat are dashed in the second round of the palette and dotted in the third, unless colours
+/// follow values.
 pub(crate) fn line_style(series: &Series) -> Style {
-    match (series.emphasis, series.style) {
-        (Emphasis::Reference, Style::Solid) => Style::Dashed,
-        (_, style) => style,
+    let round = if series.value.is_some() { 0 } else { series.colour / PALETTE.len() };
+    match (series.emphasis, series.style, round) {
+        (Emphasis::Reference, Style::Solid, _) | (_, Style::Solid, 1) => Style::Dashed,
+        (_, Style::Solid, 2) => Style::Dotted,
+        (_, style, _) => style,
     }
 }
 
@@ -455,6 +459,17 @@ fn shared(
 mod tests {
     use super::*;
     use crate::samples;
+
+    #[test]
+    fn lines_beyond_the_palette_are_dashed_and_dotted() {
+        let style = |colour: usize| line_style(&Series::line("a", vec![0.0, 1.0], vec![0.0, 1.0], colour));
+        assert_eq!(
+            [0, 6, 7, 13, 14].map(style),
+            [Style::Solid, Style::Solid, Style::Dashed, Style::Dashed, Style::Dotted]
+        );
+        let by_value = Series { value: Some(1.0), ..Series::line("a", vec![0.0], vec![0.0], 9) };
+        assert_eq!(line_style(&by_value), Style::Solid);
+    }
 
     #[test]
     fn quantities_shown_in_turn_have_a_column_each() {

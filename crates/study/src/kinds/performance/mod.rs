@@ -42,7 +42,10 @@ pub(super) const KIND: Kind = Kind {
     unit_size: |_| UnitSize::Curve,
     size,
     warnings: sampling_warnings,
-    probe: Probe::Points { compute: probe, excluded: |_| Some("the search for the optimum, which takes about 30 further values") },
+    probe: Probe::Points {
+        compute: probe,
+        excluded: |_| Some("the search for the optimum, which takes about 30 further values"),
+    },
     compute,
     draw: figure::draw,
 };
