@@ -16,9 +16,10 @@
 //! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of
 //! nominal system modes", J. Eng. Gas Turbines Power 123, 893-900.
 
+use super::computed_wave::ComputedWave;
 use super::{
-    FullStructure, ReducedMatrices, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance,
-    Row, RubinBasis, StructureDamping, damping, residual_flexibility,
+    ReducedMatrices, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, Row,
+    StructureDamping, damping,
 };
 use crate::structure::sector::{is_real, wave_entries};
 use crate::structure::sector_boundary::{Blade, symmetrized};
@@ -26,7 +27,7 @@ use crate::structure::{CyclicSector, RingEntry, unit_root};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{ModeSelection, NaturalModes, multi_vector};
+use stickslip_numerics::sparse::multi_vector;
 
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
 /// which a combination is dropped. They are tried in this sequence.
@@ -72,16 +73,6 @@ pub(in crate::structure) struct SectorReduction {
     pub up_to: f64,
     /// Highest frequency for which the basis is intended, rad/s.
     pub serves: f64,
-}
-
-/// A computed wave.
-struct ComputedWave {
-    diameter: usize,
-    whole: FullStructure,
-    modes: NaturalModes,
-    /// Multiple of the frequency of interest up to which modes are computed.
-    extent: f64,
-    reference: ReferenceReceptance,
 }
 
 /// Returns the first Gram tolerance for this number of orders.
@@ -137,15 +128,12 @@ impl WaveCollection<'_> {
         for &diameter in diameters {
             match self.computed.iter_mut().find(|wave| wave.diameter == diameter) {
                 Some(wave) if wave.extent >= extent => {}
-                Some(wave) => {
-                    wave.modes = wave.whole.modes(extent * up_to)?;
-                    wave.extent = extent;
-                }
+                Some(wave) => wave.set_modes(wave.whole.modes(extent * up_to)?, extent),
                 None => {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
                     let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-                    self.computed.push(ComputedWave { diameter, whole, modes, extent, reference });
+                    self.computed.push(ComputedWave::new(diameter, whole, (modes, extent), reference));
                 }
             }
         }
@@ -222,7 +210,7 @@ impl WaveCollection<'_> {
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
             let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-            self.computed.push(ComputedWave { diameter, whole, modes, extent: beyond, reference });
+            self.computed.push(ComputedWave::new(diameter, whole, (modes, beyond), reference));
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
         let deviation = self.deviation(&reduced, &between, up_to)?;
@@ -247,30 +235,25 @@ impl WaveCollection<'_> {
 
     /// Builds one basis from the waves of these diameters.
     fn basis(
-        &self,
+        &mut self,
         diameters: &[usize],
         (order, share): (usize, f64),
         kind: ReductionKind,
     ) -> Result<ReducedSector, ReductionError> {
         let n = self.sector.dofs;
-        let mut vectors: Vec<f64> = Vec::new();
-        let taken = || self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
-        for wave in taken() {
-            let basis = match kind {
-                ReductionKind::Rubin => RubinBasis::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
-                ReductionKind::CraigBampton => {
-                    let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
-                    let wanted = ModeSelection::UpTo { value: omega * omega, most: super::MAX_MODES };
-                    Arc::unwrap_or_clone(wave.whole.fixed_interface(wanted)?.basis)
-                }
-            };
-            vectors.extend(basis);
+        let (mut vectors, mut counts): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let mut modes = 0;
+        for wave in self.computed.iter_mut().filter(|wave| diameters.contains(&wave.diameter)) {
+            vectors.extend(wave.vectors(kind, order, n)?);
             if let Some((blade, up_to)) = self.blade {
-                vectors.extend(self.blade_vectors(wave, blade, up_to, order)?);
+                vectors.extend(wave.blade_vectors(blade, up_to, order, n)?);
             }
+            modes = modes.max(wave.modes.count());
+            // a vector and its partner split into the same columns
+            let both = if kind == ReductionKind::Rubin && wave.whole.dofs() > n { 2.0 } else { 1.0 };
+            counts.resize(vectors.len() / n.max(1), both);
         }
-        let modes = taken().map(|wave| wave.modes.count()).max().unwrap_or(0);
-        let basis = self.independent(&vectors, share)?;
+        let basis = self.independent(&vectors, &counts, share)?;
         let name = match kind {
             ReductionKind::Rubin => "modes and residual vectors",
             ReductionKind::CraigBampton => "Craig-Bampton",
@@ -282,33 +265,10 @@ impl WaveCollection<'_> {
         Ok(self.projected(kind, basis, n))
     }
 
-    /// Returns residual vectors of a wave for the forces of a deviating blade, in its modes up
-    /// to a frequency. Both parts of the wave are included.
-    fn blade_vectors(
-        &self,
-        wave: &ComputedWave,
-        blade: &Blade,
-        up_to: f64,
-        order: usize,
-    ) -> Result<Vec<f64>, ReductionError> {
-        let (n, modes) = (self.sector.dofs, &wave.modes);
-        let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
-        let forces = (modes.rigid_body_count()..inside).map(|mode| -> Row {
-            let parts = modes.shape(mode).chunks_exact(n).flat_map(|part| blade.times(part));
-            parts.enumerate().filter(|(_, force)| *force != 0.0).collect()
-        });
-        let forces: Vec<Row> = forces.filter(|row| !row.is_empty()).collect();
-        if forces.is_empty() {
-            return Ok(Vec::new());
-        }
-        let (mut basis, _) = residual_flexibility::basis(&wave.whole.with_ports(forces)?, modes, 0.0, order)?;
-        Ok(basis.split_off(modes.shapes.len()))
-    }
-
     /// Returns combinations of columns over the remaining rows that are orthogonal in the
     /// energy of the sector. Nearly dependent combinations are dropped. Each is scaled to unit
-    /// displacement at the port that moves most.
-    fn independent(&self, vectors: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
+    /// displacement at the port that moves most. A column counts as often as `counts` states.
+    fn independent(&self, vectors: &[f64], counts: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.sector.dofs;
         let (mass, stiffness) = (
             self.sector.with_fixed_adjacent(&self.sector.mass)?,
@@ -318,7 +278,8 @@ impl WaveCollection<'_> {
             self.computed.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
         let mut energies = multi_vector::inner_products(n, vectors, &stiffness.multiply_columns(vectors));
         energies += multi_vector::inner_products(n, vectors, &mass.multiply_columns(vectors)) * highest;
-        let size: Vec<f64> = energies.diagonal().iter().map(|e| e.max(0.0).sqrt()).collect();
+        let size: Vec<f64> =
+            energies.diagonal().iter().zip(counts).map(|(e, count)| (e.max(0.0) / count).sqrt()).collect();
         let moving: Vec<usize> = (0..size.len()).filter(|&k| size[k] > 0.0).collect();
         let gram = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
             let (i, k) = (moving[i], moving[k]);
