@@ -23,9 +23,32 @@ pub(super) struct SubstructureParts {
     pub places: Vec<Vec<Row>>,
     /// Entries of mass, damping and stiffness.
     pub entries: [Entries; 3],
+    /// Entries of a ring of equal sectors, in addition.
+    pub ring: Option<RingEntries>,
     /// Modal damping in addition to the damping entries, over its coordinates.
     pub modes: Option<ModalDamping>,
     pub reduced: Option<Arc<ReducedComponent>>,
+}
+
+/// The matrices of a ring of equal sectors.
+pub(super) struct RingEntries {
+    pub sectors: usize,
+    /// Entries of mass, damping and stiffness in the rows of the first sector.
+    pub entries: [Vec<RingEntry>; 3],
+}
+
+impl RingEntries {
+    /// Returns the entries of all sectors, each with `dofs` coordinates.
+    pub fn around(&self, dofs: usize) -> [Entries; 3] {
+        let next = |sector: usize, shift: i64| (sector as i64 + shift).rem_euclid(self.sectors as i64) as usize;
+        self.entries.each_ref().map(|entries| {
+            let all = (0..self.sectors).flat_map(|sector| entries.iter().map(move |entry| (sector, entry)));
+            all.map(|(sector, &(row, column, shift, value))| {
+                (sector * dofs + row, next(sector, shift) * dofs + column, value)
+            })
+            .collect()
+        })
+    }
 }
 
 impl SubstructureParts {
@@ -87,6 +110,7 @@ impl SubstructureParts {
             places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
             entries: [entries, damping, springs],
             modes,
+            ring: None,
             reduced: None,
         })
     }
@@ -116,6 +140,7 @@ impl SubstructureParts {
             names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [entries(mass), entries(damping), entries(stiffness)],
+            ring: None,
             modes: None,
             reduced: Some(component),
         })
@@ -162,11 +187,9 @@ impl SubstructureParts {
         let at = |sector: usize, shift: i64, row: usize| {
             (sector as i64 + shift).rem_euclid(sectors as i64) as usize * n + row
         };
-        let around = |entries: &[RingEntry]| -> Entries {
-            let all = (0..sectors).flat_map(|s| entries.iter().map(move |entry| (s, entry)));
-            all.map(|(s, &(row, column, shift, value))| (at(s, 0, row), at(s, shift, column), value)).collect()
-        };
-        let [mass, mut damping, mut stiffness] = one.entries.each_ref().map(|entries| around(entries));
+        let ring = RingEntries { sectors, entries: one.entries };
+        let equal = disk.deviations.iter().all(|deviation| *deviation == 0.0);
+        let [mass, mut damping, mut stiffness] = if equal { Default::default() } else { ring.around(n) };
         let of_springs = match substructure.damping {
             SubstructureDamping::Rayleigh { stiffness, .. } => stiffness,
             _ => 0.0,
@@ -191,6 +214,7 @@ impl SubstructureParts {
             names: names.collect(),
             places,
             entries: [mass, damping, stiffness],
+            ring: equal.then_some(ring),
             modes: None,
             reduced: one.reduced,
         })
@@ -216,6 +240,7 @@ impl SubstructureParts {
             names: (1..=modes.own.len()).map(|number| format!("mode {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [own(0), damping, own(1)],
+            ring: None,
             modes: None,
             reduced: Some(component),
         })
