@@ -6,7 +6,7 @@ use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Place, Substructure, SubstructureDamping};
 use crate::structure::reduction::{ReducedMatrices, ReductionError, Row, StructureDamping};
 use crate::structure::{
-    BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorCache,
+    BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBasis, SectorCache,
 };
 use std::sync::Arc;
 use stickslip_numerics::sparse::ModesError;
@@ -177,7 +177,7 @@ impl SubstructureParts {
         let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
         let one = match (reduction, &blade) {
             (Reduction::None { .. }, _) => SectorParts::whole(substructure, &kept, &seen, blade.as_deref())?,
-            (_, None) => SectorParts::reduced(substructure, &kept, &seen, sectors)?,
+            (_, None) => SectorParts::reduced(substructure, (&kept, disk.basis), &seen, sectors)?,
             (_, Some(blade)) => {
                 let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(reduction_error)?;
                 return SubstructureParts::mistuned_ring(substructure, component, model);
@@ -285,11 +285,15 @@ impl SectorParts {
 
     fn reduced(
         substructure: &Substructure,
-        kept: &SectorCache,
+        (kept, basis): (&SectorCache, Option<SectorBasis>),
         seen: &[Row],
         sectors: usize,
     ) -> Result<Self, ModelError> {
-        let component = kept.reduced(seen, &substructure.reduction).map_err(reduction_error)?;
+        let component = match (substructure.reduction, basis) {
+            (Reduction::UpTo { up_to, .. }, Some(basis)) => kept.reduced_by_size(seen, up_to, basis),
+            _ => kept.reduced(seen, &substructure.reduction),
+        };
+        let component = component.map_err(reduction_error)?;
         let ReducedForm::Sector(sector) = component.form() else {
             return Err(reduction_error(ReductionError::NoPorts));
         };
@@ -386,7 +390,7 @@ mod tests {
         let names = ["1.x", "2.x", "3.x", "4.x"].map(str::to_owned).to_vec();
         let component = Component::new(names, mass, None, stiffness).unwrap();
         let boundary = Boundary::of_nodes(component.rows(), &[("1".into(), "2".into())], None).unwrap();
-        let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation] });
+        let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation], basis: None });
         Model {
             substructure: Some(Substructure { component, damping, reduction, earlier_reduction: None, disk }),
             places: vec![Place::new("rim", vec![(1, 1.0)]), Place::new("tip", vec![(3, 1.0)])],

@@ -17,7 +17,7 @@ pub use component::{CommonBasisComponent, Component, ReducedComponent, SectorCom
 pub use dynamic::DynamicStiffness;
 pub(crate) use free_vibration::free_vibrations;
 pub use modal_damping::ModalDamping;
-pub use reduction::{Reduction, ReductionKind};
+pub use reduction::{Reduction, ReductionKind, SectorBasis};
 pub use sector::{RingSector, Wave, WaveStiffness};
 pub(crate) use sector::{sector_entries, unit_root};
 pub use sector_boundary::{BladeError, Boundary, BoundaryError, CoordinateAxis};
@@ -421,7 +421,16 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => full.mass[(row, row)],
             Storage::Sparse { mass, .. } => mass.get(row, row),
-            Storage::Ring { sector, .. } => sector.diagonal_mass(row % sector.dofs()),
+            Storage::Ring { sector, .. } => sector.diagonal(row % sector.dofs())[0],
+        }
+    }
+
+    /// Returns the diagonal entry of the stiffness matrix in a row, N/m.
+    pub fn diagonal_stiffness(&self, row: usize) -> f64 {
+        match &self.0.form {
+            Storage::Full(full) => full.stiffness[(row, row)],
+            Storage::Sparse { stiffness, .. } => stiffness.get(row, row),
+            Storage::Ring { sector, .. } => sector.diagonal(row % sector.dofs())[2],
         }
     }
 

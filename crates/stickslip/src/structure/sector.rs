@@ -189,10 +189,10 @@ impl RingSector {
         all.fold([0.0; 3], |most, entry| std::array::from_fn(|k| f64::max(most[k], entry.3[k].abs())))
     }
 
-    /// Returns the diagonal entry of the mass matrix in a row, kg.
-    pub(super) fn diagonal_mass(&self, row: usize) -> f64 {
+    /// Returns the diagonal entries of mass, damping and stiffness in a row.
+    pub(super) fn diagonal(&self, row: usize) -> [f64; 3] {
         let found = self.entries.binary_search_by_key(&(row, row, 0), |entry| (entry.0, entry.1, entry.2));
-        found.map_or(0.0, |at| self.entries[at].3[0])
+        found.map_or([0.0; 3], |at| self.entries[at].3)
     }
 
     /// Iterates over the nonzero entries of the ring, row by row: row, column, values of mass,

@@ -299,8 +299,11 @@ impl CyclicSector {
     }
 
     /// Returns the matrix of a sector with the adjacent sectors fixed.
-    pub fn with_fixed_adjacent(&self, entries: &[RingEntry]) -> Result<SparseMatrix, ReductionError> {
-        let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
+    pub fn with_fixed_adjacent(
+        &self,
+        entries: impl Iterator<Item = RingEntry>,
+    ) -> Result<SparseMatrix, ReductionError> {
+        let own = entries.filter(|entry| entry.2 == 0).map(|(row, column, _, value)| (row, column, value));
         SparseMatrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
     }
 

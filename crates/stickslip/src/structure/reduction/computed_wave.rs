@@ -19,7 +19,8 @@ pub(super) struct ComputedWave {
     pub modes: NaturalModes,
     /// Multiple of the frequency of interest up to which modes are computed.
     pub extent: f64,
-    pub reference: ReferenceReceptance,
+    /// None for a basis whose error is not computed.
+    pub reference: Option<ReferenceReceptance>,
     residual: Option<ResidualVectors>,
 }
 
@@ -35,7 +36,7 @@ impl ComputedWave {
         diameter: usize,
         whole: FullStructure,
         (modes, extent): (NaturalModes, f64),
-        reference: ReferenceReceptance,
+        reference: Option<ReferenceReceptance>,
     ) -> Self {
         ComputedWave { diameter, whole, modes, extent, reference, residual: None }
     }
@@ -60,6 +61,8 @@ impl ComputedWave {
         }
         let count = self.whole.ports().len() * sector_dofs / self.whole.dofs();
         if self.residual.as_ref().is_none_or(|known| known.order < order) {
+            // a request for more than the first order is followed by one for the third
+            let order = if self.residual.is_some() { order.max(3) } else { order };
             let columns = self.residual_vectors(self.whole.ports()[..count].to_vec(), order)?;
             self.residual = Some(ResidualVectors { order, columns });
         }

@@ -43,6 +43,19 @@ pub(super) const HALF_WIDTH: f64 = 1e-3;
 /// the size of a sector.
 const SAMPLES: usize = 5;
 
+/// The size of a basis of a sector whose error was within its tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SectorBasis {
+    /// Multiple of the frequency of interest up to which it has modes.
+    extent: f64,
+    /// Orders of residual vectors.
+    order: usize,
+    /// Relative eigenvalue of the vectors' Gram matrix below which a combination is dropped.
+    share: f64,
+    /// Refinement level of the nodal diameters.
+    level: usize,
+}
+
 /// A reduced sector.
 #[derive(Debug, Clone)]
 pub(crate) struct ReducedSector {
@@ -73,6 +86,8 @@ pub(in crate::structure) struct SectorReduction {
     pub up_to: f64,
     /// Highest frequency for which the basis is intended, rad/s.
     pub serves: f64,
+    /// The size of the basis, if it follows from the required error.
+    pub basis: Option<SectorBasis>,
 }
 
 /// Returns the first Gram tolerance for this number of orders.
@@ -112,6 +127,27 @@ impl CyclicSector {
         }
     }
 
+    /// Returns the sector reduced by a basis of a known size with the modes of a higher frequency
+    /// range, up to `up_to`, rad/s. Its error is not computed.
+    pub(in crate::structure) fn reduced_by_size(
+        &self,
+        seen: &[Row],
+        up_to: f64,
+        basis: SectorBasis,
+    ) -> Result<SectorReduction, ReductionError> {
+        let SectorBasis { extent, order, share, level } = basis;
+        let mut waves = WaveCollection { sector: self, seen, blade: None, computed: Vec::new() };
+        let taken = self.diameters(level);
+        for &diameter in &taken {
+            let whole = self.wave(diameter, seen)?;
+            let modes = whole.modes(extent * up_to)?;
+            waves.computed.push(ComputedWave::new(diameter, whole, (modes, extent), None));
+        }
+        let reduced = waves.basis(&taken, (order, share), ReductionKind::Rubin)?;
+        let unknown = ReductionDeviation { error: f64::NAN, omega: up_to };
+        Ok(SectorReduction { basis: Some(basis), ..waves.chosen(reduced, unknown, (up_to, up_to)) })
+    }
+
     /// Returns the nodal diameters of a refinement level. High levels contain all diameters.
     pub(super) fn diameters(&self, level: usize) -> Vec<usize> {
         let (half, parts) = (self.sectors / 2, 2usize << level);
@@ -133,7 +169,7 @@ impl WaveCollection<'_> {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
                     let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-                    self.computed.push(ComputedWave::new(diameter, whole, (modes, extent), reference));
+                    self.computed.push(ComputedWave::new(diameter, whole, (modes, extent), Some(reference)));
                 }
             }
         }
@@ -165,13 +201,17 @@ impl WaveCollection<'_> {
                 let between = self.sector.diameters(level + 1);
                 self.compute(&between, up_to, extent)?;
                 let reduced = self.basis(&taken, size, kind)?;
-                let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
-                let (own, all) = (at(&taken)?, at(&between)?);
+                let each = self.deviations(&reduced, &between, up_to)?;
+                let own = largest(each.iter().filter(|(diameter, _)| taken.contains(diameter)).map(|(_, own)| *own));
+                let all = largest(each.iter().map(|(_, own)| *own));
                 if best.is_none_or(|(least, _)| all.error < least.error) {
                     best = Some((all, reduced.dofs()));
                 }
                 if all.error <= tolerance {
-                    return Ok(self.chosen(reduced, all, (up_to, up_to)));
+                    let (order, share) = size;
+                    let basis = Some(SectorBasis { extent, order, share, level });
+                    let basis = basis.filter(|_| kind == ReductionKind::Rubin);
+                    return Ok(SectorReduction { basis, ..self.chosen(reduced, all, (up_to, up_to)) });
                 }
                 // if the computed waves are accurate, other diameters are missing
                 if own.error > tolerance || taken == between {
@@ -210,10 +250,11 @@ impl WaveCollection<'_> {
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
             let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-            self.computed.push(ComputedWave::new(diameter, whole, (modes, beyond), reference));
+            self.computed.push(ComputedWave::new(diameter, whole, (modes, beyond), Some(reference)));
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
-        let deviation = self.deviation(&reduced, &between, up_to)?;
+        let each = self.deviations(&reduced, &between, up_to)?;
+        let deviation = largest(each.into_iter().map(|(_, deviation)| deviation));
         Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }
 
@@ -230,7 +271,7 @@ impl WaveCollection<'_> {
             free += wave.modes.rigid_body_count() / step;
         }
         frequencies.sort_by(f64::total_cmp);
-        SectorReduction { reduced, deviation, frequencies, free, up_to, serves }
+        SectorReduction { reduced, deviation, frequencies, free, up_to, serves, basis: None }
     }
 
     /// Builds one basis from the waves of these diameters.
@@ -270,14 +311,12 @@ impl WaveCollection<'_> {
     /// displacement at the port that moves most. A column counts as often as `counts` states.
     fn independent(&self, vectors: &[f64], counts: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.sector.dofs;
-        let (mass, stiffness) = (
-            self.sector.with_fixed_adjacent(&self.sector.mass)?,
-            self.sector.with_fixed_adjacent(&self.sector.stiffness)?,
-        );
         let highest =
             self.computed.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
-        let mut energies = multi_vector::inner_products(n, vectors, &stiffness.multiply_columns(vectors));
-        energies += multi_vector::inner_products(n, vectors, &mass.multiply_columns(vectors)) * highest;
+        let weighted =
+            self.sector.mass.iter().map(|&(row, column, shift, value)| (row, column, shift, highest * value));
+        let energy = self.sector.with_fixed_adjacent(self.sector.stiffness.iter().copied().chain(weighted))?;
+        let energies = multi_vector::inner_products(n, vectors, &energy.multiply_columns(vectors));
         let size: Vec<f64> =
             energies.diagonal().iter().zip(counts).map(|(e, count)| (e.max(0.0) / count).sqrt()).collect();
         let moving: Vec<usize> = (0..size.len()).filter(|&k| size[k] > 0.0).collect();
@@ -335,17 +374,17 @@ impl WaveCollection<'_> {
         }
     }
 
-    /// Returns the error of the waves of these diameters relative to the whole ring.
-    fn deviation(
+    /// Returns the error of each wave of these diameters relative to the whole ring.
+    fn deviations(
         &self,
         reduced: &ReducedSector,
         diameters: &[usize],
         up_to: f64,
-    ) -> Result<ReductionDeviation, ReductionError> {
-        let mut worst = ReductionDeviation { error: 0.0, omega: 0.0 };
-        for wave in self.computed.iter().filter(|wave| diameters.contains(&wave.diameter)) {
+    ) -> Result<Vec<(usize, ReductionDeviation)>, ReductionError> {
+        let waves = self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
+        let deviation = |wave: &ComputedWave| {
             let small = reduced.wave(wave.diameter, self.sector.sectors)?;
-            let deviation = wave.reference.deviation(&small);
+            let of_ports = wave.reference.as_ref().map(|reference| reference.deviation(&small));
             let own = small.frequencies().unwrap_or_default();
             let found = wave
                 .modes
@@ -358,11 +397,16 @@ impl WaveCollection<'_> {
                 let error = own.get(k).map_or(f64::INFINITY, |own| (own / omega - 1.0).abs() / HALF_WIDTH);
                 ReductionDeviation { error, omega }
             });
-            worst =
-                shifts.chain([deviation]).fold(worst, |worst, one| if one.error > worst.error { one } else { worst });
-        }
-        Ok(worst)
+            Ok((wave.diameter, largest(shifts.chain(of_ports))))
+        };
+        waves.map(deviation).collect()
     }
+}
+
+/// Returns the first of the largest errors.
+fn largest(all: impl Iterator<Item = ReductionDeviation>) -> ReductionDeviation {
+    let none = ReductionDeviation { error: 0.0, omega: 0.0 };
+    all.fold(none, |worst, one| if one.error > worst.error { one } else { worst })
 }
 
 /// Returns `Vᵀ A V` for entries with shifts.

@@ -41,7 +41,8 @@ mod rubin;
 
 pub use automatic::{AutomaticReduction, SelectedReduction};
 pub(crate) use cyclic_basis::ReducedSector;
-pub(in crate::structure) use cyclic_basis::STEPS;
+pub use cyclic_basis::SectorBasis;
+pub(in crate::structure) use cyclic_basis::{STEPS, SectorReduction};
 pub(in crate::structure) use mistuning_error::MistuningError;
 pub(crate) use nominal_modes::RingModes;
 pub(in crate::structure) use nominal_modes::{EXTENTS, MistunedModes, NominalRing};
