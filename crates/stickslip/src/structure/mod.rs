@@ -34,8 +34,9 @@ use stickslip_numerics::sparse::{Asymmetry, MatrixError, SparseMatrix, SymbolicA
 /// `M x'' + C x' + K x`, over the places that are free to move.
 ///
 /// The mass matrix need not be diagonal. A copy is a reference to the same matrices. Matrices
-/// are stored full if there are few degrees of freedom or many entries, otherwise sparse. The
-/// storage affects the computing time, but not the results.
+/// are stored full if there are few degrees of freedom or many entries, otherwise sparse. A ring
+/// of equal sectors stores the matrices of its first sector. The storage affects the computing
+/// time, but not the results.
 #[derive(Debug, Clone)]
 pub struct Structure(Arc<StructureData>);
 
@@ -252,7 +253,7 @@ impl Structure {
     }
 
     /// Returns the structure with the matrices of all sectors; any other than a ring is itself.
-    fn expanded(&self) -> &Structure {
+    pub(in crate::structure) fn expanded(&self) -> &Structure {
         let Storage::Ring { sector, expanded } = &self.0.form else { return self };
         expanded.get_or_init(|| {
             let n = self.dofs();
@@ -484,12 +485,7 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => nonzero_entries(&full.damping),
             Storage::Sparse { damping, .. } => Box::new(damping.entries()),
-            Storage::Ring { sector, .. } => Box::new(
-                sector
-                    .ring_entries()
-                    .map(|(row, column, values)| (row, column, values[1]))
-                    .filter(|entry| entry.2 != 0.0),
-            ),
+            Storage::Ring { sector, .. } => Box::new(sector.ring_entries_of(1)),
         }
     }
 
@@ -499,12 +495,7 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => nonzero_entries(&full.stiffness),
             Storage::Sparse { stiffness, .. } => Box::new(stiffness.entries()),
-            Storage::Ring { sector, .. } => Box::new(
-                sector
-                    .ring_entries()
-                    .map(|(row, column, values)| (row, column, values[2]))
-                    .filter(|entry| entry.2 != 0.0),
-            ),
+            Storage::Ring { sector, .. } => Box::new(sector.ring_entries_of(2)),
         }
     }
 

@@ -122,6 +122,38 @@ pub(super) fn wave_entries(
     triplets
 }
 
+/// Returns the result of [`wave_entries`] for a symmetric matrix of `n` rows, whose entries are
+/// sorted, column by column.
+///
+/// The matrix of a wave is Hermitian, so that its columns are the conjugate rows.
+pub(super) fn symmetric_wave_entries(
+    entries: &[(usize, usize, i64, f64)],
+    n: usize,
+    diameter: usize,
+    sectors: usize,
+) -> Vec<(usize, usize, f64)> {
+    let real = is_real(diameter, sectors);
+    let mut triplets = Vec::with_capacity(if real { entries.len() } else { 2 * entries.len() });
+    for copy in 0..if real { 1 } else { 2 } {
+        for group in entries.chunk_by(|a, b| a.0 == b.0) {
+            let column = copy * n + group[0].0;
+            // the upper and the lower half of the column
+            for half in 0..if real { 1 } else { 2 } {
+                let part = |phase: Complex64| match (half, copy) {
+                    (0, 0) | (1, 1) => phase.re,
+                    (0, _) => phase.im,
+                    _ => -phase.im,
+                };
+                let all = group.iter().map(|&(_, row, shift, value)| {
+                    (half * n + row, column, value * part(unit_root(diameter as i64 * shift, sectors)))
+                });
+                triplets.extend(all.filter(|entry| entry.2 != 0.0));
+            }
+        }
+    }
+    triplets
+}
+
 impl RingSector {
     /// Returns the first of `sectors` equal sectors, whose degrees of freedom are stored sector
     /// by sector in `cyclic_basis`.
@@ -204,6 +236,18 @@ impl RingSector {
                 (sector * n + row, (sector + shift) % sectors * n + column, values)
             };
             self.entries.iter().map(of)
+        })
+    }
+
+    /// Iterates over the nonzero entries of the mass (0), damping (1) or stiffness matrix (2) of the
+    /// ring, row by row.
+    pub(super) fn ring_entries_of(&self, kind: usize) -> impl Iterator<Item = (usize, usize, f64)> + use<> {
+        let (n, sectors) = (self.dofs(), self.sectors);
+        let own = self.entries.iter().filter(|entry| entry.3[kind] != 0.0);
+        let own: Vec<_> = own.map(|&(row, column, shift, values)| (row, column, shift, values[kind])).collect();
+        (0..sectors * own.len()).map(move |at| {
+            let (sector, (row, column, shift, value)) = (at / own.len(), own[at % own.len()]);
+            (sector * n + row, (sector + shift) % sectors * n + column, value)
         })
     }
 
@@ -454,6 +498,80 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// A ring that stores its first sector has the matrices of the whole ring.
+    #[test]
+    fn a_stored_sector_is_its_ring() {
+        for sectors in [2, 3, 7, 30] {
+            let whole = ring(sectors, 0.0);
+            let first = RingSector::from_ring(&whole, sectors).unwrap();
+            let of = |kind: usize| -> Vec<RingEntry> {
+                first.entries.iter().map(|entry| (entry.0, entry.1, entry.2 as i64, entry.3[kind])).collect()
+            };
+            let [mass, damping, stiffness] = [0, 1, 2].map(of);
+            let sector = RingSector::from_entries(first.places.clone(), sectors, [&mass, &damping, &stiffness]);
+            let stored = Structure::ring(whole.places().to_vec(), sector).unwrap();
+            assert_eq!((&stored, stored.is_sparse()), (stored.expanded(), whole.is_sparse()));
+            assert_eq!(stored.has_definite_mass(), whole.has_definite_mass());
+            assert_eq!(stored.is_dissipative(), whole.is_dissipative());
+            // the sums of the whole ring have another order
+            let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-14;
+            assert!(near(stored.mass(), whole.mass()) && near(stored.stiffness(), whole.stiffness()));
+            assert!(near(stored.damping(), whole.damping()));
+            for (a, b) in [
+                (stored.largest()[2], whole.largest()[2]),
+                (stored.diagonal_mass(3), whole.diagonal_mass(3)),
+                (stored.diagonal_stiffness(2), whole.diagonal_stiffness(2)),
+            ] {
+                assert!((a - b).abs() < 1e-14, "{a} {b}");
+            }
+            let sum = |entries: Box<dyn Iterator<Item = (usize, usize, f64)> + '_>| {
+                let mut sum = DMatrix::zeros(whole.dofs(), whole.dofs());
+                entries.for_each(|(row, column, value)| sum[(row, column)] += value);
+                sum
+            };
+            assert_eq!(&sum(stored.stiffness_entries()), stored.stiffness());
+            assert_eq!(&sum(stored.damping_entries()), stored.damping());
+            assert_ne!(stored, ring(sectors, 1e-6));
+            assert_ne!(ring(sectors, 1e-6), stored);
+        }
+        let sector = RingSector::from_entries(vec!["a".into()], 3, [&[(0, 0, 0, 1.0), (0, 0, 1, -1.0)], &[], &[]]);
+        let names = vec!["0".to_owned(), "1".into(), "2".into()];
+        assert_eq!(Structure::ring(names, sector).unwrap_err(), StructureError::NegativeMass);
+    }
+
+    /// The power of a wave on one sector is its part of the power on the whole ring.
+    #[test]
+    fn all_sectors_lose_the_same_power() {
+        let (sectors, diameter) = (7, 2);
+        let whole = ring(sectors, 0.0);
+        let wave = RingSector::from_ring(&whole, sectors).unwrap().wave(diameter).unwrap();
+        let own = [Complex64::new(1.0, 0.2), Complex64::new(-0.4, 0.3)];
+        let all: Vec<Complex64> = (0..2 * sectors).map(|i| own[i % 2] * wave.phase(i as i64 / 2)).collect();
+        let entries = whole.damping_entries().map(|(row, column, c)| c * (all[row].conj() * all[column]).re);
+        assert!((wave.damping_power(&own) * sectors as f64 / entries.sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    /// Column by column, the entries of a wave are those of the general form.
+    #[test]
+    fn sorted_entries_are_those_of_the_wave() {
+        let (n, sectors) = (2, 7);
+        let entries: Vec<RingEntry> =
+            vec![(0, 0, 0, 3.0), (0, 1, -1, 0.5), (0, 1, 0, -1.0), (1, 0, 0, -1.0), (1, 0, 1, 0.5), (1, 1, 0, 2.0)];
+        for diameter in 0..sectors {
+            let sorted = symmetric_wave_entries(&entries, n, diameter, sectors);
+            assert!(sorted.is_sorted_by_key(|entry| (entry.1, entry.0)));
+            let general = wave_entries(entries.iter().copied(), [n, n], diameter, sectors);
+            let [sorted, general] = [sorted, general].map(|all| SparseMatrix::from_triplets(2 * n, all).unwrap());
+            assert!(
+                sorted
+                    .entries()
+                    .zip(general.entries())
+                    .all(|(a, b)| { (a.0, a.1) == (b.0, b.1) && (a.2 - b.2).abs() < 1e-15 })
+            );
+            assert_eq!(sorted.len(), general.len());
         }
     }
 

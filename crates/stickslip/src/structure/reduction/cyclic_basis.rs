@@ -141,7 +141,10 @@ impl CyclicSector {
         for &diameter in &taken {
             let whole = self.wave(diameter, seen)?;
             let modes = whole.modes(extent * up_to)?;
-            waves.computed.push(ComputedWave::new(diameter, whole, (modes, extent), None));
+            let mut wave = ComputedWave::new(diameter, whole, (modes, extent), None);
+            wave.vectors(order, self.dofs)?;
+            wave.whole = None;
+            waves.computed.push(wave);
         }
         let reduced = waves.basis(&taken, (order, share), ReductionKind::Rubin)?;
         let unknown = ReductionDeviation { error: f64::NAN, omega: up_to };
@@ -159,18 +162,31 @@ impl CyclicSector {
 
 impl WaveCollection<'_> {
     /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
-    /// of interest.
-    fn compute(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
+    /// of interest. The matrices of waves that are not `taken` are dropped.
+    fn compute(
+        &mut self,
+        diameters: &[usize],
+        (up_to, extent): (f64, f64),
+        taken: &[usize],
+    ) -> Result<(), ReductionError> {
+        let (sector, seen) = (self.sector, self.seen);
         for &diameter in diameters {
             match self.computed.iter_mut().find(|wave| wave.diameter == diameter) {
                 Some(wave) if wave.extent >= extent => {}
-                Some(wave) => wave.set_modes(wave.whole.modes(extent * up_to)?, extent),
+                Some(wave) => {
+                    let modes = wave.whole(|diameter| sector.wave(diameter, seen))?.modes(extent * up_to)?;
+                    wave.set_modes(modes, extent);
+                }
                 None => {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
                     let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
                     self.computed.push(ComputedWave::new(diameter, whole, (modes, extent), Some(reference)));
                 }
+            }
+            // the matrices of all waves at once would be the largest part of the memory
+            for wave in self.computed.iter_mut().filter(|wave| !taken.contains(&wave.diameter)) {
+                wave.whole = None;
             }
         }
         Ok(())
@@ -199,7 +215,7 @@ impl WaveCollection<'_> {
             loop {
                 let taken = self.sector.diameters(level);
                 let between = self.sector.diameters(level + 1);
-                self.compute(&between, up_to, extent)?;
+                self.compute(&between, (up_to, extent), &taken)?;
                 let reduced = self.basis(&taken, size, kind)?;
                 let each = self.deviations(&reduced, &between, up_to)?;
                 let own = largest(each.iter().filter(|(diameter, _)| taken.contains(diameter)).map(|(_, own)| *own));
@@ -284,15 +300,22 @@ impl WaveCollection<'_> {
         let n = self.sector.dofs;
         let (mut vectors, mut counts): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut modes = 0;
+        let (sector, seen) = (self.sector, self.seen);
         for wave in self.computed.iter_mut().filter(|wave| diameters.contains(&wave.diameter)) {
-            vectors.extend(wave.vectors(kind, order, n)?);
+            if !wave.has_vectors(order) || kind == ReductionKind::CraigBampton || self.blade.is_some() {
+                wave.whole(|diameter| sector.wave(diameter, seen))?;
+            }
+            match kind {
+                ReductionKind::Rubin => vectors.extend(wave.vectors(order, n)?),
+                ReductionKind::CraigBampton => vectors.extend(wave.craig_bampton()?),
+            }
             if let Some((blade, up_to)) = self.blade {
                 vectors.extend(wave.blade_vectors(blade, up_to, order, n)?);
             }
             modes = modes.max(wave.modes.count());
             // a vector and its partner split into the same columns
-            let both = if kind == ReductionKind::Rubin && wave.whole.dofs() > n { 2.0 } else { 1.0 };
-            counts.resize(vectors.len() / n.max(1), both);
+            let both = kind == ReductionKind::Rubin && !is_real(wave.diameter, sector.sectors);
+            counts.resize(vectors.len() / n.max(1), if both { 2.0 } else { 1.0 });
         }
         let basis = self.independent(&vectors, &counts, share)?;
         let name = match kind {
