@@ -5,11 +5,11 @@ use super::coordinates::{Coordinates, merge_duplicates};
 use super::error::{Element, ModelError};
 use super::name_resolution::{PlaceSource, PlaceTarget, Places};
 use super::place::places_of;
-use super::substructure::Entries;
+use super::substructure::{Entries, RingEntries};
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::reduction::Row;
-use crate::structure::{ModalDamping, Structure};
+use crate::structure::{ModalDamping, RingEntry, RingSector, Structure, sector_entries};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
@@ -197,7 +197,10 @@ impl Assembler<'_> {
 
     /// Returns the structure of the free coordinates.
     fn structure(&self, matrices: &AssembledMatrices) -> Result<Structure, ModelError> {
-        let Coordinates { free: n, moved, names, .. } = &self.coordinates;
+        let Coordinates { free: n, moved, names, ring, .. } = &self.coordinates;
+        if let Some(ring) = ring {
+            return self.ring_structure(ring, matrices);
+        }
         let block = |matrix: &SparseMatrix| {
             if *moved == 0 {
                 return Ok(matrix.clone());
@@ -216,6 +219,36 @@ impl Assembler<'_> {
                 structure.with_damped_modes(&ModalDamping::new(*n, Arc::new(free)))
             }
         })
+    }
+
+    /// Returns the structure of a ring without imposed motion, from its equal sectors and the masses
+    /// and springs on them.
+    fn ring_structure(&self, ring: &RingEntries, matrices: &AssembledMatrices) -> Result<Structure, ModelError> {
+        let names = self.coordinates.names.clone();
+        let more = [&matrices.mass, &matrices.damping, &matrices.stiffness];
+        let found = more.map(|matrix| sector_entries(matrix, ring.sectors));
+        let dofs = names.len() / ring.sectors;
+        let structure = match found {
+            [Some(mass), Some(damping), Some(stiffness)] => {
+                let more = [mass, damping, stiffness];
+                let all: [Vec<RingEntry>; 3] = std::array::from_fn(|k| [&ring.entries[k][..], &more[k]].concat());
+                let sector =
+                    RingSector::from_entries(names[..dofs].to_vec(), ring.sectors, all.each_ref().map(|of| &of[..]));
+                Structure::ring(names, sector)
+            }
+            // a ring that was edited after its creation
+            _ => {
+                let [mass, damping, stiffness] = ring.around(dofs);
+                let sum = |own: Entries, more: &SparseMatrix| {
+                    let all = own.into_iter().chain(more.entries());
+                    SparseMatrix::from_triplets(names.len(), all).map_err(|error| model_error(&error))
+                };
+                let (mass, damping) = (sum(mass, more[0])?, sum(damping, more[1])?);
+                let stiffness = sum(stiffness, more[2])?;
+                Structure::sparse(names, mass, damping, stiffness)
+            }
+        };
+        structure.map_err(|error| model_error(&error))
     }
 
     /// Adds the places of results: those without imposed motion.

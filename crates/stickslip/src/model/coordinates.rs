@@ -13,7 +13,7 @@ use super::body::Body;
 use super::error::{Element, ModelError};
 use super::name_resolution::{PlaceSource, Places};
 use super::place::Place;
-use super::substructure::{Entries, SubstructureParts};
+use super::substructure::{Entries, RingEntries, SubstructureParts};
 use crate::structure::reduction::Row;
 use crate::structure::{ModalDamping, ReducedComponent};
 use nalgebra::DMatrix;
@@ -36,6 +36,8 @@ pub(super) struct Coordinates {
     pub without_results: Vec<bool>,
     /// Mass, damping and stiffness of the substructure and the bodies.
     pub entries: [Entries; 3],
+    /// Matrices of equal sectors, in addition; none if a motion is imposed.
+    pub ring: Option<RingEntries>,
     /// Modal damping in addition to the damping entries, over the free and then the moved
     /// coordinates.
     pub modes: Option<ModalDamping>,
@@ -101,6 +103,12 @@ impl Coordinates {
             entries.into_iter().map(|(row, column, v)| (order.of_part(row), order.of_part(column), v)).collect()
         };
         let mut entries = part.entries.map(of_part);
+        let mut ring_entries = part.ring;
+        if places.stated.iter().any(|place| place.moved)
+            && let Some(ring) = ring_entries.take()
+        {
+            entries = ring.around(names.len() / ring.sectors);
+        }
         entries[0].extend(of_bodies.mass(model));
         let modes = part.modes.map(|modes| {
             let mut columns = vec![0.0; modes.iter().count() * names.len()];
@@ -134,6 +142,7 @@ impl Coordinates {
             places: placed,
             without_results,
             entries: entries.map(|entries| turned.entries(entries)),
+            ring: ring_entries,
             modes: modes.map(|modes| turned.modes(&modes, moved.len())),
             reduced: part.reduced,
         })

@@ -37,7 +37,7 @@ pub use system::{
 pub use view::View;
 
 use crate::law::SharedLaw;
-use crate::structure::{Boundary, Component, ReducedComponent, Reduction};
+use crate::structure::{Boundary, Component, ReducedComponent, Reduction, SectorBasis};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -92,7 +92,8 @@ pub struct Substructure {
 
 impl Substructure {
     /// Returns this structure with the same damping and a reduction that is accurate to a
-    /// higher frequency: `times` the range of the reduced component `few`.
+    /// higher frequency: `times` the range of the reduced component `few`. A sector keeps the size
+    /// of its basis apart from the number of modes, and the error of the new basis is not computed.
     #[must_use]
     pub fn with_extended_range(&self, few: &ReducedComponent, times: f64) -> Substructure {
         let (tolerance, kind) = match self.reduction {
@@ -104,7 +105,8 @@ impl Substructure {
             damping => damping,
         };
         let reduction = Reduction::UpTo { up_to: times * few.intended_up_to(), tolerance, kind };
-        Substructure { damping, reduction, ..self.clone() }
+        let disk = self.disk.clone().map(|disk| DiskPart { basis: few.sector_basis(), ..disk });
+        Substructure { damping, reduction, disk, ..self.clone() }
     }
 }
 
@@ -135,6 +137,9 @@ pub struct DiskPart {
     /// Relative deviations of the blade stiffness. A sector has one entry, a ring has one entry
     /// per sector; empty if all blades are equal.
     pub deviations: Vec<f64>,
+    /// The size of the basis of a reduction up to a frequency, from an earlier reduction of a disk
+    /// with equal blades. By default the size follows from the required error.
+    pub basis: Option<SectorBasis>,
 }
 
 /// Damping of a substructure.

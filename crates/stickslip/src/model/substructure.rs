@@ -6,7 +6,7 @@ use super::error::{Element, ModelError};
 use super::{DiskPart, Model, Place, Substructure, SubstructureDamping};
 use crate::structure::reduction::{ReducedMatrices, ReductionError, Row, StructureDamping};
 use crate::structure::{
-    BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorCache,
+    BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBasis, SectorCache,
 };
 use std::sync::Arc;
 use stickslip_numerics::sparse::ModesError;
@@ -23,9 +23,32 @@ pub(super) struct SubstructureParts {
     pub places: Vec<Vec<Row>>,
     /// Entries of mass, damping and stiffness.
     pub entries: [Entries; 3],
+    /// Entries of a ring of equal sectors, in addition.
+    pub ring: Option<RingEntries>,
     /// Modal damping in addition to the damping entries, over its coordinates.
     pub modes: Option<ModalDamping>,
     pub reduced: Option<Arc<ReducedComponent>>,
+}
+
+/// The matrices of a ring of equal sectors.
+pub(super) struct RingEntries {
+    pub sectors: usize,
+    /// Entries of mass, damping and stiffness in the rows of the first sector.
+    pub entries: [Vec<RingEntry>; 3],
+}
+
+impl RingEntries {
+    /// Returns the entries of all sectors, each with `dofs` coordinates.
+    pub fn around(&self, dofs: usize) -> [Entries; 3] {
+        let next = |sector: usize, shift: i64| (sector as i64 + shift).rem_euclid(self.sectors as i64) as usize;
+        self.entries.each_ref().map(|entries| {
+            let all = (0..self.sectors).flat_map(|sector| entries.iter().map(move |entry| (sector, entry)));
+            all.map(|(sector, &(row, column, shift, value))| {
+                (sector * dofs + row, next(sector, shift) * dofs + column, value)
+            })
+            .collect()
+        })
+    }
 }
 
 impl SubstructureParts {
@@ -87,6 +110,7 @@ impl SubstructureParts {
             places: model.places.iter().map(|place| place.displacements(&place.rows)).collect(),
             entries: [entries, damping, springs],
             modes,
+            ring: None,
             reduced: None,
         })
     }
@@ -116,6 +140,7 @@ impl SubstructureParts {
             names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [entries(mass), entries(damping), entries(stiffness)],
+            ring: None,
             modes: None,
             reduced: Some(component),
         })
@@ -152,7 +177,7 @@ impl SubstructureParts {
         let blade = blade.map_err(|error| ModelError::new(Element::Substructure, "blade", error.to_string()))?;
         let one = match (reduction, &blade) {
             (Reduction::None { .. }, _) => SectorParts::whole(substructure, &kept, &seen, blade.as_deref())?,
-            (_, None) => SectorParts::reduced(substructure, &kept, &seen, sectors)?,
+            (_, None) => SectorParts::reduced(substructure, (&kept, disk.basis), &seen, sectors)?,
             (_, Some(blade)) => {
                 let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(reduction_error)?;
                 return SubstructureParts::mistuned_ring(substructure, component, model);
@@ -162,11 +187,9 @@ impl SubstructureParts {
         let at = |sector: usize, shift: i64, row: usize| {
             (sector as i64 + shift).rem_euclid(sectors as i64) as usize * n + row
         };
-        let around = |entries: &[RingEntry]| -> Entries {
-            let all = (0..sectors).flat_map(|s| entries.iter().map(move |entry| (s, entry)));
-            all.map(|(s, &(row, column, shift, value))| (at(s, 0, row), at(s, shift, column), value)).collect()
-        };
-        let [mass, mut damping, mut stiffness] = one.entries.each_ref().map(|entries| around(entries));
+        let ring = RingEntries { sectors, entries: one.entries };
+        let equal = disk.deviations.iter().all(|deviation| *deviation == 0.0);
+        let [mass, mut damping, mut stiffness] = if equal { Default::default() } else { ring.around(n) };
         let of_springs = match substructure.damping {
             SubstructureDamping::Rayleigh { stiffness, .. } => stiffness,
             _ => 0.0,
@@ -191,6 +214,7 @@ impl SubstructureParts {
             names: names.collect(),
             places,
             entries: [mass, damping, stiffness],
+            ring: equal.then_some(ring),
             modes: None,
             reduced: one.reduced,
         })
@@ -216,6 +240,7 @@ impl SubstructureParts {
             names: (1..=modes.own.len()).map(|number| format!("mode {number}")).collect(),
             places: model.places.iter().map(of_place).collect(),
             entries: [own(0), damping, own(1)],
+            ring: None,
             modes: None,
             reduced: Some(component),
         })
@@ -260,11 +285,15 @@ impl SectorParts {
 
     fn reduced(
         substructure: &Substructure,
-        kept: &SectorCache,
+        (kept, basis): (&SectorCache, Option<SectorBasis>),
         seen: &[Row],
         sectors: usize,
     ) -> Result<Self, ModelError> {
-        let component = kept.reduced(seen, &substructure.reduction).map_err(reduction_error)?;
+        let component = match (substructure.reduction, basis) {
+            (Reduction::UpTo { up_to, .. }, Some(basis)) => kept.reduced_by_size(seen, up_to, basis),
+            _ => kept.reduced(seen, &substructure.reduction),
+        };
+        let component = component.map_err(reduction_error)?;
         let ReducedForm::Sector(sector) = component.form() else {
             return Err(reduction_error(ReductionError::NoPorts));
         };
@@ -361,7 +390,7 @@ mod tests {
         let names = ["1.x", "2.x", "3.x", "4.x"].map(str::to_owned).to_vec();
         let component = Component::new(names, mass, None, stiffness).unwrap();
         let boundary = Boundary::of_nodes(component.rows(), &[("1".into(), "2".into())], None).unwrap();
-        let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation] });
+        let disk = Some(DiskPart { boundary, blade: vec![2, 3], deviations: vec![deviation], basis: None });
         Model {
             substructure: Some(Substructure { component, damping, reduction, earlier_reduction: None, disk }),
             places: vec![Place::new("rim", vec![(1, 1.0)]), Place::new("tip", vec![(3, 1.0)])],
@@ -421,6 +450,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A basis that is extended to a higher range has the modes of that range.
+    #[test]
+    fn an_extended_basis_has_the_modes_of_its_range() {
+        let how = Reduction::UpTo { up_to: 3.0, tolerance: 1e-4, kind: None };
+        let model = ring(|d| by_matrices(d, how, SubstructureDamping::Own), SectorDistribution::Sector(1), &[]);
+        let few = model.assemble().unwrap();
+        let own = model.substructure.as_ref().unwrap().with_extended_range(few.reduced().unwrap(), 4.0);
+        assert!(own.disk.as_ref().unwrap().basis.is_some());
+        let larger = Model { substructure: Some(own), ..model }.assemble().unwrap();
+        assert!(larger.reduced().unwrap().error().is_nan() && larger.reduced().unwrap().up_to() == 12.0);
+        let whole = ring(by_masses, SectorDistribution::Sector(1), &[]).survey().unwrap();
+        let found = larger.structure().full();
+        let found = crate::structure::reduction::natural(&found.mass, &found.stiffness).unwrap().0;
+        for (a, b) in found.iter().zip(&whole.free().elastic) {
+            assert!((a.sqrt() / b.omega - 1.0).abs() < 1e-9, "{} {}", a.sqrt(), b.omega);
+        }
+        assert_eq!(found.len(), whole.free().elastic.len());
     }
 
     #[test]

@@ -55,6 +55,24 @@ pub(crate) trait PathSignals {
     fn place_displacement(&self, place: &Axis) -> Self::Signal {
         self.at_place(place, |row| self.displacement(row))
     }
+    /// Returns the energy that the damping of the structure dissipates in the return, J, from the
+    /// velocities of all degrees of freedom.
+    fn viscous_loss(&self, system: &System, velocity: &[Self::Signal]) -> f64 {
+        self.viscous_loss_of_entries(system, velocity)
+    }
+    /// Returns [`PathSignals::viscous_loss`] from the entries of the matrices.
+    fn viscous_loss_of_entries(&self, system: &System, velocity: &[Self::Signal]) -> f64 {
+        let structure = system.structure();
+        let entries = structure.damping_entries();
+        let mut loss: f64 =
+            entries.map(|(row, column, damping)| damping * self.product(&velocity[row], &velocity[column])).sum();
+        for shape in structure.damped_modes().into_iter().flat_map(ModalDamping::iter) {
+            let mut along = self.harmonics(&[]);
+            shape.iter().zip(velocity).for_each(|(share, velocity)| self.add(&mut along, velocity, *share));
+            loss += self.product(&along, &along);
+        }
+        loss
+    }
     /// Returns the energy that the `force` along an axis dissipates in the return, J.
     fn dissipation(&self, axis: usize, force: &Self::Signal) -> f64 {
         self.product(force, &self.relative_velocity(axis))
@@ -229,14 +247,7 @@ fn energy<S: PathSignals>(system: &System, signals: &S, omega: f64, forces: &[S:
             possible += (signals.product(&load, &load) * signals.product(&velocity[row], &velocity[row])).sqrt();
         }
     }
-    system.structure().damping_entries().for_each(|(row, column, damping)| {
-        viscous += damping * signals.product(&velocity[row], &velocity[column]);
-    });
-    for shape in system.structure().damped_modes().into_iter().flat_map(ModalDamping::iter) {
-        let mut along = signals.harmonics(&[]);
-        shape.iter().zip(&velocity).for_each(|(share, velocity)| signals.add(&mut along, velocity, *share));
-        viscous += signals.product(&along, &along);
-    }
+    viscous += signals.viscous_loss(system, &velocity);
     let moved: Vec<[S::Signal; 3]> = system
         .moved_places()
         .iter()

@@ -6,7 +6,7 @@
 use super::reduction::{
     AutomaticReduction, EXTENTS, FullStructure, MistunedModes, MistuningError, NominalRing, ReducedMatrices,
     ReducedSector, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, RingModes, Row,
-    RubinBasis, STEPS, StructureDamping,
+    RubinBasis, STEPS, SectorBasis, SectorReduction, StructureDamping,
 };
 use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
 use super::{ModalDamping, StructureError, free_vibrations, symmetric};
@@ -70,6 +70,7 @@ struct ComponentData {
 pub(crate) struct SectorCache {
     pub sector: CyclicSector,
     reductions: Cache<ReductionRequest, ReducedResult>,
+    sized: Cache<SizedRequest, ReducedResult>,
     blades: Cache<Vec<usize>, KeptBlade>,
 }
 
@@ -100,6 +101,8 @@ struct ReducedRing {
 /// Requests with their results.
 type Cache<K, V> = Mutex<Vec<(K, V)>>;
 type ReductionRequest = (Vec<Row>, Reduction);
+/// Observed rows, upper end of the frequency range (rad/s) and size of a basis.
+type SizedRequest = (Vec<Row>, f64, SectorBasis);
 type ReducedResult = Result<Arc<ReducedComponent>, ReductionError>;
 
 /// Displacements of all rows in each coordinate of a reduction.
@@ -120,6 +123,8 @@ pub struct ReducedComponent {
     up_to: f64,
     /// Highest frequency for which the basis is intended, rad/s.
     serves: f64,
+    /// The size of the basis of a sector, if it follows from the required error.
+    basis: Option<SectorBasis>,
 }
 
 /// A reduced component that also serves a second stiffness; see
@@ -482,7 +487,12 @@ impl Component {
             return kept.clone();
         }
         let sector = CyclicSector::new(self.matrices(), boundary, sectors);
-        let kept = Arc::new(SectorCache { sector, reductions: Mutex::default(), blades: Mutex::default() });
+        let kept = Arc::new(SectorCache {
+            sector,
+            reductions: Mutex::default(),
+            sized: Mutex::default(),
+            blades: Mutex::default(),
+        });
         known.push((boundary.clone(), sectors, kept.clone()));
         kept
     }
@@ -518,7 +528,7 @@ impl SectorCache {
             blade.as_ref().map_or(0, |blade| stored(&blade.reductions) + stored(&blade.mistuned))
         };
         let blades = self.blades.try_lock().map_or(0, |known| known.iter().map(blade).sum());
-        blades + stored(&self.reductions)
+        blades + stored(&self.reductions) + stored(&self.sized)
     }
 
     /// Returns the reduced sector.
@@ -526,18 +536,16 @@ impl SectorCache {
         cached(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
     }
 
+    /// Returns the sector reduced by a basis of this size with modes up to a higher frequency,
+    /// rad/s, see [`CyclicSector::reduced_by_size`].
+    pub fn reduced_by_size(&self, seen: &[Row], up_to: f64, basis: SectorBasis) -> ReducedResult {
+        cached(&self.sized, &(seen.to_vec(), up_to, basis), || {
+            Ok(ReducedComponent::of_sector(self.sector.reduced_by_size(seen, up_to, basis)?))
+        })
+    }
+
     fn chosen(&self, seen: &[Row], how: &Reduction, blade: Option<(&Blade, usize)>) -> ReducedResult {
-        let chosen = self.sector.reduced(seen, how, blade)?;
-        let (deviation, frequencies) = (chosen.deviation, chosen.frequencies);
-        let form = ReducedForm::Sector(Arc::new(chosen.reduced));
-        Ok(Arc::new(ReducedComponent {
-            form,
-            deviation,
-            frequencies,
-            free: chosen.free,
-            up_to: chosen.up_to,
-            serves: chosen.serves,
-        }))
+        Ok(ReducedComponent::of_sector(self.sector.reduced(seen, how, blade)?))
     }
 
     /// Returns the blade that consists of the rows `blade` of the component.
@@ -657,7 +665,7 @@ fn reduce(whole: &FullStructure, how: &Reduction) -> Result<ReducedComponent, Re
     let ReductionResult { reduced, deviation, modes, up_to, serves } = reduce_whole(whole, how)?;
     let (frequencies, free) = (natural(&modes), modes.rigid_body_count());
     let form = ReducedForm::Alone(Arc::new(reduced.scaled_to_metres().without_basis()));
-    Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves })
+    Ok(ReducedComponent { form, deviation, frequencies, free, up_to, serves, basis: None })
 }
 
 /// A reduced form of the whole component.
@@ -697,6 +705,17 @@ fn reduce_whole(whole: &FullStructure, how: &Reduction) -> Result<ReductionResul
 }
 
 impl ReducedComponent {
+    fn of_sector(chosen: SectorReduction) -> Arc<Self> {
+        let SectorReduction { reduced, deviation, frequencies, free, up_to, serves, basis } = chosen;
+        let form = ReducedForm::Sector(Arc::new(reduced));
+        Arc::new(ReducedComponent { form, deviation, frequencies, free, up_to, serves, basis })
+    }
+
+    /// Returns the size of the basis of a sector, if it follows from the required error.
+    pub(crate) fn sector_basis(&self) -> Option<SectorBasis> {
+        self.basis
+    }
+
     /// Returns the number of coordinates. For a sector of a ring with equal blades, it is that
     /// of one sector.
     pub fn dofs(&self) -> usize {

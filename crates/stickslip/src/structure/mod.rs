@@ -17,9 +17,9 @@ pub use component::{CommonBasisComponent, Component, ReducedComponent, SectorCom
 pub use dynamic::DynamicStiffness;
 pub(crate) use free_vibration::free_vibrations;
 pub use modal_damping::ModalDamping;
-pub use reduction::{Reduction, ReductionKind};
-pub(crate) use sector::unit_root;
+pub use reduction::{Reduction, ReductionKind, SectorBasis};
 pub use sector::{RingSector, Wave, WaveStiffness};
+pub(crate) use sector::{sector_entries, unit_root};
 pub use sector_boundary::{BladeError, Boundary, BoundaryError, CoordinateAxis};
 pub(crate) use sector_boundary::{CyclicSector, RingEntry, RingRow};
 pub use sector_faces::{FacesError, NodeCoordinates, SectorFaces};
@@ -34,8 +34,9 @@ use stickslip_numerics::sparse::{Asymmetry, MatrixError, SparseMatrix, SymbolicA
 /// `M x'' + C x' + K x`, over the places that are free to move.
 ///
 /// The mass matrix need not be diagonal. A copy is a reference to the same matrices. Matrices
-/// are stored full if there are few degrees of freedom or many entries, otherwise sparse. The
-/// storage affects the computing time, but not the results.
+/// are stored full if there are few degrees of freedom or many entries, otherwise sparse. A ring
+/// of equal sectors stores the matrices of its first sector. The storage affects the computing
+/// time, but not the results.
 #[derive(Debug, Clone)]
 pub struct Structure(Arc<StructureData>);
 
@@ -64,6 +65,12 @@ enum Storage {
         analysis: OnceLock<SymbolicAnalysis>,
         /// Full copy, created when a method first requests it.
         full: OnceLock<Arc<Matrices>>,
+    },
+    /// A ring of equal sectors, by its first sector.
+    Ring {
+        sector: Arc<RingSector>,
+        /// The matrices of all sectors, created when a method first requests them.
+        expanded: OnceLock<Structure>,
     },
 }
 
@@ -227,12 +234,43 @@ impl Structure {
         }
         let (analysis, full) = (OnceLock::new(), OnceLock::new());
         let form = if is_full(n, [&mass, &damping, &stiffness].map(SparseMatrix::len)) {
-            Storage::Full(Arc::new(to_full(&mass, &damping, &stiffness)))
+            Storage::Full(Arc::new(all_full(&mass, &damping, &stiffness)))
         } else {
             let (mass, stiffness) = (symmetric("mass", mass)?, symmetric("stiffness", stiffness)?);
             Storage::Sparse { mass, damping, stiffness, modes: None, analysis, full }
         };
         Structure::checked(places, form)
+    }
+
+    /// Creates the structure of a ring of equal sectors, of which it stores the first one.
+    ///
+    /// # Errors
+    /// See [`Structure::new`].
+    pub(crate) fn ring(places: Vec<String>, sector: RingSector) -> Result<Self, StructureError> {
+        sector.check()?;
+        let form = Storage::Ring { sector: Arc::new(sector), expanded: OnceLock::new() };
+        Structure::checked(places, form)
+    }
+
+    /// Returns the structure with the matrices of all sectors; any other than a ring is itself.
+    pub(in crate::structure) fn expanded(&self) -> &Structure {
+        let Storage::Ring { sector, expanded } = &self.0.form else { return self };
+        expanded.get_or_init(|| {
+            let n = self.dofs();
+            let matrix = |kind: usize| {
+                let all = sector.ring_entries().map(|(row, column, values)| (row, column, values[kind]));
+                // the entries of a checked ring are finite and in range
+                SparseMatrix::from_triplets(n, all.filter(|entry| entry.2 != 0.0)).expect("entries of a checked ring")
+            };
+            let [mass, damping, stiffness] = [0, 1, 2].map(matrix);
+            let form = if is_full(n, [&mass, &damping, &stiffness].map(SparseMatrix::len)) {
+                Storage::Full(Arc::new(all_full(&mass, &damping, &stiffness)))
+            } else {
+                let (analysis, full) = (OnceLock::new(), OnceLock::new());
+                Storage::Sparse { mass, damping, stiffness, modes: None, analysis, full }
+            };
+            Structure::from_parts(self.0.places.clone(), form, self.0.largest)
+        })
     }
 
     /// Returns this structure with additional springs. Each has a direction, as rows with
@@ -252,10 +290,12 @@ impl Structure {
                 let (mass, damping, modes) = (mass.clone(), damping.clone(), modes.clone());
                 Storage::Sparse { mass, damping, stiffness, modes, analysis: OnceLock::new(), full: OnceLock::new() }
             }
+            Storage::Ring { .. } => return self.expanded().with_springs(springs),
         };
         let largest = match &form {
             Storage::Full(full) => full.stiffness.amax(),
             Storage::Sparse { stiffness, .. } => stiffness.max_abs(),
+            Storage::Ring { sector, .. } => sector.largest()[2],
         };
         let [mass, damping, _] = self.0.largest;
         let (places, largest) = (self.0.places.clone(), [mass, damping, largest]);
@@ -285,6 +325,7 @@ impl Structure {
                 let (modes, analysis, full) = (Some(of.clone()), OnceLock::new(), OnceLock::new());
                 Storage::Sparse { mass, damping, stiffness, modes, analysis, full }
             }
+            Storage::Ring { .. } => return self.expanded().with_damped_modes(of),
         };
         Structure::from_parts(self.0.places.clone(), form, [mass, most, stiffness])
     }
@@ -309,6 +350,7 @@ impl Structure {
                 }
                 [mass, damping, stiffness].map(SparseMatrix::max_abs)
             }
+            Storage::Ring { sector, .. } => sector.largest(),
         };
         Ok(Structure::from_parts(places, form, largest))
     }
@@ -336,7 +378,11 @@ impl Structure {
 
     /// Returns whether the matrices are stored sparse.
     pub fn is_sparse(&self) -> bool {
-        matches!(self.0.form, Storage::Sparse { .. })
+        match &self.0.form {
+            Storage::Full(_) => false,
+            Storage::Sparse { .. } => true,
+            Storage::Ring { sector, .. } => !is_full(self.dofs(), sector.ring_entry_counts()),
+        }
     }
 
     /// Returns the full matrices, for methods whose cost grows with the cube of n.
@@ -348,10 +394,11 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => full,
             Storage::Sparse { mass, damping, stiffness, modes, full, .. } => full.get_or_init(|| {
-                let mut full = to_full(mass, damping, stiffness);
+                let mut full = all_full(mass, damping, stiffness);
                 modes.iter().for_each(|modes| modes.add_to(&mut full.damping));
                 Arc::new(full)
             }),
+            Storage::Ring { .. } => self.expanded().full(),
         }
     }
 
@@ -375,6 +422,16 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => full.mass[(row, row)],
             Storage::Sparse { mass, .. } => mass.get(row, row),
+            Storage::Ring { sector, .. } => sector.diagonal(row % sector.dofs())[0],
+        }
+    }
+
+    /// Returns the diagonal entry of the stiffness matrix in a row, N/m.
+    pub fn diagonal_stiffness(&self, row: usize) -> f64 {
+        match &self.0.form {
+            Storage::Full(full) => full.stiffness[(row, row)],
+            Storage::Sparse { stiffness, .. } => stiffness.get(row, row),
+            Storage::Ring { sector, .. } => sector.diagonal(row % sector.dofs())[2],
         }
     }
 
@@ -384,6 +441,7 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => semidefinite_rank(&full.mass) == Some(self.dofs()),
             Storage::Sparse { mass, .. } => sparse_definite(mass) == Some(true),
+            Storage::Ring { sector, .. } => sector.every_wave(Structure::has_definite_mass),
         }
     }
 
@@ -396,14 +454,14 @@ impl Structure {
     /// all damping and return `None`.
     pub fn damped_modes(&self) -> Option<&ModalDamping> {
         match &self.0.form {
-            Storage::Full(_) => None,
+            Storage::Full(_) | Storage::Ring { .. } => None,
             Storage::Sparse { modes, .. } => modes.as_ref(),
         }
     }
 
     /// Iterates over the nonzero entries of (mass, damping, stiffness): row, column, values.
     ///
-    /// Full matrices are read row by row, sparse ones column by column. The damping includes
+    /// Full matrices and rings are read row by row, sparse ones column by column. The damping includes
     /// [`Structure::damped_modes`] in addition.
     pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
         let n = self.dofs();
@@ -417,6 +475,7 @@ impl Structure {
             Storage::Sparse { .. } => Box::new((0..n).flat_map(move |column| {
                 self.column(column).into_iter().map(move |(row, values)| (row, column, values))
             })),
+            Storage::Ring { sector, .. } => Box::new(sector.ring_entries()),
         }
     }
 
@@ -426,6 +485,7 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => nonzero_entries(&full.damping),
             Storage::Sparse { damping, .. } => Box::new(damping.entries()),
+            Storage::Ring { sector, .. } => Box::new(sector.ring_entries_of(1)),
         }
     }
 
@@ -435,6 +495,7 @@ impl Structure {
         match &self.0.form {
             Storage::Full(full) => nonzero_entries(&full.stiffness),
             Storage::Sparse { stiffness, .. } => Box::new(stiffness.entries()),
+            Storage::Ring { sector, .. } => Box::new(sector.ring_entries_of(2)),
         }
     }
 
@@ -457,12 +518,18 @@ impl Structure {
                 }
                 merged
             }
+            Storage::Ring { .. } => self.expanded().column(column),
         }
     }
 
     /// Returns the first of `sectors` equal sectors; see [`RingSector::from_ring`]. The result is
     /// kept, because several methods need it.
     pub(crate) fn ring_sector(&self, sectors: usize) -> Option<Arc<RingSector>> {
+        if let Storage::Ring { sector, .. } = &self.0.form
+            && sector.sectors() == sectors
+        {
+            return Some(sector.clone());
+        }
         let mut known = self.0.ring_sectors.lock().unwrap_or_else(PoisonError::into_inner);
         known.entry(sectors).or_insert_with(|| RingSector::from_ring(self, sectors).map(Arc::new)).clone()
     }
@@ -491,6 +558,7 @@ impl Structure {
                     SparseMatrix::from_triplets(n, all).is_ok_and(|sum| sparse_definite(&sum) == Some(true))
                 }
             }
+            Storage::Ring { sector, .. } => sector.every_wave(Structure::is_dissipative),
         })
     }
 }
@@ -505,6 +573,13 @@ impl PartialEq for Structure {
                         Storage::Sparse { mass: a, damping: b, stiffness: c, modes, .. },
                         Storage::Sparse { mass: d, damping: e, stiffness: f, modes: others, .. },
                     ) => a == d && b == e && c == f && modes == others,
+                    (Storage::Ring { sector: a, .. }, Storage::Ring { sector: b, .. })
+                        if a.sectors() == b.sectors() =>
+                    {
+                        a.is_equal(b)
+                    }
+                    (Storage::Ring { .. }, _) => self.expanded() == other,
+                    (_, Storage::Ring { .. }) => self == other.expanded(),
                     _ => false,
                 })
     }
@@ -583,13 +658,14 @@ fn nonzero_entries(matrix: &DMatrix<f64>) -> Box<dyn Iterator<Item = (usize, usi
     Box::new(all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0))
 }
 
-fn to_full(mass: &SparseMatrix, damping: &SparseMatrix, stiffness: &SparseMatrix) -> Matrices {
-    let full = |matrix: &SparseMatrix| {
-        let mut full = DMatrix::zeros(matrix.n(), matrix.n());
-        matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
-        full
-    };
-    Matrices { mass: full(mass), damping: full(damping), stiffness: full(stiffness) }
+fn to_full(matrix: &SparseMatrix) -> DMatrix<f64> {
+    let mut full = DMatrix::zeros(matrix.n(), matrix.n());
+    matrix.entries().for_each(|(row, column, value)| full[(row, column)] = value);
+    full
+}
+
+fn all_full(mass: &SparseMatrix, damping: &SparseMatrix, stiffness: &SparseMatrix) -> Matrices {
+    Matrices { mass: to_full(mass), damping: to_full(damping), stiffness: to_full(stiffness) }
 }
 
 /// Returns the mean of both triangles, if they differ only by rounding.

@@ -9,21 +9,27 @@
 //! Source: Thomas (1979), "Dynamics of rotationally periodic structures", Int. J. Numer. Meth.
 //! Engng 14, 81-102.
 
-use super::{Structure, StructureError};
+use super::sector_boundary::RingEntry;
+use super::{Structure, StructureError, is_full, to_full};
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Mutex, PoisonError};
+use stickslip_numerics::definiteness::{is_semidefinite, sparse_definite};
 use stickslip_numerics::sparse::{Singular, SparseMatrix};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
+/// Difference between the matrices of a sector and those of the first one that counts as rounding
+/// of sums in another order. It is relative to the largest entry.
+const SECTOR_ROUNDING: f64 = 1e-12;
 
 /// The rows of the first sector in the matrices of a ring.
 #[derive(Debug)]
 pub struct RingSector {
     sectors: usize,
     places: Vec<String>,
-    /// Row, column, offset of the column in sectors, values of mass, damping, stiffness.
+    /// Row, column, offset of the column in sectors, values of mass, damping, stiffness. They are
+    /// sorted.
     entries: Vec<(usize, usize, usize, [f64; 3])>,
     /// Waves that were requested before, by nodal diameter.
     waves: Mutex<BTreeMap<usize, Wave>>,
@@ -62,6 +68,34 @@ pub(crate) fn is_real(diameter: usize, sectors: usize) -> bool {
     (2 * diameter).is_multiple_of(sectors)
 }
 
+/// Returns the entries of a ring's matrix in the rows of its first sector; `None` if the sectors
+/// differ.
+pub(crate) fn sector_entries(matrix: &SparseMatrix, sectors: usize) -> Option<Vec<RingEntry>> {
+    let (all, n) = (matrix.n(), matrix.n() / sectors);
+    let rounding = SECTOR_ROUNDING * matrix.max_abs();
+    let mut entries = Vec::new();
+    for column in 0..n {
+        let first: Vec<(usize, f64)> = matrix.column(column).collect();
+        for sector in 0..sectors {
+            let other: Vec<(usize, f64)> = matrix.column(sector * n + column).collect();
+            // the rows from those of the column's own sector on, once around the ring
+            let start = other.partition_point(|(row, _)| *row < sector * n);
+            let turned = other[start..].iter().chain(&other[..start]);
+            let equal = other.len() == first.len()
+                && first.iter().zip(turned).all(|((row, value), (other_row, other))| {
+                    (row + sector * n) % all == *other_row && (value - other).abs() <= rounding
+                });
+            if !equal {
+                return None;
+            }
+            entries.extend(
+                other.iter().take_while(|(row, _)| *row < n).map(|&(row, value)| (row, column, sector as i64, value)),
+            );
+        }
+    }
+    Some(entries)
+}
+
 /// Converts entries of a ring's matrix in the rows of a sector to the wave of one nodal
 /// diameter.
 ///
@@ -88,6 +122,38 @@ pub(super) fn wave_entries(
     triplets
 }
 
+/// Returns the result of [`wave_entries`] for a symmetric matrix of `n` rows, whose entries are
+/// sorted, column by column.
+///
+/// The matrix of a wave is Hermitian, so that its columns are the conjugate rows.
+pub(super) fn symmetric_wave_entries(
+    entries: &[(usize, usize, i64, f64)],
+    n: usize,
+    diameter: usize,
+    sectors: usize,
+) -> Vec<(usize, usize, f64)> {
+    let real = is_real(diameter, sectors);
+    let mut triplets = Vec::with_capacity(if real { entries.len() } else { 2 * entries.len() });
+    for copy in 0..if real { 1 } else { 2 } {
+        for group in entries.chunk_by(|a, b| a.0 == b.0) {
+            let column = copy * n + group[0].0;
+            // the upper and the lower half of the column
+            for half in 0..if real { 1 } else { 2 } {
+                let part = |phase: Complex64| match (half, copy) {
+                    (0, 0) | (1, 1) => phase.re,
+                    (0, _) => phase.im,
+                    _ => -phase.im,
+                };
+                let all = group.iter().map(|&(_, row, shift, value)| {
+                    (half * n + row, column, value * part(unit_root(diameter as i64 * shift, sectors)))
+                });
+                triplets.extend(all.filter(|entry| entry.2 != 0.0));
+            }
+        }
+    }
+    triplets
+}
+
 impl RingSector {
     /// Returns the first of `sectors` equal sectors, whose degrees of freedom are stored sector
     /// by sector in `cyclic_basis`.
@@ -100,10 +166,9 @@ impl RingSector {
         }
         let n = all / sectors;
         let largest = ring.largest();
-        // Difference between the matrices of a sector and those of the first one that counts as
-        // rounding of sums in another order. It is relative to the largest entry.
-        let near =
-            |first: &[f64; 3], values: &[f64; 3]| (0..3).all(|k| (first[k] - values[k]).abs() <= 1e-12 * largest[k]);
+        let near = |first: &[f64; 3], values: &[f64; 3]| {
+            (0..3).all(|k| (first[k] - values[k]).abs() <= SECTOR_ROUNDING * largest[k])
+        };
         let mut entries = Vec::new();
         for own in 0..n {
             let first = ring.column(own);
@@ -126,6 +191,80 @@ impl RingSector {
         entries.sort_unstable_by_key(|entry| (entry.0, entry.1, entry.2));
         let places = ring.places()[..n].to_vec();
         Some(RingSector { sectors, places, entries, waves: Mutex::default() })
+    }
+
+    /// Creates the first of `sectors` equal sectors from its places and the entries of mass,
+    /// damping and stiffness. Entries of the same row and column are summed.
+    pub(crate) fn from_entries(places: Vec<String>, sectors: usize, kinds: [&[RingEntry]; 3]) -> Self {
+        let mut entries = Vec::with_capacity(kinds.iter().map(|of| of.len()).sum());
+        for (kind, of) in kinds.into_iter().enumerate() {
+            entries.extend(of.iter().map(|&(row, column, shift, value)| {
+                let values: [f64; 3] = std::array::from_fn(|k| if k == kind { value } else { 0.0 });
+                (row, column, shift.rem_euclid(sectors as i64) as usize, values)
+            }));
+        }
+        // stable, so that sums keep their order
+        entries.sort_by_key(|entry: &(usize, usize, usize, [f64; 3])| (entry.0, entry.1, entry.2));
+        entries.dedup_by(|next, kept| {
+            let same = (next.0, next.1, next.2) == (kept.0, kept.1, kept.2);
+            if same {
+                (0..3).for_each(|k| kept.3[k] += next.3[k]);
+            }
+            same
+        });
+        RingSector { sectors, places, entries, waves: Mutex::default() }
+    }
+
+    /// Returns the largest absolute entries of mass, damping and stiffness.
+    pub(super) fn largest(&self) -> [f64; 3] {
+        let all = self.entries.iter();
+        all.fold([0.0; 3], |most, entry| std::array::from_fn(|k| f64::max(most[k], entry.3[k].abs())))
+    }
+
+    /// Returns the diagonal entries of mass, damping and stiffness in a row.
+    pub(super) fn diagonal(&self, row: usize) -> [f64; 3] {
+        let found = self.entries.binary_search_by_key(&(row, row, 0), |entry| (entry.0, entry.1, entry.2));
+        found.map_or([0.0; 3], |at| self.entries[at].3)
+    }
+
+    /// Iterates over the nonzero entries of the ring, row by row: row, column, values of mass,
+    /// damping and stiffness.
+    pub(super) fn ring_entries(&self) -> impl Iterator<Item = (usize, usize, [f64; 3])> + '_ {
+        let (n, sectors) = (self.dofs(), self.sectors);
+        (0..sectors).flat_map(move |sector| {
+            let of = move |&(row, column, shift, values): &(usize, usize, usize, [f64; 3])| {
+                (sector * n + row, (sector + shift) % sectors * n + column, values)
+            };
+            self.entries.iter().map(of)
+        })
+    }
+
+    /// Iterates over the nonzero entries of the mass (0), damping (1) or stiffness matrix (2) of the
+    /// ring, row by row.
+    pub(super) fn ring_entries_of(&self, kind: usize) -> impl Iterator<Item = (usize, usize, f64)> + use<> {
+        let (n, sectors) = (self.dofs(), self.sectors);
+        let own = self.entries.iter().filter(|entry| entry.3[kind] != 0.0);
+        let own: Vec<_> = own.map(|&(row, column, shift, values)| (row, column, shift, values[kind])).collect();
+        (0..sectors * own.len()).map(move |at| {
+            let (sector, (row, column, shift, value)) = (at / own.len(), own[at % own.len()]);
+            (sector * n + row, (sector + shift) % sectors * n + column, value)
+        })
+    }
+
+    /// Returns the numbers of entries of mass, damping and stiffness in the ring.
+    pub(super) fn ring_entry_counts(&self) -> [usize; 3] {
+        [0, 1, 2].map(|kind| self.sectors * self.entries.iter().filter(|entry| entry.3[kind] != 0.0).count())
+    }
+
+    /// Returns whether the matrices of two sectors are equal.
+    pub(super) fn is_equal(&self, other: &RingSector) -> bool {
+        self.sectors == other.sectors && self.entries == other.entries
+    }
+
+    /// Returns whether a property of a structure holds for all waves. A ring has it then too, if
+    /// it is a definiteness of its matrices.
+    pub(super) fn every_wave(&self, holds: impl Fn(&Structure) -> bool) -> bool {
+        (0..=self.sectors / 2).all(|diameter| self.wave(diameter).is_ok_and(|wave| holds(wave.structure())))
     }
 
     /// Returns the number of degrees of freedom of a sector.
@@ -181,23 +320,53 @@ impl RingSector {
 
     fn new_wave(&self, diameter: usize) -> Result<Wave, StructureError> {
         let n = self.dofs();
-        let real = is_real(diameter, self.sectors);
-        let copies = if real { 1 } else { 2 };
-        let matrix = |kind: usize| {
-            let all =
-                self.entries.iter().map(|&(row, column, shift, values)| (row, column, shift as i64, values[kind]));
-            wave_entries(all.filter(|entry| entry.3 != 0.0), [n, n], diameter, self.sectors)
-        };
-        let triplets = [0, 1, 2].map(matrix);
-        let [mass, damping, stiffness] = triplets.map(|entries| {
-            SparseMatrix::from_triplets(copies * n, entries).map_err(|error| StructureError::of("sector's", &error))
-        });
+        let [mass, damping, stiffness] = [0, 1, 2].map(|kind| self.wave_matrix(kind, diameter));
         let mut places = self.places.clone();
-        if !real {
+        if !is_real(diameter, self.sectors) {
             places.extend(self.places.iter().map(|place| format!("{place}, a quarter period later")));
         }
         let structure = Structure::sparse(places, mass?, damping?, stiffness?)?;
         Ok(Wave { sectors: self.sectors, diameter, dofs: n, structure })
+    }
+
+    /// Returns the mass (0), damping (1) or stiffness matrix (2) of a wave in real form.
+    fn wave_matrix(&self, kind: usize, diameter: usize) -> Result<SparseMatrix, StructureError> {
+        let (n, real) = (self.dofs(), is_real(diameter, self.sectors));
+        let phases: Vec<Complex64> =
+            (0..self.sectors).map(|shift| unit_root((diameter * shift) as i64, self.sectors)).collect();
+        // damping by modes couples all sectors: the entries of one row and column are summed
+        let mut triplets = Vec::new();
+        for group in self.entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (row, column, ..) = group[0];
+            let sum: Complex64 = group.iter().map(|entry| phases[entry.2] * entry.3[kind]).sum();
+            triplets.push((row, column, sum.re));
+            if !real {
+                triplets.extend([(n + row, n + column, sum.re), (row, n + column, -sum.im), (n + row, column, sum.im)]);
+            }
+        }
+        let size = if real { n } else { 2 * n };
+        SparseMatrix::from_triplets(size, triplets).map_err(|error| StructureError::of("sector's", &error))
+    }
+
+    /// Checks that the entries are finite, and that the mass matrix is positive semidefinite.
+    pub(super) fn check(&self) -> Result<(), StructureError> {
+        for (kind, matrix) in ["mass", "damping", "stiffness"].into_iter().enumerate() {
+            if let Some(&(row, column, _, values)) = self.entries.iter().find(|entry| !entry.3[kind].is_finite()) {
+                let (row, column) = (row + 1, column + 1);
+                return Err(StructureError::NotFinite { matrix, row, column, value: values[kind] });
+            }
+        }
+        for diameter in 0..=self.sectors / 2 {
+            let mass = self.wave_matrix(0, diameter)?;
+            let is_semidefinite = match is_full(mass.n(), [mass.len(); 3]) {
+                true => is_semidefinite(&to_full(&mass)),
+                false => sparse_definite(&mass).is_some(),
+            };
+            if !is_semidefinite {
+                return Err(StructureError::NegativeMass);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -230,8 +399,25 @@ impl Wave {
     /// # Errors
     /// [`Singular`]: an undamped resonance.
     pub fn dynamic_stiffness(&self, s: Complex64, hold: f64) -> Result<WaveStiffness, Singular> {
+        if self.is_double() && !self.structure.is_sparse() {
+            let factor = self.structure.complex_dynamic_stiffness(s, hold)?;
+            return Ok(WaveStiffness { dofs: self.dofs, double: false, factor });
+        }
         let factor = self.structure.shifted_dynamic_stiffness(s, hold)?;
         Ok(WaveStiffness { dofs: self.dofs, double: self.is_double(), factor })
+    }
+
+    /// Returns `vᴴ C v` of complex velocities of the first sector, W: twice the mean power that
+    /// its damping dissipates.
+    pub(crate) fn damping_power(&self, velocity: &[Complex64]) -> f64 {
+        let n = self.dofs;
+        let part = |row: usize| if row < n { velocity[row].re } else { velocity[row - n].im };
+        let double = self.is_double();
+        let loss = self.structure.damping_entries().map(|(row, column, damping)| {
+            let imaginary = if double { 0.0 } else { velocity[row].im * velocity[column].im };
+            damping * (part(row) * part(column) + imaginary)
+        });
+        loss.sum()
     }
 }
 
@@ -239,6 +425,7 @@ impl Wave {
 #[derive(Debug, Clone)]
 pub struct WaveStiffness {
     dofs: usize,
+    /// True if the factor is that of the real form, of twice the size.
     double: bool,
     factor: super::DynamicStiffness,
 }
@@ -311,6 +498,80 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// A ring that stores its first sector has the matrices of the whole ring.
+    #[test]
+    fn a_stored_sector_is_its_ring() {
+        for sectors in [2, 3, 7, 30] {
+            let whole = ring(sectors, 0.0);
+            let first = RingSector::from_ring(&whole, sectors).unwrap();
+            let of = |kind: usize| -> Vec<RingEntry> {
+                first.entries.iter().map(|entry| (entry.0, entry.1, entry.2 as i64, entry.3[kind])).collect()
+            };
+            let [mass, damping, stiffness] = [0, 1, 2].map(of);
+            let sector = RingSector::from_entries(first.places.clone(), sectors, [&mass, &damping, &stiffness]);
+            let stored = Structure::ring(whole.places().to_vec(), sector).unwrap();
+            assert_eq!((&stored, stored.is_sparse()), (stored.expanded(), whole.is_sparse()));
+            assert_eq!(stored.has_definite_mass(), whole.has_definite_mass());
+            assert_eq!(stored.is_dissipative(), whole.is_dissipative());
+            // the sums of the whole ring have another order
+            let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-14;
+            assert!(near(stored.mass(), whole.mass()) && near(stored.stiffness(), whole.stiffness()));
+            assert!(near(stored.damping(), whole.damping()));
+            for (a, b) in [
+                (stored.largest()[2], whole.largest()[2]),
+                (stored.diagonal_mass(3), whole.diagonal_mass(3)),
+                (stored.diagonal_stiffness(2), whole.diagonal_stiffness(2)),
+            ] {
+                assert!((a - b).abs() < 1e-14, "{a} {b}");
+            }
+            let sum = |entries: Box<dyn Iterator<Item = (usize, usize, f64)> + '_>| {
+                let mut sum = DMatrix::zeros(whole.dofs(), whole.dofs());
+                entries.for_each(|(row, column, value)| sum[(row, column)] += value);
+                sum
+            };
+            assert_eq!(&sum(stored.stiffness_entries()), stored.stiffness());
+            assert_eq!(&sum(stored.damping_entries()), stored.damping());
+            assert_ne!(stored, ring(sectors, 1e-6));
+            assert_ne!(ring(sectors, 1e-6), stored);
+        }
+        let sector = RingSector::from_entries(vec!["a".into()], 3, [&[(0, 0, 0, 1.0), (0, 0, 1, -1.0)], &[], &[]]);
+        let names = vec!["0".to_owned(), "1".into(), "2".into()];
+        assert_eq!(Structure::ring(names, sector).unwrap_err(), StructureError::NegativeMass);
+    }
+
+    /// The power of a wave on one sector is its part of the power on the whole ring.
+    #[test]
+    fn all_sectors_lose_the_same_power() {
+        let (sectors, diameter) = (7, 2);
+        let whole = ring(sectors, 0.0);
+        let wave = RingSector::from_ring(&whole, sectors).unwrap().wave(diameter).unwrap();
+        let own = [Complex64::new(1.0, 0.2), Complex64::new(-0.4, 0.3)];
+        let all: Vec<Complex64> = (0..2 * sectors).map(|i| own[i % 2] * wave.phase(i as i64 / 2)).collect();
+        let entries = whole.damping_entries().map(|(row, column, c)| c * (all[row].conj() * all[column]).re);
+        assert!((wave.damping_power(&own) * sectors as f64 / entries.sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    /// Column by column, the entries of a wave are those of the general form.
+    #[test]
+    fn sorted_entries_are_those_of_the_wave() {
+        let (n, sectors) = (2, 7);
+        let entries: Vec<RingEntry> =
+            vec![(0, 0, 0, 3.0), (0, 1, -1, 0.5), (0, 1, 0, -1.0), (1, 0, 0, -1.0), (1, 0, 1, 0.5), (1, 1, 0, 2.0)];
+        for diameter in 0..sectors {
+            let sorted = symmetric_wave_entries(&entries, n, diameter, sectors);
+            assert!(sorted.is_sorted_by_key(|entry| (entry.1, entry.0)));
+            let general = wave_entries(entries.iter().copied(), [n, n], diameter, sectors);
+            let [sorted, general] = [sorted, general].map(|all| SparseMatrix::from_triplets(2 * n, all).unwrap());
+            assert!(
+                sorted
+                    .entries()
+                    .zip(general.entries())
+                    .all(|(a, b)| { (a.0, a.1) == (b.0, b.1) && (a.2 - b.2).abs() < 1e-15 })
+            );
+            assert_eq!(sorted.len(), general.len());
         }
     }
 

@@ -10,7 +10,7 @@
 //! Engng 14, 81-102.
 
 use super::reduction::{FullStructure, ReductionError, Row, StructureDamping};
-use super::sector::wave_entries;
+use super::sector::{symmetric_wave_entries, wave_entries};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
@@ -299,8 +299,11 @@ impl CyclicSector {
     }
 
     /// Returns the matrix of a sector with the adjacent sectors fixed.
-    pub fn with_fixed_adjacent(&self, entries: &[RingEntry]) -> Result<SparseMatrix, ReductionError> {
-        let own = entries.iter().filter(|entry| entry.2 == 0).map(|&(row, column, _, value)| (row, column, value));
+    pub fn with_fixed_adjacent(
+        &self,
+        entries: impl Iterator<Item = RingEntry>,
+    ) -> Result<SparseMatrix, ReductionError> {
+        let own = entries.filter(|entry| entry.2 == 0).map(|(row, column, _, value)| (row, column, value));
         SparseMatrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
     }
 
@@ -334,15 +337,16 @@ impl CyclicSector {
     pub fn wave(&self, diameter: usize, seen: &[Row]) -> Result<FullStructure, ReductionError> {
         let (n, sectors) = (self.dofs, self.sectors);
         let copies = if super::sector::is_real(diameter, sectors) { 1 } else { 2 };
-        let matrix = |entries: &[RingEntry]| {
-            let triplets = wave_entries(entries.iter().copied(), [n, n], diameter, sectors);
-            SparseMatrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange)
-        };
+        let sparse =
+            |triplets| SparseMatrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange);
         let damping = match &self.damping {
-            Some(damping) => StructureDamping::Matrix(matrix(damping)?),
+            Some(damping) => {
+                StructureDamping::Matrix(sparse(wave_entries(damping.iter().copied(), [n, n], diameter, sectors))?)
+            }
             None => StructureDamping::Rayleigh { mass: 0.0, stiffness: 0.0 },
         };
-        let whole = FullStructure::without_ports(matrix(&self.mass)?, damping, matrix(&self.stiffness)?)?;
+        let symmetric = |entries: &[RingEntry]| sparse(symmetric_wave_entries(entries, n, diameter, sectors));
+        let whole = FullStructure::without_ports(symmetric(&self.mass)?, damping, symmetric(&self.stiffness)?)?;
         let mut ports = vec![Row::new(); copies * seen.len()];
         for (p, row) in seen.iter().enumerate() {
             let all = self.row(row).into_iter().map(|(at, shift, weight)| (p, at, shift, weight));

@@ -128,7 +128,7 @@ fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, secto
         );
         return Err(problem("blade", message).help("remove the nodes that `boundary` lists"));
     }
-    substructure.disk = Some(DiskPart { boundary, blade, deviations: Vec::new() });
+    substructure.disk = Some(DiskPart { boundary, blade, deviations: Vec::new(), basis: None });
     Ok(())
 }
 

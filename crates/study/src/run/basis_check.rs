@@ -145,7 +145,7 @@ impl SlipReductionCheck {
                     format!("{of} points of one part of the study were")
                 };
                 let solved = format!(
-                    "{some} solved again in {coordinates} coordinates that are valid up to {}: the amplitude of \
+                    "{some} solved again in {coordinates} coordinates with all modes up to {}: the amplitude of \
                      `{place}` differs by up to {error:.1e} of the largest amplitude ({at}); other points may differ \
                      more",
                     hertz(*up_to)

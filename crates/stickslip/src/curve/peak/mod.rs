@@ -89,8 +89,10 @@ fn higher(one: Peak, other: Peak) -> Peak {
 /// Returns the amplitude (m) below which a place counts as held at a frequency: a fraction of
 /// the largest `F / (k + Ω²m)`.
 pub fn held_amplitude(system: &System, omega: f64) -> f64 {
-    let (mass, stiffness) = (system.structure().mass(), system.structure().stiffness());
-    let alone = |i: usize, force: f64| force / (stiffness[(i, i)].abs() + omega * omega * mass[(i, i)]);
+    let structure = system.structure();
+    let alone = |i: usize, force: f64| {
+        force / (structure.diagonal_stiffness(i).abs() + omega * omega * structure.diagonal_mass(i))
+    };
     let loads = system.excitation(omega);
     let sizes = loads.iter().flat_map(|(_, force)| force.iter().enumerate().map(|(i, f)| alone(i, f.norm())));
     // Amplitudes below this fraction of the response of a single mass to the loads are rounding:

@@ -6,7 +6,7 @@ use super::dynamics::linear_dynamics::LinearDynamics;
 use super::equations::{Discretization, HarmonicSolution};
 use crate::law::{Contact, MAX_DIRECTIONS};
 use crate::method::orbit_search::evidence::{OrbitCheck, ReturnEvidence};
-use crate::model::{Axis, MovedPlace, System};
+use crate::model::{Axis, CyclicSymmetry, MovedPlace, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results};
 use crate::orbit::{
     Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws,
@@ -135,10 +135,24 @@ pub(super) fn orbit(
     motion: &HarmonicSolution,
     x: Vec<DVector<Complex64>>,
 ) -> Option<Orbit> {
-    if let (Some(wave), Some(ports)) = (setting.ports.wave(), setting.ring_ports) {
-        let (mut discretization, motion) = discretization.over_ring(wave, ports, motion);
-        return orbit(OrbitInput { ports, ring_ports: None, ..setting }, &mut discretization, &motion, x);
+    match (setting.ports.wave(), setting.ring_ports) {
+        (Some(wave), Some(ports)) => {
+            let (mut discretization, motion) = discretization.over_ring(wave, ports, motion);
+            orbit_of_all(OrbitInput { ports, ..setting }, &mut discretization, &motion, x, Some(wave))
+        }
+        _ => orbit_of_all(setting, discretization, motion, x, None),
     }
+}
+
+/// Makes the orbit of a solution over all joints, which is a travelling wave of a ring if `wave` is
+/// given.
+fn orbit_of_all(
+    setting: OrbitInput,
+    discretization: &mut Discretization,
+    motion: &HarmonicSolution,
+    x: Vec<DVector<Complex64>>,
+    wave: Option<CyclicSymmetry>,
+) -> Option<Orbit> {
     if !mean_forces_balance(&setting, discretization, motion, &x) {
         return None;
     }
@@ -160,6 +174,7 @@ pub(super) fn orbit(
     let measuring = SolutionSignals {
         axes: system.axes().map(|(_, axis)| axis).collect(),
         ports: ports_of_axes(system, ports),
+        wave,
         motion,
         x: &x,
         harmonics: &harmonics,
@@ -329,6 +344,8 @@ struct SolutionSignals<'a> {
     axes: Vec<&'a Axis>,
     /// Unknowns along each axis, see [`ports_of_axes`].
     ports: Vec<Vec<(usize, PortMember)>>,
+    /// The symmetry of a travelling wave.
+    wave: Option<CyclicSymmetry>,
     motion: &'a HarmonicSolution,
     x: &'a [DVector<Complex64>],
     harmonics: &'a [usize],
@@ -412,6 +429,17 @@ impl PathSignals for SolutionSignals<'_> {
         let terms = self.harmonics.iter().zip(a.iter().zip(b));
         let sum: f64 = terms.map(|(&h, (a, b))| if h == 0 { a.re * b.re } else { 0.5 * (a.conj() * b).re }).sum();
         self.length() * sum
+    }
+    /// In a travelling wave, all sectors lose the same energy, and each harmonic is a wave.
+    fn viscous_loss(&self, system: &System, velocity: &[Vec<Complex64>]) -> f64 {
+        let sector = self.wave.and_then(|wave| Some((wave, system.structure().ring_sector(wave.sectors)?)));
+        let Some((cyclic, sector)) = sector else { return self.viscous_loss_of_entries(system, velocity) };
+        let loss = |(k, &h): (usize, &usize)| {
+            let own: Vec<Complex64> = velocity[..sector.dofs()].iter().map(|signal| signal[k]).collect();
+            // the mean does not move
+            sector.wave(cyclic.diameter(h)).map_or(f64::NAN, |wave| 0.5 * wave.damping_power(&own))
+        };
+        self.length() * cyclic.sectors as f64 * self.harmonics.iter().enumerate().map(loss).sum::<f64>()
     }
     fn fourier(&self, signal: &Vec<Complex64>, omega: f64) -> Complex64 {
         let share = if omega == 0.0 { 1.0 } else { 0.5 };

@@ -9,6 +9,7 @@ use crate::structure::reduction::natural;
 use crate::structure::{Matrices, free_vibrations};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use stickslip_numerics::eigen;
+use stickslip_numerics::sparse::multi_vector;
 
 /// A spring and damper along a direction of the free places.
 pub(super) struct SpringDamper {
@@ -56,7 +57,10 @@ impl ModalStructure {
         }
         let mut stiffness = full.stiffness.clone();
         links.iter().for_each(|link| add(&mut stiffness, &link.at, link.stiffness));
-        let part = |matrix: &DMatrix<f64>| turn.tr_mul(&(matrix * &turn));
+        let part = |matrix: &DMatrix<f64>| match rigid.is_empty() {
+            true => matrix.clone(),
+            false => turn.tr_mul(&(matrix * &turn)),
+        };
         let mut damping = full.damping.clone();
         links.iter().for_each(|link| add(&mut damping, &link.at, link.damping));
         let (mass, damping, stiffness) = (part(&full.mass), part(&damping), part(&stiffness));
@@ -68,8 +72,11 @@ impl ModalStructure {
         // This suits matrices with ten digits.
         let free = squares.partition_point(|value| *value < 1e-10 * usual);
         let shapes = shapes.columns(0, squares.len()).into_owned();
-        let damping = shapes.tr_mul(&(damping * &shapes));
-        Some(ModalStructure { squares, free, shapes: turn * shapes, damping })
+        let r = shapes.nrows();
+        let moved = multi_vector::combine(r, damping.as_slice(), &shapes);
+        let damping = multi_vector::inner_products(r, shapes.as_slice(), &moved);
+        let shapes = if rigid.is_empty() { shapes } else { turn * shapes };
+        Some(ModalStructure { squares, free, shapes, damping })
     }
 
     fn elastic_shapes(&self) -> DMatrix<f64> {

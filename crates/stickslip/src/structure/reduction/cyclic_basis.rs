@@ -16,9 +16,10 @@
 //! Source: Yang and Griffin (2001), "A reduced-order model of mistuning using a subset of
 //! nominal system modes", J. Eng. Gas Turbines Power 123, 893-900.
 
+use super::computed_wave::ComputedWave;
 use super::{
-    FullStructure, ReducedMatrices, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance,
-    Row, RubinBasis, StructureDamping, damping, residual_flexibility,
+    ReducedMatrices, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, Row,
+    StructureDamping, damping,
 };
 use crate::structure::sector::{is_real, wave_entries};
 use crate::structure::sector_boundary::{Blade, symmetrized};
@@ -26,7 +27,7 @@ use crate::structure::{CyclicSector, RingEntry, unit_root};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
-use stickslip_numerics::sparse::{ModeSelection, NaturalModes, multi_vector};
+use stickslip_numerics::sparse::multi_vector;
 
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
 /// which a combination is dropped. They are tried in this sequence.
@@ -41,6 +42,19 @@ pub(super) const HALF_WIDTH: f64 = 1e-3;
 /// Largest number of samples in the comparison of a wave; each needs a factorization of twice
 /// the size of a sector.
 const SAMPLES: usize = 5;
+
+/// The size of a basis of a sector whose error was within its tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SectorBasis {
+    /// Multiple of the frequency of interest up to which it has modes.
+    extent: f64,
+    /// Orders of residual vectors.
+    order: usize,
+    /// Relative eigenvalue of the vectors' Gram matrix below which a combination is dropped.
+    share: f64,
+    /// Refinement level of the nodal diameters.
+    level: usize,
+}
 
 /// A reduced sector.
 #[derive(Debug, Clone)]
@@ -72,16 +86,8 @@ pub(in crate::structure) struct SectorReduction {
     pub up_to: f64,
     /// Highest frequency for which the basis is intended, rad/s.
     pub serves: f64,
-}
-
-/// A computed wave.
-struct ComputedWave {
-    diameter: usize,
-    whole: FullStructure,
-    modes: NaturalModes,
-    /// Multiple of the frequency of interest up to which modes are computed.
-    extent: f64,
-    reference: ReferenceReceptance,
+    /// The size of the basis, if it follows from the required error.
+    pub basis: Option<SectorBasis>,
 }
 
 /// Returns the first Gram tolerance for this number of orders.
@@ -121,6 +127,30 @@ impl CyclicSector {
         }
     }
 
+    /// Returns the sector reduced by a basis of a known size with the modes of a higher frequency
+    /// range, up to `up_to`, rad/s. Its error is not computed.
+    pub(in crate::structure) fn reduced_by_size(
+        &self,
+        seen: &[Row],
+        up_to: f64,
+        basis: SectorBasis,
+    ) -> Result<SectorReduction, ReductionError> {
+        let SectorBasis { extent, order, share, level } = basis;
+        let mut waves = WaveCollection { sector: self, seen, blade: None, computed: Vec::new() };
+        let taken = self.diameters(level);
+        for &diameter in &taken {
+            let whole = self.wave(diameter, seen)?;
+            let modes = whole.modes(extent * up_to)?;
+            let mut wave = ComputedWave::new(diameter, whole, (modes, extent), None);
+            wave.vectors(order, self.dofs)?;
+            wave.whole = None;
+            waves.computed.push(wave);
+        }
+        let reduced = waves.basis(&taken, (order, share), ReductionKind::Rubin)?;
+        let unknown = ReductionDeviation { error: f64::NAN, omega: up_to };
+        Ok(SectorReduction { basis: Some(basis), ..waves.chosen(reduced, unknown, (up_to, up_to)) })
+    }
+
     /// Returns the nodal diameters of a refinement level. High levels contain all diameters.
     pub(super) fn diameters(&self, level: usize) -> Vec<usize> {
         let (half, parts) = (self.sectors / 2, 2usize << level);
@@ -132,21 +162,31 @@ impl CyclicSector {
 
 impl WaveCollection<'_> {
     /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
-    /// of interest.
-    fn compute(&mut self, diameters: &[usize], up_to: f64, extent: f64) -> Result<(), ReductionError> {
+    /// of interest. The matrices of waves that are not `taken` are dropped.
+    fn compute(
+        &mut self,
+        diameters: &[usize],
+        (up_to, extent): (f64, f64),
+        taken: &[usize],
+    ) -> Result<(), ReductionError> {
+        let (sector, seen) = (self.sector, self.seen);
         for &diameter in diameters {
             match self.computed.iter_mut().find(|wave| wave.diameter == diameter) {
                 Some(wave) if wave.extent >= extent => {}
                 Some(wave) => {
-                    wave.modes = wave.whole.modes(extent * up_to)?;
-                    wave.extent = extent;
+                    let modes = wave.whole(|diameter| sector.wave(diameter, seen))?.modes(extent * up_to)?;
+                    wave.set_modes(modes, extent);
                 }
                 None => {
                     let whole = self.sector.wave(diameter, self.seen)?;
                     let modes = whole.modes(extent * up_to)?;
                     let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-                    self.computed.push(ComputedWave { diameter, whole, modes, extent, reference });
+                    self.computed.push(ComputedWave::new(diameter, whole, (modes, extent), Some(reference)));
                 }
+            }
+            // the matrices of all waves at once would be the largest part of the memory
+            for wave in self.computed.iter_mut().filter(|wave| !taken.contains(&wave.diameter)) {
+                wave.whole = None;
             }
         }
         Ok(())
@@ -175,15 +215,19 @@ impl WaveCollection<'_> {
             loop {
                 let taken = self.sector.diameters(level);
                 let between = self.sector.diameters(level + 1);
-                self.compute(&between, up_to, extent)?;
+                self.compute(&between, (up_to, extent), &taken)?;
                 let reduced = self.basis(&taken, size, kind)?;
-                let at = |diameters: &[usize]| self.deviation(&reduced, diameters, up_to);
-                let (own, all) = (at(&taken)?, at(&between)?);
+                let each = self.deviations(&reduced, &between, up_to)?;
+                let own = largest(each.iter().filter(|(diameter, _)| taken.contains(diameter)).map(|(_, own)| *own));
+                let all = largest(each.iter().map(|(_, own)| *own));
                 if best.is_none_or(|(least, _)| all.error < least.error) {
                     best = Some((all, reduced.dofs()));
                 }
                 if all.error <= tolerance {
-                    return Ok(self.chosen(reduced, all, (up_to, up_to)));
+                    let (order, share) = size;
+                    let basis = Some(SectorBasis { extent, order, share, level });
+                    let basis = basis.filter(|_| kind == ReductionKind::Rubin);
+                    return Ok(SectorReduction { basis, ..self.chosen(reduced, all, (up_to, up_to)) });
                 }
                 // if the computed waves are accurate, other diameters are missing
                 if own.error > tolerance || taken == between {
@@ -222,10 +266,11 @@ impl WaveCollection<'_> {
         let up_to = if up_to > 0.0 { up_to } else { serves };
         for (diameter, whole, modes) in wholes {
             let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-            self.computed.push(ComputedWave { diameter, whole, modes, extent: beyond, reference });
+            self.computed.push(ComputedWave::new(diameter, whole, (modes, beyond), Some(reference)));
         }
         let reduced = self.basis(&taken, (orders, share(orders)), kind)?;
-        let deviation = self.deviation(&reduced, &between, up_to)?;
+        let each = self.deviations(&reduced, &between, up_to)?;
+        let deviation = largest(each.into_iter().map(|(_, deviation)| deviation));
         Ok(self.chosen(reduced, deviation, (up_to, serves)))
     }
 
@@ -242,35 +287,37 @@ impl WaveCollection<'_> {
             free += wave.modes.rigid_body_count() / step;
         }
         frequencies.sort_by(f64::total_cmp);
-        SectorReduction { reduced, deviation, frequencies, free, up_to, serves }
+        SectorReduction { reduced, deviation, frequencies, free, up_to, serves, basis: None }
     }
 
     /// Builds one basis from the waves of these diameters.
     fn basis(
-        &self,
+        &mut self,
         diameters: &[usize],
         (order, share): (usize, f64),
         kind: ReductionKind,
     ) -> Result<ReducedSector, ReductionError> {
         let n = self.sector.dofs;
-        let mut vectors: Vec<f64> = Vec::new();
-        let taken = || self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
-        for wave in taken() {
-            let basis = match kind {
-                ReductionKind::Rubin => RubinBasis::new(&wave.whole, &wave.modes, 0.0, order)?.into_basis(),
-                ReductionKind::CraigBampton => {
-                    let omega = wave.modes.values.last().map_or(0.0, |value| value.max(0.0).sqrt());
-                    let wanted = ModeSelection::UpTo { value: omega * omega, most: super::MAX_MODES };
-                    Arc::unwrap_or_clone(wave.whole.fixed_interface(wanted)?.basis)
-                }
-            };
-            vectors.extend(basis);
-            if let Some((blade, up_to)) = self.blade {
-                vectors.extend(self.blade_vectors(wave, blade, up_to, order)?);
+        let (mut vectors, mut counts): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let mut modes = 0;
+        let (sector, seen) = (self.sector, self.seen);
+        for wave in self.computed.iter_mut().filter(|wave| diameters.contains(&wave.diameter)) {
+            if !wave.has_vectors(order) || kind == ReductionKind::CraigBampton || self.blade.is_some() {
+                wave.whole(|diameter| sector.wave(diameter, seen))?;
             }
+            match kind {
+                ReductionKind::Rubin => vectors.extend(wave.vectors(order, n)?),
+                ReductionKind::CraigBampton => vectors.extend(wave.craig_bampton()?),
+            }
+            if let Some((blade, up_to)) = self.blade {
+                vectors.extend(wave.blade_vectors(blade, up_to, order, n)?);
+            }
+            modes = modes.max(wave.modes.count());
+            // a vector and its partner split into the same columns
+            let both = kind == ReductionKind::Rubin && !is_real(wave.diameter, sector.sectors);
+            counts.resize(vectors.len() / n.max(1), if both { 2.0 } else { 1.0 });
         }
-        let modes = taken().map(|wave| wave.modes.count()).max().unwrap_or(0);
-        let basis = self.independent(&vectors, share)?;
+        let basis = self.independent(&vectors, &counts, share)?;
         let name = match kind {
             ReductionKind::Rubin => "modes and residual vectors",
             ReductionKind::CraigBampton => "Craig-Bampton",
@@ -282,43 +329,19 @@ impl WaveCollection<'_> {
         Ok(self.projected(kind, basis, n))
     }
 
-    /// Returns residual vectors of a wave for the forces of a deviating blade, in its modes up
-    /// to a frequency. Both parts of the wave are included.
-    fn blade_vectors(
-        &self,
-        wave: &ComputedWave,
-        blade: &Blade,
-        up_to: f64,
-        order: usize,
-    ) -> Result<Vec<f64>, ReductionError> {
-        let (n, modes) = (self.sector.dofs, &wave.modes);
-        let inside = modes.values.partition_point(|value| *value <= up_to * up_to);
-        let forces = (modes.rigid_body_count()..inside).map(|mode| -> Row {
-            let parts = modes.shape(mode).chunks_exact(n).flat_map(|part| blade.times(part));
-            parts.enumerate().filter(|(_, force)| *force != 0.0).collect()
-        });
-        let forces: Vec<Row> = forces.filter(|row| !row.is_empty()).collect();
-        if forces.is_empty() {
-            return Ok(Vec::new());
-        }
-        let (mut basis, _) = residual_flexibility::basis(&wave.whole.with_ports(forces)?, modes, 0.0, order)?;
-        Ok(basis.split_off(modes.shapes.len()))
-    }
-
     /// Returns combinations of columns over the remaining rows that are orthogonal in the
     /// energy of the sector. Nearly dependent combinations are dropped. Each is scaled to unit
-    /// displacement at the port that moves most.
-    fn independent(&self, vectors: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
+    /// displacement at the port that moves most. A column counts as often as `counts` states.
+    fn independent(&self, vectors: &[f64], counts: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
         let n = self.sector.dofs;
-        let (mass, stiffness) = (
-            self.sector.with_fixed_adjacent(&self.sector.mass)?,
-            self.sector.with_fixed_adjacent(&self.sector.stiffness)?,
-        );
         let highest =
             self.computed.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
-        let mut energies = multi_vector::inner_products(n, vectors, &stiffness.multiply_columns(vectors));
-        energies += multi_vector::inner_products(n, vectors, &mass.multiply_columns(vectors)) * highest;
-        let size: Vec<f64> = energies.diagonal().iter().map(|e| e.max(0.0).sqrt()).collect();
+        let weighted =
+            self.sector.mass.iter().map(|&(row, column, shift, value)| (row, column, shift, highest * value));
+        let energy = self.sector.with_fixed_adjacent(self.sector.stiffness.iter().copied().chain(weighted))?;
+        let energies = multi_vector::inner_products(n, vectors, &energy.multiply_columns(vectors));
+        let size: Vec<f64> =
+            energies.diagonal().iter().zip(counts).map(|(e, count)| (e.max(0.0) / count).sqrt()).collect();
         let moving: Vec<usize> = (0..size.len()).filter(|&k| size[k] > 0.0).collect();
         let gram = DMatrix::from_fn(moving.len(), moving.len(), |i, k| {
             let (i, k) = (moving[i], moving[k]);
@@ -374,17 +397,17 @@ impl WaveCollection<'_> {
         }
     }
 
-    /// Returns the error of the waves of these diameters relative to the whole ring.
-    fn deviation(
+    /// Returns the error of each wave of these diameters relative to the whole ring.
+    fn deviations(
         &self,
         reduced: &ReducedSector,
         diameters: &[usize],
         up_to: f64,
-    ) -> Result<ReductionDeviation, ReductionError> {
-        let mut worst = ReductionDeviation { error: 0.0, omega: 0.0 };
-        for wave in self.computed.iter().filter(|wave| diameters.contains(&wave.diameter)) {
+    ) -> Result<Vec<(usize, ReductionDeviation)>, ReductionError> {
+        let waves = self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
+        let deviation = |wave: &ComputedWave| {
             let small = reduced.wave(wave.diameter, self.sector.sectors)?;
-            let deviation = wave.reference.deviation(&small);
+            let of_ports = wave.reference.as_ref().map(|reference| reference.deviation(&small));
             let own = small.frequencies().unwrap_or_default();
             let found = wave
                 .modes
@@ -397,11 +420,16 @@ impl WaveCollection<'_> {
                 let error = own.get(k).map_or(f64::INFINITY, |own| (own / omega - 1.0).abs() / HALF_WIDTH);
                 ReductionDeviation { error, omega }
             });
-            worst =
-                shifts.chain([deviation]).fold(worst, |worst, one| if one.error > worst.error { one } else { worst });
-        }
-        Ok(worst)
+            Ok((wave.diameter, largest(shifts.chain(of_ports))))
+        };
+        waves.map(deviation).collect()
     }
+}
+
+/// Returns the first of the largest errors.
+fn largest(all: impl Iterator<Item = ReductionDeviation>) -> ReductionDeviation {
+    let none = ReductionDeviation { error: 0.0, omega: 0.0 };
+    all.fold(none, |worst, one| if one.error > worst.error { one } else { worst })
 }
 
 /// Returns `Vᵀ A V` for entries with shifts.

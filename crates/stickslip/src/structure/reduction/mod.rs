@@ -18,7 +18,8 @@
 //! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does
 //!   this for a ring with different blades.
 //! - `automatic`: [`AutomaticReduction`] uses as many modes as a given error requires.
-//! - `cyclic_basis` reduces a sector for all waves of its ring at once.
+//! - `cyclic_basis` reduces a sector for all waves of its ring at once; `computed_wave` has the modes
+//!   and residual vectors of one wave.
 //! - `common_basis` builds one basis for two stiffnesses and all between them.
 //! - `nominal_modes` transforms a ring with different blades to its own modes.
 //!
@@ -27,6 +28,7 @@
 
 mod automatic;
 mod common_basis;
+mod computed_wave;
 mod craig_bampton;
 mod cyclic_basis;
 mod mistuning_error;
@@ -39,7 +41,8 @@ mod rubin;
 
 pub use automatic::{AutomaticReduction, SelectedReduction};
 pub(crate) use cyclic_basis::ReducedSector;
-pub(in crate::structure) use cyclic_basis::STEPS;
+pub use cyclic_basis::SectorBasis;
+pub(in crate::structure) use cyclic_basis::{STEPS, SectorReduction};
 pub(in crate::structure) use mistuning_error::MistuningError;
 pub(crate) use nominal_modes::RingModes;
 pub(in crate::structure) use nominal_modes::{EXTENTS, MistunedModes, NominalRing};

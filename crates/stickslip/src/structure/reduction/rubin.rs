@@ -83,11 +83,6 @@ impl<'a> RubinBasis<'a> {
         self.whole
     }
 
-    /// Returns all modes and residual vectors, by columns.
-    pub(super) fn into_basis(self) -> Vec<f64> {
-        Arc::unwrap_or_clone(self.basis)
-    }
-
     /// Returns the number of modes.
     pub fn modes(&self) -> usize {
         self.values.len()

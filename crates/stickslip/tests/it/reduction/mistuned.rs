@@ -43,7 +43,8 @@ fn ring(reduction: Reduction, blades: &[f64]) -> System {
     let component = Component::new(rows, brick.mass, None, brick.stiffness).unwrap();
     let boundary = Boundary::of_nodes(component.rows(), &pairs, None).unwrap();
     let sector = |deviation: f64| {
-        let disk = DiskPart { boundary: boundary.clone(), blade: blade.clone(), deviations: vec![deviation] };
+        let disk =
+            DiskPart { boundary: boundary.clone(), blade: blade.clone(), deviations: vec![deviation], basis: None };
         let (component, damping) = (component.clone(), SubstructureDamping::Own);
         let substructure =
             Some(Substructure { component, damping, reduction, earlier_reduction: None, disk: Some(disk) });

@@ -363,12 +363,10 @@ impl FigureData<'_> {
             // amplitude.
             false => 2,
         };
-        let in_sector: BTreeSet<String> = self
-            .shown
-            .iter()
-            .filter_map(|(name, _)| Some(place_and_sector(name)?.0))
-            .filter(|_| self.is_disk())
-            .collect();
+        let in_sector: BTreeSet<String> = match self.is_disk() {
+            true => self.shown.iter().filter_map(|(name, _)| Some(place_and_sector(name)?.0)).collect(),
+            false => BTreeSet::new(),
+        };
         let joints = places + in_sector.len().min(disk_shape::MAX_PLACES);
         [places, joints, joints + if self.joints.is_empty() { 0 } else { self.force_groups().len() }]
     }
