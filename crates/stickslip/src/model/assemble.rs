@@ -221,8 +221,8 @@ impl Assembler<'_> {
         })
     }
 
-    /// Returns the structure of a ring without imposed motion, from its equal sectors and the masses
-    /// and springs on them.
+    /// Returns the structure of a ring without imposed motion, from its equal sectors and the
+    /// masses and springs on them.
     fn ring_structure(&self, ring: &RingEntries, matrices: &AssembledMatrices) -> Result<Structure, ModelError> {
         let names = self.coordinates.names.clone();
         let more = [&matrices.mass, &matrices.damping, &matrices.stiffness];

@@ -461,8 +461,8 @@ impl Structure {
 
     /// Iterates over the nonzero entries of (mass, damping, stiffness): row, column, values.
     ///
-    /// Full matrices and rings are read row by row, sparse ones column by column. The damping includes
-    /// [`Structure::damped_modes`] in addition.
+    /// Full matrices and rings are read row by row, sparse ones column by column. The damping
+    /// includes [`Structure::damped_modes`] in addition.
     pub fn entries(&self) -> Box<dyn Iterator<Item = (usize, usize, [f64; 3])> + '_> {
         let n = self.dofs();
         match &self.0.form {

@@ -239,8 +239,8 @@ impl RingSector {
         })
     }
 
-    /// Iterates over the nonzero entries of the mass (0), damping (1) or stiffness matrix (2) of the
-    /// ring, row by row.
+    /// Iterates over the nonzero entries of the mass (0), damping (1) or stiffness matrix (2) of
+    /// the ring, row by row.
     pub(super) fn ring_entries_of(&self, kind: usize) -> impl Iterator<Item = (usize, usize, f64)> + use<> {
         let (n, sectors) = (self.dofs(), self.sectors);
         let own = self.entries.iter().filter(|entry| entry.3[kind] != 0.0);

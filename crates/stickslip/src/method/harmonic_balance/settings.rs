@@ -107,8 +107,8 @@ pub(super) struct WorkSettings {
     pub evaluations: usize,
     /// Limit of all searches of a point, relative to one search, including those of the error
     /// estimate. Default 3 for multiplications: Newton's method and two of the fallbacks may each
-    /// use the eliminations of one search. Converged points of 173 random systems used at most 1.01 of
-    /// half of it, all but one at most 0.4. Default 1 for time steps.
+    /// use the eliminations of one search. Converged points of 173 random systems used at most 1.01
+    /// of half of it, all but one at most 0.4. Default 1 for time steps.
     pub point: WorkShare,
     /// Work of a point, relative to that of its first orbit, up to which longer series may reduce
     /// the error of that orbit. Default 8: a few doublings of the number of harmonics.

@@ -18,8 +18,8 @@
 //! - `receptance_error` compares a reduction with the whole structure; `mistuning_error` does
 //!   this for a ring with different blades.
 //! - `automatic`: [`AutomaticReduction`] uses as many modes as a given error requires.
-//! - `cyclic_basis` reduces a sector for all waves of its ring at once; `computed_wave` has the modes
-//!   and residual vectors of one wave.
+//! - `cyclic_basis` reduces a sector for all waves of its ring at once; `computed_wave` has the
+//!   modes and residual vectors of one wave.
 //! - `common_basis` builds one basis for two stiffnesses and all between them.
 //! - `nominal_modes` transforms a ring with different blades to its own modes.
 //!

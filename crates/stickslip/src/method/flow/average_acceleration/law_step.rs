@@ -18,7 +18,8 @@ enum LawView {
     Rate,
 }
 
-/// Returns the view of a law, if it has one: ideal elements without rigid sliders, a step, or a rate.
+/// Returns the view of a law, if it has one: ideal elements without rigid sliders, a step, or a
+/// rate.
 fn view(law: &SharedLaw) -> Option<LawView> {
     let steps = |element: &IdealElement| match element {
         IdealElement::Slider(slider) => {

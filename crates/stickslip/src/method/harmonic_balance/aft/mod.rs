@@ -423,8 +423,9 @@ impl FrequencyTime {
     /// [axis][harmonic], into `force`. Writes the derivative by (Re, Im) of the harmonics into
     /// `tangent` (row-major, 2 × axes × harmonics squared).
     ///
-    /// The law is evaluated at `1/limit_factor` of the motion, and its force is multiplied by `limit_factor`.
-    /// A large factor raises the slip limits: every joint sticks, as in a very small motion.
+    /// The law is evaluated at `1/limit_factor` of the motion, and its force is multiplied by
+    /// `limit_factor`. A large factor raises the slip limits: every joint sticks, as in a very
+    /// small motion.
     pub fn motion_port_force(
         &mut self,
         port: &Port,
