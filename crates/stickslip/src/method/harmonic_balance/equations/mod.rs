@@ -47,11 +47,12 @@ use super::equations::harmonic_set::velocity_weight;
 use super::globalization::found_by::FoundBy;
 use super::globalization::homotopy::{Homotopy, SearchContext};
 use super::linear_solve::linearization::LinearizedEquations;
-use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, dot, uses_krylov};
+use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, uses_krylov};
 use crate::model::CyclicSymmetry;
 use crate::orbit::JointSeries;
 use nalgebra::DVector;
 use num_complex::Complex64;
+use stickslip_numerics::vector::dot;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 

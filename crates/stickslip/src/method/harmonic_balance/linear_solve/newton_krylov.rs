@@ -28,6 +28,7 @@ use std::sync::Arc;
 use stickslip_numerics::complex_gemv::ComplexGemv;
 use stickslip_numerics::dense::{ComplexLu, DenseLu, ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::gmres::{Gmres, GmresLimits};
+use stickslip_numerics::vector::dot;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -699,11 +700,6 @@ impl ModalPreconditioner {
             v.iter_mut().enumerate().skip(first).for_each(|(i, v)| *v = columns[i * p + q]);
         }
     }
-}
-
-/// Returns `a · b`.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::method::harmonic_balance::line_search::LineSearch;
 use crate::method::harmonic_balance::settings::NewtonSettings;
 use num_complex::Complex64;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
+use stickslip_numerics::vector::dot;
 use stickslip_numerics::{dense, interrupt};
 
 /// Point of the curve: modal amplitude, m √kg, and motion.
@@ -290,8 +291,4 @@ impl ModeEquations<'_> {
         }
         out[size * (size + 1)..].copy_from_slice(row);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
