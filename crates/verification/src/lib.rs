@@ -5,10 +5,12 @@
 //! small numerics (search, quadrature). It does not use the numerics of the other crates.
 
 pub mod law_driver;
+pub mod laws_of_seeds;
 pub mod loose_dampers;
 pub mod newmark_reference;
 pub mod single_mass;
 
+use laws_of_seeds::LAWS_OF_SEEDS;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
@@ -92,29 +94,6 @@ fn drawn_law(
     }
     row.sample()
 }
-
-/// The laws of random systems. A law that is added to the table does not belong here, so that a
-/// seed keeps its system; the conformance tests run every law of the table.
-const LAWS_OF_SEEDS: &[&str] = &[
-    "coulomb",
-    "coulomb-arctan",
-    "stribeck",
-    "stribeck-arctan",
-    "jenkins",
-    "jenkins-arctan",
-    "iwan",
-    "dahl",
-    "bouc-wen",
-    "valanis",
-    "lugre",
-    "coulomb-2d",
-    "coulomb-2d-arctan",
-    "jenkins-2d",
-    "jenkins-2d-arctan",
-    "friction-contact",
-    "gap",
-    "cubic",
-];
 
 fn laws_of_seeds() -> Vec<&'static LawInfo> {
     TABLE.iter().copied().filter(|row| LAWS_OF_SEEDS.contains(&row.name)).collect()

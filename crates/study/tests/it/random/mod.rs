@@ -1,6 +1,10 @@
 //! Generator of random study files: small structures with parameters over many decades, every
 //! law, method and kind.
 
+#[path = "../../../../verification/src/laws_of_seeds.rs"]
+mod laws_of_seeds;
+
+use laws_of_seeds::LAWS_OF_SEEDS;
 use std::fmt::Write;
 use stickslip::law;
 use stickslip_numerics::random::SplitMix64;
@@ -121,29 +125,6 @@ fn template(chance: &mut Chance, text: &mut String) -> (Names, Scales) {
     let hertz = if names.masses.len() > 1 { 120.6 } else { 0.2 };
     (names, Scales { mass: 0.182, hertz, force: 10.0 })
 }
-
-/// The laws of random studies. A law that is added to the table does not belong here, so that a
-/// seed keeps its study.
-const LAWS_OF_SEEDS: &[&str] = &[
-    "coulomb",
-    "coulomb-arctan",
-    "stribeck",
-    "stribeck-arctan",
-    "jenkins",
-    "jenkins-arctan",
-    "iwan",
-    "dahl",
-    "bouc-wen",
-    "valanis",
-    "lugre",
-    "coulomb-2d",
-    "coulomb-2d-arctan",
-    "jenkins-2d",
-    "jenkins-2d-arctan",
-    "friction-contact",
-    "gap",
-    "cubic",
-];
 
 /// Generates a law with parameters of these scales. Half of the limits are the parameter
 /// `limit`.
