@@ -47,10 +47,8 @@ pub struct StaticEquilibrium {
     /// An orbit without motion.
     orbit: Orbit,
     dofs: usize,
-    /// Number of joints of the system; further joints of `orbit` hold places.
-    joints: usize,
-    /// Number of internal states of these joints.
-    states: usize,
+    /// Number of the last joints of `orbit`, which hold places and have one internal state each.
+    held: usize,
 }
 
 impl StaticEquilibrium {
@@ -88,13 +86,7 @@ impl StaticEquilibrium {
     /// assert!((held.displacement()[1] - 3e-3).abs() < 1e-12);
     /// ```
     pub fn holding(system: &System, held: &[(Axis, f64)]) -> Option<Self> {
-        let count = |orbit: &Orbit| orbit.initial_state.len() - 2 * system.dofs() - held.len();
-        let made = |orbit: Orbit| StaticEquilibrium {
-            states: count(&orbit),
-            orbit,
-            dofs: system.dofs(),
-            joints: system.joints().len(),
-        };
+        let made = |orbit: Orbit| StaticEquilibrium { orbit, dofs: system.dofs(), held: held.len() };
         if held.is_empty() {
             return harmonic_balance::static_equilibrium_of(system).map(made);
         }
@@ -150,12 +142,14 @@ impl StaticEquilibrium {
 
     /// Returns the forces of each joint along its directions, N.
     pub fn forces(&self) -> Vec<[f64; MAX_DIRECTIONS]> {
-        self.orbit.sample(0.0).joints.iter().take(self.joints).map(|joint| joint.force).collect()
+        let joints = self.orbit.sample(0.0).joints;
+        joints[..joints.len() - self.held].iter().map(|joint| joint.force).collect()
     }
 
     /// Returns the internal states of all joints, in the order of the joints.
     pub fn joint_states(&self) -> &[f64] {
-        &self.orbit.initial_state[2 * self.dofs..][..self.states]
+        let state = &self.orbit.initial_state;
+        &state[2 * self.dofs..state.len() - self.held]
     }
 }
 

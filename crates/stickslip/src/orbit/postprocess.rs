@@ -106,15 +106,15 @@ impl ContactSummary {
         summary
     }
 
-    /// Tells whether the joint sticks during the whole return. `loss` is the dissipated energy
-    /// divided by its upper bound, the product of the norms of force and velocity.
+    /// Tells whether the joint sticks during the whole return. `loss` computes the dissipated
+    /// energy divided by its upper bound, the product of the norms of force and velocity.
     ///
     /// At the edge of a continuum of orbits the force just reaches its limit, and the error of
     /// the motion makes some samples slip. In one sample the excess cannot be resolved. More
     /// samples are judged by their loss: if the force of a Jenkins element exceeds its limit by
     /// the fraction ε, the loss is 4ε/π.
-    fn sticks(&self, loss: f64) -> bool {
-        self.stays_closed && (self.slips <= 1 || (self.shares.slip <= 0.01 && loss <= 1e-6))
+    fn sticks(&self, loss: impl FnOnce() -> f64) -> bool {
+        self.stays_closed && (self.slips <= 1 || (self.shares.slip <= 0.01 && loss() <= 1e-6))
     }
 }
 
@@ -195,19 +195,20 @@ pub(crate) fn results<S: PathSignals>(
         let axes = first..first + joint.axes().len();
         first = axes.end;
         let dissipation: f64 = axes.clone().map(|axis| signals.dissipation(axis, &forces[axis])).sum();
-        let bound: f64 = axes
-            .clone()
-            .map(|axis| {
+        let loss = || {
+            let bound = axes.clone().map(|axis| {
                 let velocity = signals.relative_velocity(axis);
                 (signals.product(&forces[axis], &forces[axis]) * signals.product(&velocity, &velocity)).sqrt()
-            })
-            .sum();
-        let displacement = axes.map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
+            });
+            dissipation.abs() / bound.sum::<f64>()
+        };
+        let displacement =
+            axes.clone().map(|axis| signals.relative_range(axis).map(mirrored)).collect::<Result<_, _>>()?;
         let contact = signals.faces(j);
         // A law without a slip limit never slips, and a smooth law always creeps. Neither counts
         // as stuck, because their orbits are unique. The limit of a contact follows its pressure.
         let slips = joint.law().force_scale().is_finite() || joint.law().normal().is_some();
-        if contact.sticks(dissipation.abs() / bound) && slips && joint.law().rate().is_none() {
+        if slips && joint.law().rate().is_none() && contact.sticks(loss) {
             stuck.push(j);
         }
         joints.push(JointMotion {

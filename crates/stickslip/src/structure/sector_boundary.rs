@@ -123,7 +123,7 @@ impl CoordinateAxis {
 
     /// Returns the rotation by `angle` (rad): it maps displacements along x, y, z of the
     /// rotated sector to fixed axes.
-    pub(super) fn rotation(self, angle: f64) -> [[f64; 3]; 3] {
+    pub fn rotation(self, angle: f64) -> [[f64; 3]; 3] {
         let (sin, cos) = angle.sin_cos();
         let own = self as usize;
         let (a, b) = ((own + 1) % 3, (own + 2) % 3);

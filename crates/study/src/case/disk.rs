@@ -1,7 +1,7 @@
 //! `[disk]`: the ring of a model that states one sector, tuned or mistuned.
 
 use crate::case::model_builder::{build_model, whole_number};
-use crate::case::values::{ResolvedValue, Values};
+use crate::case::values::Values;
 use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
 use crate::compile::source_model::{DiskSource, SourceModel, model_problem};
 use crate::syntax::error::Problem;
@@ -84,6 +84,13 @@ pub(crate) fn ring_of(
     })
 }
 
+/// Returns the coordinate axis of this name.
+pub(crate) fn coordinate_axis(name: &str) -> Option<CoordinateAxis> {
+    [("x", CoordinateAxis::X), ("y", CoordinateAxis::Y), ("z", CoordinateAxis::Z)]
+        .into_iter()
+        .find_map(|(known, axis)| (known == name).then_some(axis))
+}
+
 /// Ties a sector given by matrices to the next sector.
 fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, sector: &mut Model) -> Result<(), Problem> {
     let table = &disk.table;
@@ -100,14 +107,7 @@ fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, secto
     }
     // only names are known
     let Some(substructure) = &mut sector.substructure else { return Ok(()) };
-    let axis = match table.entry("axis").map(|entry| &entry.value) {
-        Some(CompiledValue::Fixed(ResolvedValue::Text(axis))) => {
-            [("x", CoordinateAxis::X), ("y", CoordinateAxis::Y), ("z", CoordinateAxis::Z)]
-                .into_iter()
-                .find_map(|(name, known)| (name == axis).then_some(known))
-        }
-        _ => None,
-    };
+    let axis = table.text("axis").and_then(coordinate_axis);
     let component = &substructure.component;
     let pairs = pairs(disk, component, axis, sectors)?;
     let boundary =

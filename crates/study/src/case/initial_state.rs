@@ -1,6 +1,7 @@
 //! Initial state of a transient: static equilibrium with some places held, or given
 //! displacements with unloaded joints.
 
+use crate::case::values::Values;
 use std::collections::BTreeMap;
 use stickslip::method::StaticEquilibrium;
 use stickslip::model::{Axis, System};
@@ -21,10 +22,33 @@ pub(crate) fn begin_values() -> Vec<(&'static str, &'static str)> {
     ]
 }
 
-/// Displacements of all degrees of freedom, m, and internal states of all joints.
+/// The state in which a motion begins.
 pub(crate) struct Start {
+    /// Displacements of all degrees of freedom, m.
     pub displacement: Vec<f64>,
+    /// Their velocities, m/s.
+    pub velocity: Vec<f64>,
+    /// Internal states of all joints; empty if they are unloaded.
     pub states: Vec<f64>,
+    /// True if the motion should begin in an equilibrium that was not found.
+    pub lacks_equilibrium: bool,
+}
+
+impl Start {
+    /// Returns the state of `start`, `start_velocity` and `begin`. The joints are unloaded if there
+    /// is no equilibrium.
+    pub fn new(system: &System, values: &Values) -> Start {
+        let start = values.by_name("start");
+        let begin = values.text("begin").unwrap_or(if start.is_some() { EQUILIBRIUM } else { UNLOADED });
+        let wanted = begin == EQUILIBRIUM;
+        let held = if wanted { held_equilibrium(system, start) } else { None };
+        let (displacement, states) = match &held {
+            Some(held) => (held.displacement().to_vec(), held.joint_states().to_vec()),
+            None => (state_vector(system, start), Vec::new()),
+        };
+        let velocity = state_vector(system, values.by_name("start_velocity"));
+        Start { displacement, velocity, states, lacks_equilibrium: wanted && held.is_none() }
+    }
 }
 
 /// Returns the value of each named place by its row. Skips places that are not a degree of
@@ -36,17 +60,16 @@ fn values_by_row(system: &System, given: Option<&BTreeMap<String, f64>>) -> BTre
 }
 
 /// Returns displacements or velocities of all degrees of freedom: as given, zero elsewhere.
-pub(crate) fn state_vector(system: &System, given: Option<&BTreeMap<String, f64>>) -> Vec<f64> {
+fn state_vector(system: &System, given: Option<&BTreeMap<String, f64>>) -> Vec<f64> {
     let mut state = vec![0.0; system.dofs()];
     values_by_row(system, given).into_iter().for_each(|(row, value)| state[row] = value);
     state
 }
 
 /// Returns the static equilibrium with the places of `start` held; `None` if it is not found.
-pub(crate) fn held_equilibrium(system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<Start> {
+fn held_equilibrium(system: &System, start: Option<&BTreeMap<String, f64>>) -> Option<StaticEquilibrium> {
     let places = system.places().iter().zip(system.place_axes());
     let held: Vec<(Axis, f64)> =
         places.filter_map(|(place, along)| Some((along.clone(), *start?.get(place)?))).collect();
-    let equilibrium = StaticEquilibrium::holding(system, &held)?;
-    Some(Start { displacement: equilibrium.displacement().to_vec(), states: equilibrium.joint_states().to_vec() })
+    StaticEquilibrium::holding(system, &held)
 }

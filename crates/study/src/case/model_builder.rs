@@ -2,7 +2,7 @@
 //! its excitation pattern.
 
 use crate::case::substructure::{self, fault_in};
-use crate::case::values::{ResolvedValue, Values};
+use crate::case::values::Values;
 use crate::compile::compiled::{CompiledTable, CompiledValue, Environment};
 use crate::compile::frequency_amplitude::FrequencyPolynomial;
 use crate::compile::source_model::{ModelLists, SourceModel};
@@ -165,12 +165,6 @@ pub(crate) fn build_model(
     (model, forces, motions)
 }
 
-/// Tells whether a key of a table has this text as its value.
-fn has_text(table: &CompiledTable, key: &str, text: &str) -> bool {
-    let value = table.entry(key).map(|entry| &entry.value);
-    matches!(value, Some(CompiledValue::Fixed(ResolvedValue::Text(stated))) if stated == text)
-}
-
 /// Returns the node of an end of a spring, without its direction.
 fn node_of(end: &str) -> &str {
     end.strip_prefix(NEXT).unwrap_or(end).split('.').next().unwrap_or_default()
@@ -183,14 +177,14 @@ fn is_known_end(end: &str, lists: &ModelLists, model: &Model) -> bool {
     end == GROUND
         || model.masses.iter().any(|mass| mass.name == node)
         || model.bodies.iter().any(|body| body.name == node)
-        || lists.place.iter().any(|table| has_text(table, "name", node))
-        || lists.motion.iter().any(|table| has_text(table, "on", end))
+        || lists.place.iter().any(|table| table.name() == Some(node))
+        || lists.motion.iter().any(|table| table.text("on") == Some(end))
 }
 
 /// Returns the critical damping `2 sqrt(k m)` of a spring, kg/s, with `m` the mass at its end.
 /// Between two masses, `m = m1 m2/(m1 + m2)`. The error says in words which value is missing.
 fn critical_damping(spring: &Spring, lists: &ModelLists, masses: &[Mass]) -> Result<f64, String> {
-    let moved = |name: &str| lists.motion.iter().any(|table| has_text(table, "on", name));
+    let moved = |name: &str| lists.motion.iter().any(|table| table.text("on") == Some(name));
     let inverse_mass = |name: &String| match masses.iter().find(|mass| mass.name == node_of(name)) {
         Some(mass) => Ok(1.0 / mass.mass),
         None if name == GROUND || moved(name) => Ok(0.0),

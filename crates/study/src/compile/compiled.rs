@@ -154,8 +154,13 @@ impl CompiledFitRange {
 impl CompiledTable {
     /// Returns the name of the entry of a list.
     pub fn name(&self) -> Option<&str> {
-        match &self.entry("name")?.value {
-            CompiledValue::Fixed(ResolvedValue::Text(name)) => Some(name),
+        self.text("name")
+    }
+
+    /// Returns the text of a key.
+    pub fn text(&self, key: &str) -> Option<&str> {
+        match &self.entry(key)?.value {
+            CompiledValue::Fixed(ResolvedValue::Text(text)) => Some(text),
             _ => None,
         }
     }

@@ -43,6 +43,10 @@ pub(crate) trait Flow: Send {
     fn energy_scale(&self) -> f64;
     /// Sets the error per step, relative to the state, of a flow with controlled steps.
     fn set_tolerance(&mut self, _tolerance: f64) {}
+    /// Tells whether the flow takes equal steps, whose error it does not control.
+    fn has_equal_steps(&self) -> bool {
+        false
+    }
     /// Sets the fraction of the steps of a full run, for a flow in equal steps. A run over the
     /// same fraction of the duration then keeps the step length.
     fn set_step_fraction(&mut self, _share: f64) {}

@@ -16,6 +16,7 @@ use crate::syntax::key::Bounds;
 use serde_json::{Value as Json, json};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Frame, GROUND, NEXT};
+use stickslip::structure::CoordinateAxis;
 use stickslip_formats::mesh::{Patch, PatchNode, ProjectedPoint};
 use stickslip_numerics::vector::dot;
 
@@ -60,8 +61,8 @@ struct Pair {
 /// The rotation between the axes of a sector and those of the next one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SectorRotation {
-    /// The axis of the disk: 0 to 2 for x, y, z.
-    pub axis: usize,
+    /// The axis of the disk.
+    pub axis: CoordinateAxis,
     /// Angle of a sector, rad.
     pub angle: f64,
 }
@@ -78,12 +79,7 @@ impl SectorRotation {
     }
 
     fn rotated(self, vector: [f64; 3], angle: f64) -> [f64; 3] {
-        let (i, j) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        let (sin, cos) = angle.sin_cos();
-        let mut rotated = vector;
-        rotated[i] = cos * vector[i] - sin * vector[j];
-        rotated[j] = sin * vector[i] + cos * vector[j];
-        rotated
+        self.axis.rotation(angle).map(|row| dot(&row, &vector))
     }
 }
 

@@ -65,14 +65,6 @@ fn table_of_node(stated: &CompiledTable, node: &str, entries: Vec<CompiledEntry>
     CompiledTable { location: stated.location.clone(), repetition, entries }
 }
 
-/// Returns the text of a key.
-fn text<'a>(table: &'a CompiledTable, key: &str) -> Option<&'a str> {
-    match &table.entry(key)?.value {
-        CompiledValue::Fixed(ResolvedValue::Text(text)) => Some(text),
-        _ => None,
-    }
-}
-
 /// Returns the numbers of nodes that a text mentions in names `NAME_17`, in ascending order. They
 /// stand for the nodes of a set whose mesh is not read.
 pub(crate) fn mentioned_nodes(text: &str, name: &str) -> Vec<i64> {

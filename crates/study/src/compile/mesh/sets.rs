@@ -1,14 +1,14 @@
 //! Places on sets of a mesh: `set = "PADS"` is a place for every node, `nodes = ["PADS"]` the mean
 //! over them.
 
-use super::{MeshSource, entry, node_entry, set_problem, table_of_node, text};
+use super::{MeshSource, entry, node_entry, set_problem, table_of_node};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::syntax::error::Problem;
 
 /// Returns the places that an entry of `[[place]]` states.
 pub(crate) fn expand(place: CompiledTable, source: &MeshSource) -> Result<Vec<CompiledTable>, Problem> {
-    let Some(set) = text(&place, "set") else { return Ok(vec![with_nodes_of_sets(place, source)]) };
+    let Some(set) = place.text("set") else { return Ok(vec![with_nodes_of_sets(place, source)]) };
     let location = place.location_of("set", None);
     if let Some(other) = ["of", "dof", "dofs", "nodes", "sum"].into_iter().find_map(|key| place.entry(key)) {
         let message = format!("`set` and `{}` exclude each other", other.key);

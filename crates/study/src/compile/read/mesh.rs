@@ -2,6 +2,7 @@
 //! nodes.
 
 use super::reader::Reader;
+use crate::case::disk::coordinate_axis;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::compile::mesh::contact::SectorRotation;
@@ -23,7 +24,7 @@ pub(super) fn sector_rotation(root: &TomlTable) -> Option<SectorRotation> {
     let Some(TomlValue::Table(disk)) = value(root, "disk") else { return None };
     let Some(TomlValue::Number { value: sectors, .. }) = value(&disk, "sectors") else { return None };
     let Some(TomlValue::Text { text, .. }) = value(&disk, "axis") else { return None };
-    let axis = ["x", "y", "z"].iter().position(|axis| *axis == text)?;
+    let axis = coordinate_axis(&text)?;
     (sectors > 0.0).then(|| SectorRotation { axis, angle: TAU / sectors })
 }
 

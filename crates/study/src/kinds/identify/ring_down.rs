@@ -3,7 +3,7 @@
 //! The first row is the initial instant. The rows have equal distances.
 
 use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
-use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, held_equilibrium, state_vector};
+use crate::case::initial_state::Start;
 use crate::case::study::Case;
 use crate::data::ColumnError;
 use stickslip::dimension::Dimension;
@@ -68,14 +68,11 @@ impl Target for RingDown {
         let along = place.map(|place| system.place_axes()[place].clone());
         let along = along.ok_or_else(|| format!("there is no place `{}`", self.place))?;
         let values = &case.values;
-        let start = values.by_name("start");
-        let begin = values.text("begin").unwrap_or(if start.is_some() { EQUILIBRIUM } else { UNLOADED });
-        let held = if begin == EQUILIBRIUM { held_equilibrium(&system, start) } else { None };
-        let held = held.unwrap_or_else(|| Start { displacement: state_vector(&system, start), states: Vec::new() });
+        let start = Start::new(&system, values);
         let history = TimeHistory {
-            displacement: held.displacement,
-            velocity: state_vector(&system, values.by_name("start_velocity")),
-            states: held.states,
+            displacement: start.displacement,
+            velocity: start.velocity,
+            states: start.states,
             excitation: Excitation::Free,
             // half a step more, so that the last row is not lost by rounding
             duration: self.step * (self.measured.len() as f64 - 0.5),

@@ -8,7 +8,7 @@ mod signal;
 
 use super::orbit::write_sample;
 use super::shared::keys::MAX_SAMPLES;
-use crate::case::initial_state::{EQUILIBRIUM, Start, UNLOADED, begin_values, held_equilibrium, state_vector};
+use crate::case::initial_state::{Start, UNLOADED, begin_values};
 use crate::case::names::ModelNames;
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
@@ -261,16 +261,12 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         None => vec![None],
     };
     let mut part = UnitResult::default();
-    let start_values = values.by_name("start");
-    let begin = values.text("begin").unwrap_or(if start_values.is_some() { EQUILIBRIUM } else { UNLOADED });
-    let start_state = if begin == EQUILIBRIUM { held_equilibrium(&prepared.system, start_values) } else { None };
-    if begin == EQUILIBRIUM && start_state.is_none() {
+    let start = Start::new(&prepared.system, values);
+    if start.lacks_equilibrium {
         let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
             with begin = \"unloaded\"";
         part.notes.push(Note::for_case(&case.label(), format!("{WARNING}{text}")));
     }
-    let start = start_state
-        .unwrap_or_else(|| Start { displacement: state_vector(&prepared.system, start_values), states: Vec::new() });
     if records.as_ref().is_some_and(|records| records.ground_moves) {
         let text = "the ground moves; displacements and velocities are relative to it.";
         part.notes.push(Note::for_case(&case.label(), text));
@@ -295,7 +291,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let step = values.quantity("time_step").or(fastest.map(|w| TAU / w / per_cycle)).unwrap_or(duration);
         let transient = TimeHistory {
             displacement: start.displacement.clone(),
-            velocity: state_vector(&prepared.system, values.by_name("start_velocity")),
+            velocity: start.velocity.clone(),
             states: start.states.clone(),
             excitation,
             duration,

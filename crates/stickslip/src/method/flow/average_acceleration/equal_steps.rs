@@ -184,6 +184,10 @@ impl Flow for AverageAccelerationFlow {
         self.assembly.energy_scale(&self.excitation)
     }
 
+    fn has_equal_steps(&self) -> bool {
+        true
+    }
+
     fn set_step_fraction(&mut self, share: f64) {
         self.share = share;
     }
