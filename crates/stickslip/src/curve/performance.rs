@@ -200,9 +200,9 @@ impl<E: Send> Performance<'_, E> {
     /// between two branches.
     fn refine(&self, low: f64, middle: PerformanceRow, high: f64) -> Result<PerformanceRow, PerformanceError<E>> {
         let mut best = middle;
-        // Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10,
-        // and the curve is flat to second order or kinked at the optimum.
-        let close = |a: f64, b: f64| b - a <= 1e-7 * (a.abs() + b.abs());
+        // Relative width at which the search for the optimum ends. Peaks are accurate to 1e-10, so
+        // a smooth minimum is determined to the square root of that.
+        let close = |a: f64, b: f64| b - a <= 1e-5 * (a.abs() + b.abs());
         // the steps are not points of the curve; after a stop they end at once
         let watch = Watch { finished: &|| (), stop: self.watch.stop };
         golden_section((low, high), close, |value| {

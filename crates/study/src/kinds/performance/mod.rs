@@ -44,7 +44,7 @@ pub(super) const KIND: Kind = Kind {
     warnings: sampling_warnings,
     probe: Probe::Points {
         compute: probe,
-        excluded: |_| Some("the search for the optimum, which takes about 30 further values"),
+        excluded: |_| Some("the search for the optimum, which takes about 20 further values"),
     },
     compute,
     draw: figure::draw,
