@@ -1,8 +1,8 @@
 //! The solution of a point: Newton's method, then the searches of one table.
 //!
 //! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
-//! [`FALLBACKS`] follow in their order; each receives the same initial guess, which the homotopy
-//! ignores. If all of them fail, the solver begins once more from a time integration
+//! [`FALLBACKS`] follow in their order. Each receives the same initial guess; the homotopy ignores
+//! it. If all of them fail, the solver begins once more from a time integration
 //! (`time_start`), which is no row of the table.
 //!
 //! To add a search: its file and `mod` line, one row of [`FALLBACKS`], and a variant of [`FoundBy`]
@@ -36,9 +36,9 @@ struct Fallback {
     found_by: FoundBy,
     /// True if the search can help with these ports.
     applies: fn(&Ports) -> bool,
-    /// True if the search also serves orbits between known ones. These can do without a failed
-    /// point, so only quick searches do.
-    between_orbits: bool,
+    /// False if the search ignores the initial guess. It then does not follow a guess from an
+    /// adjacent orbit or from a time integration: it was tried before, or the point can be omitted.
+    uses_guess: bool,
     /// Replaces the initial guess in the last argument by a solution. The search begins with
     /// [`Discretization::begin_search`] if it does not continue with the states of Newton's method,
     /// and adds its iterations to those of the guess.
@@ -50,19 +50,19 @@ const FALLBACKS: &[Fallback] = &[
     Fallback {
         found_by: FoundBy::InteriorPoints,
         applies: Ports::has_forces,
-        between_orbits: true,
+        uses_guess: true,
         search: Discretization::interior_point_method,
     },
     Fallback {
         found_by: FoundBy::ProximalPoints,
         applies: Ports::has_forces,
-        between_orbits: true,
+        uses_guess: true,
         search: Discretization::proximal_point_method,
     },
     Fallback {
         found_by: FoundBy::SlipLimitHomotopy,
         applies: |_| true,
-        between_orbits: false,
+        uses_guess: false,
         search: Discretization::slip_limit_homotopy,
     },
 ];
@@ -74,7 +74,7 @@ pub(super) struct SearchSettings {
     pub iterations: usize,
     /// Residual at which Newton's method ends. The fallbacks ignore it.
     pub goal: StopCriterion,
-    /// True for an orbit between known ones. Only quick fallbacks follow.
+    /// True for an orbit between known ones. Only fallbacks that use the guess follow.
     pub between_orbits: bool,
 }
 
@@ -115,8 +115,8 @@ impl Discretization {
             Ok(()) => return Ok(motion),
             Err(failure) => failure,
         };
-        let follows =
-            |fallback: &&Fallback| (fallback.applies)(ports) && (fallback.between_orbits || !settings.between_orbits);
+        let near = settings.between_orbits || begin.found_by == FoundBy::TimeIntegration;
+        let follows = |fallback: &&Fallback| (fallback.applies)(ports) && (fallback.uses_guess || !near);
         for fallback in FALLBACKS.iter().filter(follows) {
             motion = HarmonicSolution { iterations: motion.iterations, ..begin.clone() };
             let found = (fallback.search)(self, ports, omega, &mut motion);
