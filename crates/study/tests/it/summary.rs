@@ -590,8 +590,8 @@ fn wedges_without_load() {
     let words = [
         "warning: `wedge_0.x`",
         "can move freely",
-        "`face1_0`, `face2_0`",
-        "and 18 more touch them",
+        "`face1_in_0`, `face1_out_0`",
+        "and 42 more touch them",
         "they have no preload",
     ];
     warns(&template("under-platform-wedge", &[edit, alone]), &words);
