@@ -683,6 +683,17 @@ fn resonances_without_damping() {
     assert!((free.free.elastic[0].damping - 0.01).abs() < 1e-12 && free.warnings.is_empty(), "{:?}", free.warnings);
 }
 
+/// A damping ratio that is probably percent is valid, with a warning that gives the text for
+/// percent.
+#[test]
+fn large_damping_ratios() {
+    let ratio = |text: &str| rubbing(JENKINS, &[("damping = \"2 N s/m\"", &format!("damping_ratio = {text}"))]);
+    warns(&ratio("2"), &["`damping_ratio` of spring 1 is 200 %", "write \"2 %\""]);
+    warns(&ratio("0.5"), &["is 50 %", "write \"0.5 %\""]);
+    silent(&ratio("\"2 %\""));
+    silent(&ratio("0.02"));
+}
+
 #[test]
 fn models_without_mass() {
     let massless = rubbing(JENKINS, &[("mass = \"1 kg\"", "mass = \"0 kg\"")]);
