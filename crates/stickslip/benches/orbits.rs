@@ -4,7 +4,7 @@
 use divan::Bencher;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::law::{Coulomb, CoulombArctan, Iwan, SharedLaw, Stribeck};
+use stickslip::law::{Coulomb, Coulomb2d, CoulombArctan, Iwan, Jenkins2d, SharedLaw, Stribeck};
 use stickslip::method::{Method, auto::Auto, event_driven::EventDriven, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System, example};
 use stickslip::orbit::Seed;
@@ -93,4 +93,43 @@ fn stribeck_orbit_warm(bencher: Bencher, hertz: u32) {
 fn iwan_orbit_warm(bencher: Bencher, elements: u32) {
     let law = Arc::new(Iwan { stiffness: 5e3, limit: 4.0, chi: -0.5, beta: 0.3, elements });
     warm(bencher, &mass(law), 17.0);
+}
+
+/// Two masses that move in a plane, with a law from each one to the ground.
+fn plane([of_a, of_b]: [SharedLaw; 2]) -> System {
+    let mass = |name: &str| Mass { directions: ["x", "y"].map(str::to_owned).to_vec(), ..Mass::new(name, 1.0) };
+    let spring =
+        |between: [&str; 2], stiffness: f64| Spring { between: between.map(str::to_owned), stiffness, damping: 2.0 };
+    let joint = |on: &str, law: SharedLaw| Joint {
+        name: format!("contact_{on}"),
+        between: [on.to_owned(), GROUND.to_owned()],
+        law,
+    };
+    let force = |on: &str, amplitude: f64, phase: f64| Force { on: on.to_owned(), amplitude, phase, harmonic: 1 };
+    let model = Model {
+        masses: vec![mass("a"), mass("b")],
+        springs: vec![
+            spring(["a.x", GROUND], 1e4),
+            spring(["a.y", GROUND], 1.5e4),
+            spring(["a.x", "b.x"], 1e4),
+            spring(["a.y", "b.y"], 1e4),
+        ],
+        joints: vec![joint("a", of_a), joint("b", of_b)],
+        forces: vec![force("b.x", 6.0, 0.0), force("b.y", 4.0, 1.2)],
+        ..Model::default()
+    };
+    model.assemble().unwrap()
+}
+
+/// Friction in a plane: rigid, with a tangential spring, and both in one model.
+#[divan::bench(args = ["coulomb-2d", "jenkins-2d", "coulomb-2d and jenkins-2d"], sample_count = 20)]
+fn plane_friction_orbit_warm(bencher: Bencher, laws: &str) {
+    let rigid: SharedLaw = Arc::new(Coulomb2d { limit: 1.0 });
+    let elastic: SharedLaw = Arc::new(Jenkins2d { stiffness: 2e4, limit: 2.0 });
+    let laws = match laws {
+        "coulomb-2d" => [rigid.clone(), rigid],
+        "jenkins-2d" => [elastic.clone(), elastic],
+        _ => [rigid, elastic],
+    };
+    warm(bencher, &plane(laws), 17.0);
 }

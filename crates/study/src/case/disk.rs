@@ -247,8 +247,8 @@ fn mistuned_sectors(
                 let changed = environment.values[*index].si * (1.0 + deviation);
                 let values = again(&[(*index, changed)]).map_err(|problem| vec![problem])?;
                 let mut problems = Vec::new();
-                let (model, ..) =
-                    build_model(structure, &Environment { names: environment.names, values }, &mut problems);
+                let changed = Environment { values, ..*environment };
+                let (model, ..) = build_model(structure, &changed, &mut problems);
                 if !problems.is_empty() {
                     problems.iter_mut().for_each(|problem| problem.message += &format!(" (sector {sector})"));
                     return Err(problems);

@@ -1,10 +1,12 @@
 //! Initial state of a transient: static equilibrium with some places held, or given
 //! displacements with unloaded joints.
 
+use crate::case::names::ModelNames;
 use crate::case::values::Values;
+use crate::kinds::info::KeyError;
 use std::collections::BTreeMap;
 use stickslip::method::StaticEquilibrium;
-use stickslip::model::{Axis, System};
+use stickslip::model::{Axis, Model, System};
 
 /// The values of the key `begin`.
 pub(crate) const EQUILIBRIUM: &str = "equilibrium";
@@ -20,6 +22,25 @@ pub(crate) fn begin_values() -> Vec<(&'static str, &'static str)> {
         ),
         (UNLOADED, "displacements as in `start`, zero elsewhere; joints carry no force"),
     ]
+}
+
+/// Checks the names in `start` and `start_velocity`. A place alone does not determine the velocity
+/// of its structure or body, nor its displacement without the equilibrium of the rest.
+pub(crate) fn check_names(values: &Values, model: &Model) -> Result<(), KeyError> {
+    let free = ModelNames::free_displacements(model);
+    for key in ["start", "start_velocity"] {
+        for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
+            free.single_label(key, "free mass or place", name)?;
+            let is_place = model.places.iter().any(|place| place.places().contains(name));
+            if is_place && (key != "start" || values.text("begin") == Some(UNLOADED)) {
+                let message =
+                    format!("the place `{name}` alone does not determine the motion of its structure or body");
+                let help = "hold it with `start` and begin = \"equilibrium\", or push it with a [[force]]";
+                return Err(KeyError::new(key, message, help));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The state in which a motion begins.

@@ -370,7 +370,7 @@ impl Study {
         let CompiledValue::Table(spin) = &table.entry("stiffened")?.value else { return None };
         let CompiledValue::Quantity { quantity: speed, .. } = &spin.entry("speed")?.value else { return None };
         let values = evaluate(&self.names, &self.parameters, &self.order, &self.value_indices(0), &[]).ok()?;
-        let environment = Environment { names: &self.names, values };
+        let environment = Environment { names: &self.names, parameters: &self.parameters, values };
         let at = spin.values(&environment, &mut Vec::new()).quantity("at")?;
         let rest = component.clone()?;
         let there = stiffened.as_ref()?.component_at(&rest, 1.0).ok()?.matrices().2.clone();
@@ -385,7 +385,7 @@ impl Study {
     /// Returns the values of `[figure]`.
     pub(crate) fn figure_values(&self) -> Values {
         // no key of `[figure]` takes a quantity
-        let environment = Environment { names: &self.names, values: Vec::new() };
+        let environment = Environment { names: &self.names, parameters: &[], values: Vec::new() };
         self.figure.values(&environment, &mut Vec::new())
     }
 
@@ -763,7 +763,7 @@ impl Study {
                 return None;
             }
         };
-        let environment = Environment { names: &self.names, values };
+        let environment = Environment { names: &self.names, parameters: &self.parameters, values };
         let reevaluate = |changed: &[(usize, f64)]| {
             let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();
             evaluate(&self.names, &self.parameters, &self.order, &choice, &fixed)
@@ -875,7 +875,8 @@ pub(crate) fn evaluate(
     choice: &HashMap<usize, (&VariedParameter, usize)>,
     fixed: &[(usize, f64)],
 ) -> Result<Vec<ExpressionValue>, Problem> {
-    let mut environment = Environment { names, values: vec![ExpressionValue::bare(f64::NAN); parameters.len()] };
+    let unknown = vec![ExpressionValue::bare(f64::NAN); parameters.len()];
+    let mut environment = Environment { names, parameters, values: unknown };
     for &index in order {
         let (parameter, name) = (&parameters[index], &names[index]);
         let dimension = parameter.dimension;

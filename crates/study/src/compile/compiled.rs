@@ -3,11 +3,13 @@
 
 use super::frequency_amplitude::FrequencyAmplitude;
 use super::torsion::of_rotation;
+use crate::case::study;
 use crate::case::values::{FitRange, Frequencies, ResolvedValue, Values};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::{Expression, ExpressionValue, dimension_text, quantity_text};
 use crate::syntax::key::Bounds;
-use std::collections::BTreeMap;
+use crate::syntax::suggest::excerpt;
+use std::collections::{BTreeMap, BTreeSet};
 use stickslip::dimension::Dimension;
 use stickslip::law::{LawError, LawInfo, Parameter, SharedLaw};
 
@@ -242,6 +244,8 @@ impl CompiledTable {
 /// The values of the parameters of one case, by index.
 pub(crate) struct Environment<'a> {
     pub names: &'a [String],
+    /// The parameters as stated; empty if errors need not name their places.
+    pub parameters: &'a [study::Parameter],
     pub values: Vec<ExpressionValue>,
 }
 
@@ -301,23 +305,40 @@ impl CompiledQuantity {
         example: &str,
         environment: &Environment<'_>,
     ) -> Result<f64, Problem> {
-        let number = value.written_as(&self.text, dimension).map_err(|(message, help)| {
-            let bare = self.expression.parameters().find(|i| environment.values[*i].dimension.is_none());
-            let help = help
-                .or_else(|| {
-                    let name = &environment.names[bare?];
-                    Some(format!(
-                        "`{name}` has no unit and counts as a pure number in this product; give it a unit in \
-                         [parameters]"
-                    ))
-                })
-                .or_else(|| (!example.is_empty()).then(|| format!("write it as in {key} = {example}")));
-            self.problem(key, message).maybe_help(help)
+        let number = value.written_as(&self.text, dimension).map_err(|(message, help)| match help {
+            Some(help) => self.problem(key, message).help(help),
+            None => self.dimension_problem(key, message, example, environment),
         })?;
         if number.is_finite() {
             return Ok(number);
         }
         Err(self.problem(key, "this is not a finite number"))
+    }
+
+    /// Returns the problem that this quantity has another dimension. If the expression uses one
+    /// parameter without a unit, the problem is at that parameter.
+    fn dimension_problem(&self, key: &str, message: String, example: &str, environment: &Environment<'_>) -> Problem {
+        let without_unit = |index: &usize| environment.values[*index].dimension.is_none();
+        let bare: BTreeSet<usize> = self.expression.parameters().filter(without_unit).collect();
+        let names: Vec<String> = bare.iter().map(|index| format!("`{}`", environment.names[*index])).collect();
+        let parameter = bare.first().filter(|_| bare.len() == 1).and_then(|index| environment.parameters.get(*index));
+        match (parameter, &names[..]) {
+            (Some(parameter), [name]) => {
+                let text = excerpt(self.text.trim());
+                let message = format!("{name} has no unit and counts as a pure number in `{key} = {text}`: {message}");
+                let help = format!("if {name} is a quantity, give it its unit here");
+                parameter.quantity.problem(name.trim_matches('`'), message).help(help)
+            }
+            (_, []) => {
+                let help = (!example.is_empty()).then(|| format!("write it as in {key} = {example}"));
+                self.problem(key, message).maybe_help(help)
+            }
+            _ => {
+                let names = names.join(", ");
+                let help = format!("{names} have no unit and count as pure numbers here; give units in [parameters]");
+                self.problem(key, message).help(help)
+            }
+        }
     }
 
     /// Returns the value of this quantity for the parameter `name`, in the dimension that the

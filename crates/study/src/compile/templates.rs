@@ -37,7 +37,6 @@ pub const TABLE: &[Template] = templates![
     "shroud",
     "rim-ring",
     "under-platform-wedge",
-    "under-platform-rocking-wedge",
     "under-platform-cylinder",
 ];
 

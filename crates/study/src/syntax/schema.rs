@@ -350,7 +350,7 @@ const PLACE: &[Key] = &[
     required("name", ValueType::Name, "name, for joints, forces and results", "\"tip\""),
     optional(
         "of",
-        ValueType::Text,
+        ValueType::Name,
         "the [[body]] of which it is a point or a face, with `offset`, `normal` or both; or the [[mass]] of which it \
          is a rotated face, with `normal`; needs no [structure]",
         "\"damper\"",

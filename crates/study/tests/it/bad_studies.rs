@@ -527,6 +527,31 @@ fn template_errors_name_user_parameters() {
     assert!(found.message().starts_with("the value of `m` makes"), "{found}");
 }
 
+/// An expression of the wrong dimension with one parameter without a unit: the error is at the
+/// parameter. With several, it is at the expression and names them.
+#[test]
+fn parameters_without_a_unit_are_the_place_of_the_error() {
+    let error = |parameters: &str, amplitude: &str| {
+        let text = format!(
+            "schema = 1\n[parameters]\n{parameters}\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\n\
+             stiffness = \"1 N/mm\"\ndamping = \"1 N s/m\"\n[[force]]\non = \"m\"\namplitude = \"{amplitude}\"\n[study]\nkind = \"response\"\n\
+             frequency = \"5 Hz\"\n"
+        );
+        read_study("study.toml", &text, &[]).unwrap_err()
+    };
+    let found = error("a = 2\nm0 = \"1 kg\"", "m0*a");
+    assert_eq!((found.line(), found.key(), found.underlined()), (Some(3), Some("a"), Some("2")), "{found}");
+    for words in ["`a` has no unit", "`amplitude = m0*a`", "expected force (N), found mass (kg)"] {
+        assert!(found.message().contains(words), "{found}");
+    }
+    let found = error("a = 2\nb = 3\nm0 = \"1 kg\"", "m0*a*b");
+    assert_eq!((found.key(), found.underlined()), (Some("amplitude"), Some("m0*a*b")), "{found}");
+    assert!(found.help_text().is_some_and(|help| help.contains("`a`, `b` have no unit")), "{found}");
+    // radians in excess
+    let found = error("e = \"1 mm\"", "10 g*e*frequency^2");
+    assert_eq!(found.help_text(), Some("2 radians are too many: divide by `(1 rad)^2`"), "{found}");
+}
+
 /// A mass on a spring with a joint, with some lines replaced.
 fn oscillator(edits: &[(&str, &str)]) -> String {
     let text = r#"schema = 1

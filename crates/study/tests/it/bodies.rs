@@ -423,7 +423,7 @@ fn errors_of_bodies_have_locations() {
 /// The templates of dampers under rotating platforms contain bodies.
 #[test]
 fn the_templates_of_dampers_have_bodies() {
-    for name in ["under-platform-cylinder", "under-platform-rocking-wedge"] {
+    for name in ["under-platform-cylinder", "under-platform-wedge"] {
         let text = templates::find(name).unwrap().study;
         let summary = ModelSummary::new(&read_study("damper.toml", text, &[]).unwrap()).unwrap();
         assert_eq!((summary.bodies.len(), summary.dofs), (1, 12 * 5), "{name}: {:?}", summary.bodies);

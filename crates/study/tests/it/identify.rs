@@ -234,6 +234,25 @@ fn a_ring_down_with_an_unknown_start() {
     }
 }
 
+/// The velocity of one point does not determine the motion of its body: it is refused before the
+/// run, as in a transient.
+#[test]
+fn a_place_has_no_start_velocity() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("data.csv"), "time_s,response_m\n0,1\n1,0.5\n2,0.2\n").expect("the data");
+    let bar = "[[body]]\nname = \"bar\"\nmass = \"1 kg\"\ninertia = \"0.01 kg m^2\"\ndirections = [\"x\", \"z\"]\n\
+               [[spring]]\nbetween = [\"bar.z\", \"m\"]\nstiffness = \"1 N/mm\"\n\
+               [[place]]\nname = \"tip\"\nof = \"bar\"\noffset = [\"0.1 m\", 0, 0]\n";
+    let targets = format!(
+        "{FIT}start_velocity = {{ \"tip.z\" = \"1 m/s\" }}\n\
+         targets = [{{ data = \"test\", is = \"ring-down\", at = \"m\" }}]"
+    );
+    let name = folder.path().join("study.toml").display().to_string();
+    let error = read_study(&name, &oscillator(&targets, bar), &[]).map(|_| ()).unwrap_err();
+    assert_eq!(error.key(), Some("start_velocity"), "{error}");
+    assert!(error.message().contains("the place `tip.z` alone does not determine the motion"), "{error}");
+}
+
 /// Backbone of a hardening spring: `ω² = k/m + 3/4 b a²/m` to first order.
 #[test]
 fn a_backbone_of_a_hardening_spring() {

@@ -13,6 +13,7 @@
 //! - `initial_states`: transients that begin with held places;
 //! - `key_examples`: the example of every key;
 //! - `laws_and_kinds`: every law in every study kind;
+//! - `loose_wedges`: dampers that only contacts and a constant force hold;
 //! - `maps`: the peak over two parameters;
 //! - `meshes`: places on sets of a mesh, and contacts from geometry;
 //! - `nodes`: nodes with several directions;
@@ -41,6 +42,7 @@ mod incomplete_models;
 mod initial_states;
 mod key_examples;
 mod laws_and_kinds;
+mod loose_wedges;
 mod maps;
 mod meshes;
 mod nodes;

@@ -590,8 +590,8 @@ fn wedges_without_load() {
     let words = [
         "warning: `wedge_0.x`",
         "can move freely",
-        "`face1_0`, `face2_0`",
-        "and 18 more touch them",
+        "`face1_in_0`, `face1_out_0`",
+        "and 42 more touch them",
         "they have no preload",
     ];
     warns(&template("under-platform-wedge", &[edit, alone]), &words);
@@ -681,6 +681,17 @@ fn resonances_without_damping() {
     let lugre = "kind = \"lugre\", stiffness = \"2 N/mm\", viscous = \"2 N s/m\", limit = \"1 N\", static_limit = \"1 N\", velocity = \"1 mm/s\"";
     let free = summary(&rubbing(lugre, &undamped));
     assert!((free.free.elastic[0].damping - 0.01).abs() < 1e-12 && free.warnings.is_empty(), "{:?}", free.warnings);
+}
+
+/// A damping ratio that is probably percent is valid, with a warning that gives the text for
+/// percent.
+#[test]
+fn large_damping_ratios() {
+    let ratio = |text: &str| rubbing(JENKINS, &[("damping = \"2 N s/m\"", &format!("damping_ratio = {text}"))]);
+    warns(&ratio("2"), &["`damping_ratio` of spring 1 is 200 %", "write \"2 %\""]);
+    warns(&ratio("0.5"), &["is 50 %", "write \"0.5 %\""]);
+    silent(&ratio("\"2 %\""));
+    silent(&ratio("0.02"));
 }
 
 #[test]

@@ -155,11 +155,25 @@ impl StructureSummary {
 
 /// Returns the mass in a unit translation along `along`, in the units of the matrix.
 ///
-/// All rows of that direction (`449.x`) move by one. Returns `None` if no row name has the
-/// direction.
+/// All rows of that direction (`449.x`) move by one, except internal variables, whose node
+/// number is negative (`-3.x`). Returns `None` if no row name has the direction.
 pub fn mass_along(rows: &[String], mass: &SparseMatrix, along: &str) -> Option<f64> {
-    let moves = |name: &String| f64::from(name.rsplit_once('.').is_some_and(|(_, direction)| direction == along));
-    let motion: Vec<f64> = rows.iter().map(moves).collect();
+    let is_moved = |(node, direction): (&str, &str)| direction == along && !node.starts_with('-');
+    let motion: Vec<f64> = rows.iter().map(|name| f64::from(name.rsplit_once('.').is_some_and(is_moved))).collect();
     let moved = motion.contains(&1.0);
     moved.then(|| mass.multiply(&motion).iter().zip(&motion).map(|(force, motion)| force * motion).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of an internal variable do not move with the structure.
+    #[test]
+    fn internal_variables_have_no_mass_along_a_direction() {
+        let rows = ["7.x", "7.y", "-1.x"].map(str::to_owned);
+        let mass = SparseMatrix::from_triplets(3, [(0, 0, 2.0), (1, 1, 2.0), (2, 2, 1.0), (2, 0, 0.5)]).unwrap();
+        assert_eq!(mass_along(&rows, &mass, "x"), Some(2.0));
+        assert_eq!(mass_along(&rows, &mass, "z"), None);
+    }
 }

@@ -7,6 +7,7 @@ use crate::compile::compiled::{CompiledTable, Environment};
 use crate::results::notes::WARNING;
 use crate::syntax::expression::quantity_text;
 use crate::syntax::format::format_significant;
+use crate::syntax::key::DAMPING_RATIO;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
@@ -28,6 +29,7 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -
     if let Some(environment) = first_values(study) {
         warnings.extend(bare_numbers(study, &environment));
         warnings.extend(bare_angles(study, &environment));
+        warnings.extend(large_damping_ratios(study, &environment));
     }
     warnings.extend(no_references(study, cases));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
@@ -301,7 +303,7 @@ fn likely_unit(dimension: Option<Dimension>, si: f64, with_pi: bool) -> Option<(
 fn first_values(study: &Study) -> Option<Environment<'_>> {
     let choice: HashMap<_, _> = study.varied.iter().map(|varied| (varied.index, (varied, 0))).collect();
     let values = evaluate(&study.names, &study.parameters, &study.order, &choice, &[]).ok()?;
-    Some(Environment { names: &study.names, values })
+    Some(Environment { names: &study.names, parameters: &study.parameters, values })
 }
 
 /// Warns of bare parameters in `sin`, `cos` or `tan` that exceed a turn in radians: they are
@@ -325,6 +327,32 @@ fn bare_angles(study: &Study, first: &Environment<'_>) -> Vec<String> {
         )
     };
     turned.into_iter().filter(bare).take(MAX_NAMED).map(sentence).collect()
+}
+
+/// Warns of damping ratios that are too large for a vibrating structure: they are probably
+/// percent.
+fn large_damping_ratios(study: &Study, first: &Environment<'_>) -> Option<String> {
+    // Elastomer mounts reach 0.2. Values above it are rare, and usually percent without their sign.
+    let plausible = 0.2;
+    let matrices = study.structure.matrices.as_ref().map(|matrices| ("structure".to_owned(), &matrices.table));
+    let springs = study.structure.lists.spring.iter().enumerate();
+    let springs = springs.map(|(index, table)| (format!("spring {}", index + 1), table));
+    let mut found = Vec::new();
+    for (owner, table) in springs.chain(matrices) {
+        table.each_quantity(&mut |key, quantity, _| {
+            if ![DAMPING_RATIO, "modal_damping"].contains(&key) {
+                return;
+            }
+            let Some(ratio) = quantity.value(key, first).ok().map(|value| value.si).filter(|si| *si > plausible) else {
+                return;
+            };
+            found.push((format!("`{key}` of {owner}"), ratio));
+        });
+    }
+    let (what, ratio) = found.first()?;
+    let others = if found.len() > 1 { format!(" (and {} more)", found.len() - 1) } else { String::new() };
+    let (percent, bare) = (format_significant(100.0 * ratio, 4), quantity_text(*ratio, None));
+    Some(format!("{what} is {percent} %{others}; if {bare} % is meant, write \"{bare} %\""))
 }
 
 /// Warns of bare numbers whose unit is easily mistaken: angles count as radians, lengths as

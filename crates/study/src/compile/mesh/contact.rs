@@ -84,7 +84,7 @@ impl SectorRotation {
 }
 
 /// The environment of values that no parameter may change.
-const NO_PARAMETERS: Environment<'static> = Environment { names: &[], values: Vec::new() };
+const NO_PARAMETERS: Environment<'static> = Environment { names: &[], parameters: &[], values: Vec::new() };
 
 /// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;

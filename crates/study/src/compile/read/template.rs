@@ -127,7 +127,7 @@ impl CompiledTemplate {
 
     /// Builds the model; `fixed` parameters have the given value, SI.
     fn model(&self, fixed: &[(usize, f64)]) -> Result<Model, StudyError> {
-        let environment = Environment { names: &self.names, values: self.values(fixed)? };
+        let environment = Environment { names: &self.names, parameters: &self.parameters, values: self.values(fixed)? };
         let mut problems = Vec::new();
         let reevaluate = |changed: &[(usize, f64)]| {
             let fixed: Vec<_> = fixed.iter().chain(changed).copied().collect();

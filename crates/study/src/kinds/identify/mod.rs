@@ -33,7 +33,7 @@ mod tables;
 mod targets;
 mod weight;
 
-use crate::case::initial_state::begin_values;
+use crate::case::initial_state::{self, begin_values};
 use crate::case::study::Study;
 use crate::case::values::Values;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
@@ -214,7 +214,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     for target in values.tables("targets").unwrap_or_default() {
         targets::check(target, values, model)?;
     }
-    Ok(())
+    initial_state::check_names(values, model)
 }
 
 /// Checks the targets of a study together with their data.

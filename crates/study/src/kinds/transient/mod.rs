@@ -8,8 +8,7 @@ mod signal;
 
 use super::orbit::write_sample;
 use super::shared::keys::MAX_SAMPLES;
-use crate::case::initial_state::{Start, UNLOADED, begin_values};
-use crate::case::names::ModelNames;
+use crate::case::initial_state::{self, Start, begin_values};
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::motion_warnings;
@@ -182,19 +181,7 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     // Largest number of samples of one transient.
     let max_steps = 1e7;
-    let free = ModelNames::free_displacements(model);
-    for key in ["start", "start_velocity"] {
-        for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
-            free.single_label(key, "free mass or place", name)?;
-            let is_place = model.places.iter().any(|place| place.places().contains(name));
-            if is_place && (key != "start" || values.text("begin") == Some(UNLOADED)) {
-                let message =
-                    format!("the place `{name}` alone does not determine the motion of its structure or body");
-                let help = "hold it with `start` and begin = \"equilibrium\", or push it with a [[force]]";
-                return Err(KeyError::new(key, message, help));
-            }
-        }
-    }
+    initial_state::check_names(values, model)?;
     let unknown =
         values.names("also").unwrap_or_default().iter().find(|name| !further_tables::ALL.contains(&name.as_str()));
     if let Some(name) = unknown {

@@ -211,7 +211,7 @@ fn environment<'a>(study: &'a Study, case: &Case) -> Environment<'a> {
         Some((si, None)) => ExpressionValue::bare(*si),
         None => ExpressionValue::bare(f64::NAN),
     };
-    Environment { names: &study.names, values: study.names.iter().map(value).collect() }
+    Environment { names: &study.names, parameters: &study.parameters, values: study.names.iter().map(value).collect() }
 }
 
 /// Reads a column over time. An error has the key to which it belongs.

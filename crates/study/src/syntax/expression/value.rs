@@ -49,8 +49,7 @@ impl ExpressionValue {
                  or by `1 rev`"
                     .to_owned(),
             ),
-            (true, std::cmp::Ordering::Greater) => Some("a radian is missing: multiply by `1 rad`".to_owned()),
-            (true, std::cmp::Ordering::Less) => Some("there is one radian too many: divide by `1 rad`".to_owned()),
+            (true, order) if order.is_ne() => Some(radian_advice(expected.rad - found.rad)),
             _ => dimension_advice::dimension_advice(expected, found, text),
         };
         Err((format!("expected {}, found {}", dimension_text(expected), dimension_text(found)), help))
@@ -65,6 +64,17 @@ impl ExpressionValue {
             ));
         }
         Ok(if counts_cycles { self.si * TAU } else { self.si })
+    }
+}
+
+/// Returns the advice to multiply by radians, as many as are missing; a negative number are too
+/// many.
+fn radian_advice(missing: i8) -> String {
+    let what = if missing > 0 { "missing: multiply by" } else { "too many: divide by" };
+    match missing.unsigned_abs() {
+        1 if missing > 0 => "a radian is missing: multiply by `1 rad`".to_owned(),
+        1 => "there is one radian too many: divide by `1 rad`".to_owned(),
+        count => format!("{count} radians are {what} `(1 rad)^{count}`"),
     }
 }
 

@@ -1,0 +1,176 @@
+//! Dampers that only contacts and a constant force hold, in study files, against the linear
+//! structure with stuck contacts (NumPy) and an integration in time (own program in C).
+
+use stickslip_study::dataset::{Dataset, Table};
+use stickslip_study::read_study;
+use stickslip_study::run::{Context, run};
+
+fn dataset(text: &str) -> Dataset {
+    let found = run(&read_study("study.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
+    assert!(found.failures.is_empty(), "{:?}", found.failures);
+    found
+}
+
+fn numbers<'a>(found: &'a Dataset, table: &str, column: &str) -> &'a [f64] {
+    let table: &Table = found.tables.iter().find(|found| found.name == table).unwrap();
+    table.numbers(column).unwrap_or_else(|| panic!("no column {column}"))
+}
+
+/// A wedge of 12 g between a blade and a heavy wall, pressed with 500 N on faces at 40 degrees.
+fn wedge_on_a_wall(study: &str) -> Dataset {
+    dataset(&format!(
+        r#"schema = 1
+[[mass]]
+name = "blade"
+mass = "250 g"
+directions = ["x", "z"]
+[[mass]]
+name = "wall"
+mass = "1000 kg"
+directions = ["x", "z"]
+[[mass]]
+name = "wedge"
+mass = "12 g"
+directions = ["x", "z"]
+[[spring]]
+between = ["blade.x", "ground"]
+stiffness = "160 N/mm"
+damping = "20 N s/m"
+[[spring]]
+between = ["blade.z", "ground"]
+stiffness = "20 kN/mm"
+damping = "50 N s/m"
+[[spring]]
+between = ["wall.x", "ground"]
+stiffness = "200 kN/mm"
+damping = "500 kN s/m"
+[[spring]]
+between = ["wall.z", "ground"]
+stiffness = "200 kN/mm"
+damping = "500 kN s/m"
+[[place]]
+name = "left"
+of = "wedge"
+normal = ["-cos(40 deg)", 0, "sin(40 deg)"]
+[[place]]
+name = "right"
+of = "wedge"
+normal = ["cos(40 deg)", 0, "sin(40 deg)"]
+[[place]]
+name = "on_blade"
+of = "blade"
+normal = ["-cos(40 deg)", 0, "sin(40 deg)"]
+[[place]]
+name = "on_wall"
+of = "wall"
+normal = ["cos(40 deg)", 0, "sin(40 deg)"]
+[[joint]]
+name = "blade_face"
+between = ["left", "on_blade"]
+law = {{ kind = "friction-contact", tangential = "15 N/um", normal = "20 N/um", friction = 0.25 }}
+[[joint]]
+name = "wall_face"
+between = ["right", "on_wall"]
+law = {{ kind = "friction-contact", tangential = "15 N/um", normal = "20 N/um", friction = 0.25 }}
+[[force]]
+on = "wedge.z"
+amplitude = "500 N"
+harmonic = 0
+[[force]]
+on = "blade.x"
+amplitude = "3 N"
+[study]
+{study}"#
+    ))
+}
+
+/// Both contacts stick, so that the response is that of the structure of six linear degrees of
+/// freedom.
+#[test]
+fn a_pressed_wedge_sticks_at_small_forces() {
+    let found = wedge_on_a_wall(
+        "kind = \"response\"\nfrequency = [\"100 Hz\", \"150 Hz\", \"200 Hz\", \"250 Hz\", \"300 Hz\"]\n",
+    );
+    let expected = [3.348_397_6e-7, 3.408_396_4e-7, 3.489_750_6e-7, 3.590_352_4e-7, 3.716_606_5e-7];
+    for (found, expected) in numbers(&found, "curve", "blade_x_amplitude_m").iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+    }
+}
+
+/// In time, the wedge settles to the same motion. It begins in static equilibrium under its load.
+#[test]
+fn a_pressed_wedge_settles_in_time() {
+    let study =
+        "kind = \"transient\"\nfrequency = \"200 Hz\"\nbegin = \"equilibrium\"\ncycles = 28\nsamples_per_cycle = 32\n";
+    let found = wedge_on_a_wall(study);
+    let motion = numbers(&found, "motion", "blade_x_displacement_m");
+    let last = &motion[motion.len() - 33..];
+    let (low, high) = last.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    let amplitude = 0.5 * (high - low);
+    assert!((amplitude / 3.489_750_6e-7 - 1.0).abs() < 1e-3, "{amplitude}");
+}
+
+/// Two blades with a roof damper under their platforms at 1000 rpm. Five digits of half the
+/// peak-to-peak motion of the first blade, by the integration in time; the contacts stick.
+#[test]
+fn a_roof_damper_between_two_blades() {
+    let found = dataset(
+        r#"schema = 1
+[parameters]
+md = "12 g"
+load = "md * 320 mm * (1000 rpm/(1 rad))^2"
+[[mass]]
+repeat = { i = 2 }
+name = "blade{i}"
+mass = "250 g"
+directions = ["x", "z"]
+[[spring]]
+repeat = { i = 2 }
+between = ["blade{i}.x", "ground"]
+stiffness = "160 N/mm"
+damping = "0.5 N s/m"
+[[spring]]
+repeat = { i = 2 }
+between = ["blade{i}.z", "ground"]
+stiffness = "20 kN/mm"
+damping = "5 N s/m"
+[[mass]]
+name = "roof"
+mass = "md"
+directions = ["x", "z"]
+[[place]]
+repeat = { i = 2 }
+name = "side{i}"
+of = "roof"
+normal = ["(2*i - 3)*cos(40 deg)", 0, "sin(40 deg)"]
+[[place]]
+repeat = { i = 2 }
+name = "platform{i}"
+of = "blade{i}"
+normal = ["(2*i - 3)*cos(40 deg)", 0, "sin(40 deg)"]
+[[joint]]
+repeat = { i = 2 }
+name = "face{i}"
+between = ["side{i}", "platform{i}"]
+law = { kind = "friction-contact", tangential = "15 N/um", normal = "20 N/um", friction = 0.25 }
+[[force]]
+on = "roof.z"
+amplitude = "load"
+harmonic = 0
+[[force]]
+on = "blade1.x"
+amplitude = "3 N"
+[[force]]
+on = "blade2.x"
+amplitude = "3 N"
+phase = "-150 deg"
+[study]
+kind = "response"
+frequency = ["120 Hz", "150 Hz", "165 Hz", "175.5 Hz"]
+"#,
+    );
+    let expected = [53.652e-6, 11.520e-6, 6.7442e-6, 5.1345e-6];
+    for (found, expected) in numbers(&found, "curve", "blade1_x_amplitude_m").iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 5e-5, "{found} {expected}");
+    }
+}
