@@ -2,6 +2,7 @@
 
 import { run } from "./api.js";
 import { byId, make, message, perFrame } from "./dom.js";
+import { PALE } from "./follow.js";
 import { digits, duration } from "./format.js";
 import { draggable, draw, legend, pixel } from "./plot.js";
 import { changeList, on, state, tell } from "./store.js";
@@ -116,7 +117,7 @@ async function compute(moving, asked = false) {
     });
     clearTimeout(late);
     if (event === null) { return; }
-    take(event, reduced !== null, (performance.now() - begun) / 1000);
+    take(event, { moving, reduced: reduced !== null }, (performance.now() - begun) / 1000);
   } catch (error) {
     place.classList.remove("stale");
     status.textContent = "";
@@ -134,8 +135,8 @@ function remaining(done, all, time) {
   return seconds > 2 ? `, ${duration(seconds)} left` : "";
 }
 
-/** @param {any} event @param {boolean} reduced @param {number} seconds */
-function take(event, reduced, seconds) {
+/** @param {any} event @param {{moving: boolean, reduced: boolean}} how @param {number} seconds */
+function take(event, { moving, reduced }, seconds) {
   partial = null;
   place.classList.remove("stale");
   if (event.event === "expect") {
@@ -157,8 +158,9 @@ function take(event, reduced, seconds) {
   empty.hidden = true;
   place.hidden = false;
   if (!reduced) { cost = { seconds, points: state.description.points }; }
-  if (!reduced && state.result && !state.result.reduced) { previous = state.result; }
-  state.result = { ...event, reduced };
+  // the pale curve is the last one at rest
+  if (state.result && !state.result.moving) { previous = state.result; }
+  state.result = { ...event, reduced, moving };
   hint.hidden = !hasOrbits();
   status.textContent = reduced ? "fewer points while moving" : duration(seconds);
   show();
@@ -186,14 +188,13 @@ const show = perFrame(() => {
   const shown = partial ?? state.result;
   if (!shown || place.closest("[hidden]")) { return; }
   const { plot } = shown;
-  legend(legendPlace, plot, place);
-  for (const pin of state.pins) { legendPlace.append(make("span", { class: "pin", text: `– – ${pin.name}` })); }
+  legend(legendPlace, plot, place, state.pins.map((/** @type {any} */ pin) => pin.name));
   const behind = pinned();
-  if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: 0.28 }); }
+  if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: PALE }); }
   // the figure fills the window; on a narrow page it leaves room for the parameters
   const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - 110;
   const height = window.innerWidth < 820 ? plot.narrow?.height ?? 340 : Math.max(340, free);
-  draw(place, plot, { behind, shapes: markers(plot), height }).then(drawn);
+  draw(place, plot, { behind, shapes: markers(plot), height, moving: shown.moving === true }).then(drawn);
 });
 
 /** The vertical lines at the marked frequency. @param {any} plot */

@@ -26,6 +26,7 @@ const MODULES: &[(&str, &str)] = modules![
     "api.js",
     "dom.js",
     "design.js",
+    "follow.js",
     "format.js",
     "gallery.js",
     "mistuning.js",

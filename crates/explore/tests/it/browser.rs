@@ -475,6 +475,21 @@ fn a_map_can_be_stopped() {
     browser.wait_long("document.querySelector('#design-performance').data?.length > 0");
 }
 
+/// While a slider moves, only the paths of the curves change; the rest follows when it stops.
+#[test]
+fn curves_follow_a_moving_slider_and_settle() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    let path = "document.querySelector('#response-plot .scatterlayer .trace path.js-line')?.getAttribute('d')";
+    let first = browser.text(path);
+    browser.evaluate("performance.clearMarks(); const moving = document.getElementById('q-parameters-F0-slider'); moving.value = 480; moving.dispatchEvent(new Event('input')); true");
+    browser.wait(&format!("{path} !== '{first}'"));
+    // it rests: nothing of the movement stays, and the data are those of the new curve
+    browser.wait_long("document.querySelector('#panel-response .state').textContent.match(/^[0-9.]+ m?s$/) && document.querySelectorAll('path.before').length === 0");
+    browser.wait("document.querySelectorAll('#response-plot .trace[style*=visibility]').length === 0");
+    browser.check_clean();
+}
+
 /// The rules of axe-core for every tab, light and dark. `STICKSLIP_AXE` names its script, which
 /// `.ci/explorer` fetches.
 #[test]
