@@ -39,6 +39,7 @@ const MODULES: &[(&str, &str)] = modules![
     "plot.js",
     "response.js",
     "scene.js",
+    "solid.js",
     "store.js",
     "trust.js",
 ];

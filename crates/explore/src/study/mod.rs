@@ -6,6 +6,7 @@
 //! - `view`: what is computed: the study itself, an orbit, a performance curve or a map;
 //! - `description`: a study for the page: its quantities, its cases and its model;
 //! - `answer`: the results of a run for the page;
+//! - `solid`: the motion of a structure with a mesh, as a surface in three dimensions;
 //! - `measured`: measured curves of `[[data]]`, drawn with the computed ones;
 //! - `response_quantity`: curves of velocities, accelerations, receptances and joint quantities.
 
@@ -16,4 +17,5 @@ pub(crate) mod description;
 pub(crate) mod measured;
 pub mod quantities;
 pub mod response_quantity;
+pub(crate) mod solid;
 pub mod view;

@@ -34,6 +34,8 @@ pub enum View {
         /// Values of the varied parameters.
         #[serde(default)]
         case: Vec<Fixed>,
+        /// Instants of the period at which the displacements of all nodes of a mesh are computed.
+        fields: Option<i64>,
     },
     /// The peak over one parameter.
     Performance {
@@ -130,13 +132,16 @@ pub fn show(document: &mut DocumentMut, view: &View, settings: &ViewSettings) ->
                 set_figure(document, "panels", Value::from(panels));
             }
         }
-        View::Orbit { frequency, case } => {
+        View::Orbit { frequency, case, fields } => {
             let old = document.get("study").and_then(Item::as_table_like).ok_or_else(missing)?;
             let mut study = Table::new();
             study.insert("kind", value("orbit"));
             study.insert("frequency", value(format!("{frequency:?} Hz")));
             study.insert("samples", value(settings.samples));
             study.insert("multipliers", value(true));
+            if let Some(instants) = fields {
+                study.insert("fields", value(*instants));
+            }
             study.insert("output", Item::Value(Value::Array(["harmonics", "contact"].into_iter().collect())));
             let varied = old.get("vary").and_then(Item::as_table_like);
             let mut fixed = InlineTable::new();
@@ -371,7 +376,7 @@ mod tests {
         let row = 241 * 2 + 100;
         let frequency = table.numbers("frequency_Hz").unwrap()[row];
         let case = vec![Fixed { name: "Ft".into(), value: "6 N".into() }];
-        let orbit = run(&shown(&View::Orbit { frequency, case }), &Context::without_progress(1)).unwrap();
+        let orbit = run(&shown(&View::Orbit { frequency, case, fields: None }), &Context::without_progress(1)).unwrap();
         let found = orbit.tables.iter().find(|table| table.name == "orbits").unwrap();
         let [a, b] =
             [table.numbers("blade1_amplitude_m").unwrap()[row], found.numbers("blade1_amplitude_m").unwrap()[0]];

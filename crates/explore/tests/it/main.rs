@@ -5,7 +5,8 @@
 //! - `latency`: times in the browser, on request;
 //! - `live`: structures that stay in memory, and searches that stop;
 //! - `load`: the server under load, on request;
-//! - `server`: requests, limits and errors.
+//! - `server`: requests, limits and errors;
+//! - `solid`: structures with a mesh.
 
 mod browser;
 mod chromium;
@@ -13,3 +14,4 @@ mod latency;
 mod live;
 mod load;
 mod server;
+mod solid;
