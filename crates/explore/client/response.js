@@ -2,6 +2,7 @@
 
 import { run } from "./api.js";
 import { byId, make, message, perFrame } from "./dom.js";
+import * as fit from "./fit.js";
 import { PALE } from "./follow.js";
 import { digits, duration } from "./format.js";
 import { draggable, draw, legend, pixel } from "./plot.js";
@@ -14,7 +15,7 @@ const PATIENCE = 2;
 /** Pause of a slider after which the full curve is computed, ms. */
 const REST = 160;
 
-let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty;
+let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty, fitted;
 /** Time of the last full run, s, and its number of points. */
 let cost = { seconds: 0, points: 0 };
 /** The curve before the last change. @type {any} */
@@ -41,12 +42,13 @@ export function start(panel) {
   place = make("div", { class: "plot", id: "response-plot" });
   button = make("button", { type: "button", class: "primary", text: "Compute", hidden: true, onclick: () => { waiting = false; compute(false, true); } });
   empty = make("div", { class: "empty", hidden: true }, make("p", {}), button);
+  fitted = make("div", {});
   hint = make("p", { class: "hint", text: "Click the curve to see its orbit. Drag the vertical marker to another frequency." });
   panel.append(
     make("div", { class: "tools" },
       make("label", { class: "only-response" }, "Show", quantity), make("label", { class: "only-response" }, "Panels", panels), make("label", { class: "only-response" }, logarithmic, "logarithmic"),
       make("button", { type: "button", class: "only-response", id: "pin", text: "Pin this curve", onclick: () => tell("pin") }), status),
-    legendPlace, empty, place, hint);
+    legendPlace, empty, place, hint, fitted);
   place.addEventListener("redraw", () => show());
   place.addEventListener("tap", (/** @type {CustomEvent} */ event) => {
     const at = event.detail;
@@ -54,7 +56,7 @@ export function start(panel) {
     tell("show", "orbit");
   });
   draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
-  on("opened", () => { previous = partial = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
+  on("opened", () => { previous = partial = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
   on("moving", () => compute(true));
   on("changed", () => compute(false));
   on("theme", () => show());
@@ -163,6 +165,7 @@ function take(event, { moving, reduced }, seconds) {
   state.result = { ...event, reduced, moving };
   hint.hidden = !hasOrbits();
   status.textContent = reduced ? "fewer points while moving" : duration(seconds);
+  fitted.replaceChildren(...(event.fitted ? [fit.table(event)] : []));
   show();
   tell("result", state.result);
 }

@@ -26,6 +26,7 @@ const MODULES: &[(&str, &str)] = modules![
     "api.js",
     "dom.js",
     "design.js",
+    "fit.js",
     "follow.js",
     "format.js",
     "gallery.js",

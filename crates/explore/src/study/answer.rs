@@ -2,6 +2,7 @@
 //! how far to trust them.
 
 use super::description::cases;
+use super::fit;
 use super::measured;
 use super::response_quantity::ResponseQuantity;
 use super::solid;
@@ -44,6 +45,7 @@ pub fn answer(study: &Study, dataset: &Dataset, tables: Tables, quantity: Option
         "plot": html::plot(&figure),
         "cases": cases(study),
         "tables": tables_json(&dataset.tables, tables),
+        "fitted": fit::fitted(study, dataset),
         "solid": (tables == Tables::Motion).then(|| solid::solid(dataset)),
         "notes": dataset.notes,
         "failures": dataset.failures.iter().take(NAMED_FAILURES).collect::<Vec<_>>(),

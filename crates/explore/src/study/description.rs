@@ -2,6 +2,7 @@
 //! from.
 
 use super::catalog::Source;
+use super::fit;
 use super::quantities::quantities;
 use super::solid;
 use serde_json::{Value, json};
@@ -42,6 +43,7 @@ pub(crate) fn describe(study: &Study, document: &DocumentMut) -> Value {
         "model": case.as_ref().map(|case| &case.model),
         "places": case.as_ref().and_then(|case| Some(case.model.assemble().ok()?.places().to_vec())),
         "fields": solid::instants(study),
+        "targets": fit::targets(study),
         "laws": laws,
     })
 }

@@ -7,6 +7,7 @@
 //! - `description`: a study for the page: its quantities, its cases and its model;
 //! - `answer`: the results of a run for the page;
 //! - `solid`: the motion of a structure with a mesh, as a surface in three dimensions;
+//! - `fit`: fits to measured data;
 //! - `measured`: measured curves of `[[data]]`, drawn with the computed ones;
 //! - `response_quantity`: curves of velocities, accelerations, receptances and joint quantities.
 
@@ -14,6 +15,7 @@ pub mod answer;
 pub mod catalog;
 pub mod change;
 pub(crate) mod description;
+pub mod fit;
 pub(crate) mod measured;
 pub mod quantities;
 pub mod response_quantity;

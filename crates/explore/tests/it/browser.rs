@@ -4,7 +4,7 @@
 //! `STICKSLIP_SCREENSHOTS=FOLDER` writes a picture of every view.
 
 use crate::chromium::{self, Browser};
-use crate::solid;
+use crate::{fit, solid};
 use std::path::Path;
 use stickslip_explore::{Server, Settings, Start};
 use stickslip_study::run::{Context, run};
@@ -497,6 +497,29 @@ fn a_structure_with_a_mesh_turns_in_three_dimensions() {
     assert!(large > 1.1 * turned, "{turned} {large}");
     assert_eq!(browser.text("document.getElementById('solid-colour').value"), "state");
     browser.picture("solid");
+    browser.check_clean();
+}
+
+/// A fit starts at the sliders, shows errors, and moves the sliders to its values.
+#[test]
+fn a_fit_moves_the_sliders_to_the_measured_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some((_server, mut browser)) = open(Start::File(fit::rig(folder.path()))) else { return };
+    browser.wait_long("document.querySelector('#response-plot')?.data?.some((t) => t.name === 'measured: rig')");
+    browser.evaluate("document.getElementById('tab-design').click()");
+    assert_eq!(
+        browser.text("document.getElementById('fit-target').selectedOptions[0].textContent"),
+        "rig: response of body"
+    );
+    browser.evaluate("document.getElementById('compute-fit').click()");
+    browser.wait_long("document.querySelector('#panel-design table.fitted tbody tr')");
+    browser.wait("document.querySelector('#design-fit').data?.length > 0");
+    browser.picture("fit");
+    browser.evaluate("document.querySelector('#panel-design button.take').click()");
+    browser.wait(&format!(
+        "Math.abs(document.getElementById('q-parameters-Ft').value / {} - 1) < 1e-4 && document.querySelectorAll('.row.changed').length >= 1",
+        fit::LIMIT
+    ));
     browser.check_clean();
 }
 

@@ -2,6 +2,7 @@
 //!
 //! - `browser`: the page in Chromium;
 //! - `chromium`: drives the browser;
+//! - `fit`: fits to measured data;
 //! - `latency`: times in the browser, on request;
 //! - `live`: structures that stay in memory, and searches that stop;
 //! - `load`: the server under load, on request;
@@ -10,6 +11,7 @@
 
 mod browser;
 mod chromium;
+mod fit;
 mod latency;
 mod live;
 mod load;

@@ -549,6 +549,11 @@ impl Study {
         self.data.iter().find(|known| known.name == table)?.values(role, dimension).ok()
     }
 
+    /// Returns the title of a column of a table of `[[data]]`. `role` is its use or its name.
+    pub fn data_title(&self, table: &str, role: &str) -> Option<String> {
+        self.data.iter().find(|known| known.name == table)?.title(role)
+    }
+
     /// Returns a checksum of the matrices of `[structure]` and of the sector's files; `None`
     /// without matrices.
     pub fn matrices_checksum(&self) -> Option<String> {
