@@ -4,6 +4,7 @@
 import { run, stop } from "./api.js";
 import { make, perFrame } from "./dom.js";
 import { digits, duration, si } from "./format.js";
+import * as fit from "./fit.js";
 import * as mistuning from "./mistuning.js";
 import { draggable, draw, legend, pixel } from "./plot.js";
 import { change, changeList, commit, keyOf, on, quantityText, setQuantity, state, tell } from "./store.js";
@@ -22,6 +23,7 @@ export function start(place) {
   panel.append(empty, body);
   searches.push(search("performance", "Peak over one parameter", ["x"]), search("map", "Peak over two parameters", ["x", "y"]));
   mistuning.start(body);
+  fit.start(body);
   on("opened", () => searches.forEach((one) => one.forget()));
   on("described", () => { if (visible) { offer(); } });
   on("moving", () => searches.forEach((one) => one.show()));
@@ -34,11 +36,13 @@ export function start(place) {
 const plain = () => state.description.quantities.filter((/** @type {any} */ one) => one.group === "parameters" && one.number !== null && one.number > 0 && one.range !== "count");
 
 function offer() {
-  const possible = plain().length > 0 && ["response", "performance", "map"].includes(state.description.kind);
+  const peaks = plain().length > 0 && ["response", "performance", "map"].includes(state.description.kind);
+  const possible = peaks || fit.possible();
   empty.hidden = possible;
   body.hidden = !possible;
   empty.textContent = plain().length === 0 ? "The study has no entry of [parameters] with a plain value to search over." : `A study of kind ${state.description.kind} has no resonance peak to minimize.`;
-  if (possible) { searches.forEach((one) => one.offer()); mistuning.offer(); }
+  searches.forEach((one) => one.offer(peaks));
+  if (possible) { mistuning.offer(); fit.offer(); }
 }
 
 /** @param {"performance" | "map"} kind @param {string} title @param {("x" | "y")[]} letters */
@@ -57,7 +61,8 @@ function search(kind, title, letters) {
   /** True if the user has read how long the search takes. */
   let asked = false;
   const fields = Object.fromEntries(letters.map((letter, index) => [letter, axisFields(`${kind}-${letter}`, index)]));
-  body.append(make("section", { class: "tile wide", "aria-label": title }, make("h2", { text: title }), make("div", { class: "tools" }, ...letters.map((letter) => fields[letter].box), button), words, legendPlace, place));
+  const tile = make("section", { class: "tile wide", "aria-label": title }, make("h2", { text: title }), make("div", { class: "tools" }, ...letters.map((letter) => fields[letter].box), button), words, legendPlace, place);
+  body.append(tile);
 
   async function compute() {
     const ranges = /** @type {any[]} */ (letters.map((letter) => fields[letter].read()));
@@ -173,7 +178,7 @@ function search(kind, title, letters) {
     show,
     forget() { stop(kind); turn += 1; running = asked = false; button.textContent = "Compute"; result = null; words.textContent = purpose; legendPlace.replaceChildren(); place.hidden = legendPlace.hidden = true; letters.forEach((letter) => fields[letter].forget()); },
     changed() { if (visible && result && result.seconds < 0.5 && others(result.ranges) !== found) { compute(); } else { show(); } },
-    offer() { letters.forEach((letter) => fields[letter].offer()); },
+    offer(/** @type {boolean} */ peaks) { tile.hidden = !peaks; if (peaks) { letters.forEach((letter) => fields[letter].offer()); } },
   };
 }
 

@@ -33,7 +33,7 @@ export function start(body) {
 
 /** Shows the fields for a disk. */
 export function offer() {
-  const disk = state.description.model?.ring;
+  const disk = state.description.model?.ring && ["response", "performance", "map"].includes(state.description.kind);
   tile.hidden = !disk;
   if (!disk || menu.childElementCount > 0) { return; }
   const plain = state.description.quantities.filter((/** @type {any} */ one) => one.group === "parameters" && one.number > 0 && one.range !== "count");

@@ -6,9 +6,10 @@ import * as loops from "./moving_loops.js";
 import { colour, isDark } from "./plot.js";
 import { present } from "./orbit.js";
 import { sceneOf } from "./scene.js";
+import * as solid from "./solid.js";
 import { on, state } from "./store.js";
 
-let panel, canvas, play, speed, size, position, status, empty, box;
+let panel, canvas, play, speed, size, position, status, empty, box, flat;
 let visible = false;
 let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 let phase = 0;
@@ -25,11 +26,12 @@ export function start(place) {
   status = make("span", { class: "state" });
   canvas = make("canvas", { role: "img", "aria-label": "The structure in motion", height: "420" });
   empty = make("p", { class: "empty", hidden: true });
+  flat = make("div", {}, canvas, make("p", { class: "hint", text: "Blue: the joint sticks. Orange: it slips. Pink, dashed: it is open. Grey: springs. The arrow shows a force." }));
   box = make("div", {}, make("div", { class: "tools" }, play, make("button", { type: "button", text: "◂ Step", onclick: step(-0.01) }), make("button", { type: "button", text: "Step ▸", onclick: step(0.01) }),
-    make("label", {}, "Speed", speed), make("label", {}, "Scale", size), make("label", {}, "Time", position), status), canvas,
-    make("p", { class: "hint", text: "Blue: the joint sticks. Orange: it slips. Pink, dashed: it is open. Grey: springs. The arrow shows a force." }), loops.start());
+    make("label", {}, "Speed", speed), make("label", {}, "Scale", size), make("label", {}, "Time", position), status), solid.start(() => draw()), flat, loops.start());
   panel.append(empty, box);
-  on("orbit", () => draw());
+  on("opened", solid.forget);
+  on("orbit", (/** @type {any} */ orbit) => { flat.hidden = solid.take(orbit?.event.solid); draw(); });
   on("theme", () => draw());
   on("tab", (/** @type {string} */ name) => { visible = name === "motion"; if (visible) { last = 0; requestAnimationFrame(frame); } });
   new ResizeObserver(() => draw()).observe(canvas);
@@ -65,6 +67,14 @@ function draw() {
   empty.textContent = reason;
   box.hidden = reason !== "";
   if (reason) { return; }
+  const gain = solid.active() ? solid.draw(phase, Number(size.value)) : drawFlat(orbit, model);
+  loops.draw(orbit, (column) => at(orbit, column));
+  position.value = String(phase);
+  status.textContent = `${digits(phase * orbit.time.at(-1) * 1e3, 3)} ms of ${digits(orbit.time.at(-1) * 1e3, 4)} ms, displacements × ${digits(gain, 2)}`;
+}
+
+/** Draws masses, springs and joints in a plane. @param {any} orbit @param {any} model @returns {number} the factor of the displacements */
+function drawFlat(orbit, model) {
   const scene = sceneOf(model);
   const width = canvas.clientWidth;
   const bounds = [...scene.masses, ...scene.ground];
@@ -122,9 +132,7 @@ function draw() {
       arrow(pen, [x + (r + 4) * along[0], y + (r + 4) * along[1]], along, size, text);
     }
   });
-  loops.draw(orbit, (column) => at(orbit, column));
-  position.value = String(phase);
-  status.textContent = `${digits(phase * orbit.time.at(-1) * 1e3, 3)} ms of ${digits(orbit.time.at(-1) * 1e3, 4)} ms, displacements × ${digits(gain, 2)}`;
+  return gain;
 }
 
 /** The unit vector of a direction of a mass. On a wheel, `x` and `t` are along the circumference. @param {any} one @param {string} direction */

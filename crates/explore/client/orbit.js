@@ -15,6 +15,8 @@ const plots = {};
 let orbit = null;
 let visible = false;
 let wanted = "";
+/** True once the structure of this study was shown in motion: then an orbit has the displacements of all nodes. */
+let inMotion = false;
 
 /** @param {any} place */
 export function start(place) {
@@ -37,11 +39,11 @@ export function start(place) {
       name === "time" ? make("p", { class: "hint", text: "Shading: a joint sticks (blue) or is open (pink); it slips where there is none. Several joints have one strip each." }) : null,
       name === "time" ? make("p", { class: "hint", id: "first-sector", hidden: true, text: "The plots show the first sector of the tuned disk; the others do the same, one after the other." }) : null));
   }
-  on("opened", () => { orbit = null; wanted = ""; grid.hidden = true; status.textContent = ""; });
+  on("opened", () => { orbit = null; wanted = ""; inMotion = false; grid.hidden = true; status.textContent = ""; });
   on("marker", () => { follow(); });
   on("result", () => { atPeakFirst(); follow(); });
   on("theme", () => show());
-  on("tab", (/** @type {string} */ name) => { visible = name === "orbit" || name === "motion"; if (visible) { atPeakFirst(); follow(); show(); } });
+  on("tab", (/** @type {string} */ name) => { visible = name === "orbit" || name === "motion"; inMotion ||= name === "motion"; if (visible) { atPeakFirst(); follow(); show(); } });
 }
 
 /** The orbit that is shown, for the animation. */
@@ -110,7 +112,7 @@ async function follow() {
   caseMenu.parentElement.hidden = cases.length < 2;
   caseMenu.replaceChildren(...cases.map((/** @type {any} */ one, /** @type {number} */ index) => make("option", { value: index, text: one.label, selected: index === state.marker.case })));
   const fixed = (cases[state.marker.case]?.values ?? []).map((/** @type {any} */ one) => ({ name: one.name, value: one.text }));
-  const request = { study: state.study, changes: changeList(), tables: true, view: { kind: "orbit", frequency: state.marker.frequency, case: fixed } };
+  const request = { study: state.study, changes: changeList(), tables: true, view: { kind: "orbit", frequency: state.marker.frequency, case: fixed, fields: inMotion ? state.description.fields : null } };
   const key = JSON.stringify(request);
   if (key === wanted) { return; }
   wanted = key;

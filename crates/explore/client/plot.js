@@ -1,8 +1,17 @@
 // Draws figures with plotly.js in the colours of the page.
 
-import { make } from "./dom.js";
+import { byId, make } from "./dom.js";
+import { REFERENCE, follow, settle } from "./follow.js";
+
 /** @type {any} */
-const Plotly = /** @type {any} */ (window).Plotly;
+let Plotly = null;
+/** plotly.js, which loads while the rest of the page already works. @type {Promise<void>} */
+const loaded = new Promise((resolve, reject) => {
+  const take = () => { Plotly = /** @type {any} */ (window).Plotly; resolve(); };
+  if (/** @type {any} */ (window).Plotly) { take(); return; }
+  byId("plotly").addEventListener("load", take);
+  byId("plotly").addEventListener("error", () => reject(new TypeError("plotly.js did not load")));
+});
 
 const WORDS = new Set(["text", "name", "legendgroup", "hovertemplate", "quantity", "title", "unit"]);
 const CONFIG = {
@@ -12,14 +21,36 @@ const CONFIG = {
 
 export const isDark = () => document.documentElement.dataset.theme === "dark";
 
-/** A copy with the dark counterparts of all colours. @param {any} value @param {Record<string, string>} dark @param {boolean} [wanted] false keeps the light colours */
-function tinted(value, dark, wanted = isDark()) {
-  return JSON.parse(JSON.stringify(value), (key, item) =>
-    (typeof item === "string" && !WORDS.has(key) && wanted && dark[item]) || item);
+/**
+ * A copy with the dark counterparts of all colours. Lists of numbers are shared, because they are
+ * most of a figure.
+ * @param {any} value @param {Record<string, string>} dark @param {boolean} [wanted] false keeps the light colours @param {string} [key] key of the value
+ * @returns {any}
+ */
+function tinted(value, dark, wanted = isDark(), key = "") {
+  if (typeof value === "string") { return (wanted && !WORDS.has(key) && dark[value]) || value; }
+  if (Array.isArray(value)) {
+    const isNumbers = typeof value.find((item) => item !== null) === "number";
+    // plotly.js changes the two numbers of a range in place
+    return isNumbers ? (value.length > 8 ? value : [...value]) : value.map((item) => tinted(item, dark, wanted, key));
+  }
+  if (value === null || typeof value !== "object") { return value; }
+  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, tinted(item, dark, wanted, name)]));
 }
 
 /** Hidden legend groups by plot. @type {WeakMap<any, Set<string>>} */
 const hidden = new WeakMap();
+
+/** The figures as they were last drawn in full. @type {WeakMap<any, import("./follow.js").Drawn>} */
+const drawnFigures = new WeakMap();
+
+/** Raises the upper ends of the vertical axes, so that the curves of the next values fit. @param {any} layout */
+function leaveRoom(layout) {
+  for (const name of Object.keys(layout).filter((key) => /^yaxis/.test(key) && layout[key].range)) {
+    const [low, high] = layout[name].range;
+    layout[name].range = [low, high + 0.25 * (high - low)];
+  }
+}
 
 /**
  * @typedef {{plot: any, opacity: number, name?: string, dash?: string}} Behind a figure whose curves are drawn behind
@@ -29,9 +60,11 @@ const hidden = new WeakMap();
  * Draws a figure of the server.
  * @param {any} place
  * @param {any} plot data of the server
- * @param {{behind?: Behind[], shapes?: any[], height?: number}} [more]
+ * @param {{behind?: Behind[], shapes?: any[], height?: number, moving?: boolean}} [more] `moving` moves the curves only, if that is possible
  */
 export async function draw(place, plot, more = {}) {
+  const last = drawnFigures.get(place);
+  if (more.moving && last?.dark === isDark() && follow(place, last, plot)) { return; }
   const wide = place.clientWidth > plot.break || plot.axes.length === 1;
   const { data, layout } = figure(plot, { behind: more.behind ?? [], wide, dark: isDark() });
   layout.autosize = true;
@@ -47,7 +80,11 @@ export async function draw(place, plot, more = {}) {
   layout.uirevision = place.dataset.revision ?? "same";
   const off = hidden.get(place) ?? new Set();
   for (const trace of data) { if (off.has(trace.legendgroup)) { trace.visible = false; } }
+  await loaded;
+  if (more.moving) { leaveRoom(layout); }
+  settle(place);
   await Plotly.react(place, data, layout, CONFIG);
+  drawnFigures.set(place, { plot, layout: JSON.parse(JSON.stringify(layout)), wide, dark: isDark(), width: place.clientWidth, first: data.length - plot.data.length, moving: more.moving === true });
 }
 
 /** The traces and the layout of a figure with other curves behind its own. @param {any} plot @param {{behind: Behind[], wide: boolean, dark: boolean}} how */
@@ -60,7 +97,7 @@ function figure(plot, { behind, wide, dark }) {
       const owner = [other.name, title].filter((part) => part).join(", ");
       const name = other.name && trace.hovertemplate ? { hovertemplate: trace.hovertemplate.replace("<extra>", `<extra>${owner}: `) } : { hoverinfo: "skip", hovertemplate: null };
       const line = { ...trace.line, ...(other.dash ? { dash: other.dash } : {}) };
-      return { ...plain(moved(trace, other.plot, plot, panel)), ...name, line, opacity: other.opacity, legendgroup: "", owner: other.name };
+      return { ...plain(moved(trace, other.plot, plot, panel)), ...name, line, opacity: other.opacity, legendgroup: "", owner: other.name, pale: !other.name };
     }));
   });
   extend(layout, others.filter((trace) => trace.owner));
@@ -79,9 +116,6 @@ function extend(layout, traces) {
     if (end > high) { axis.range = [low, end + 0.05 * (end - low)]; }
   }
 }
-
-/** Names of linear curves, which belong to the present values only. */
-const REFERENCE = /joints (free|stuck)/;
 
 /** The number of the panel of a trace, from 0. @param {any} trace */
 const panelOf = (trace) => Number((trace.xaxis ?? "x").slice(1) || 1) - 1;
@@ -116,30 +150,37 @@ function moved(trace, from, to, panel) {
 /** Drawing by the graphics processor needs scripts that the policy of the page forbids. @param {any} trace */
 const plain = (trace) => ({ ...trace, ...(trace.type === "scattergl" ? { type: "scatter" } : {}), showlegend: false });
 
+/** What legends show now: while a slider moves they stay as they are. @type {WeakMap<any, string>} */
+const legends = new WeakMap();
+
 /**
- * The legend of a figure: buttons that hide and show curves.
- * @param {any} place @param {any} plot @param {any} target
+ * The legend of a figure: buttons that hide and show curves, and the names of pins.
+ * @param {any} place @param {any} plot @param {any} target @param {string[]} [pins]
  */
-export function legend(place, plot, target) {
+export function legend(place, plot, target, pins = []) {
   const off = hidden.get(target) ?? new Set();
   hidden.set(target, off);
-  const data = tinted(plot.data, plot.dark);
   /** @type {Map<string, any>} */
   const entries = new Map();
-  for (const trace of data) { if (trace.showlegend && trace.name && !entries.has(trace.legendgroup)) { entries.set(trace.legendgroup, trace); } }
+  for (const trace of plot.data) { if (trace.showlegend && trace.name && !entries.has(trace.legendgroup)) { entries.set(trace.legendgroup, tinted({ ...trace, x: null, y: null }, plot.dark)); } }
   const present = new Set(plot.data.map((/** @type {any} */ trace) => trace.legendgroup));
   for (const name of [...off]) { if (!present.has(name)) { off.delete(name); } }
+  const now = JSON.stringify([[...entries], [...off], pins]);
+  if (legends.get(place) === now && place.childElementCount > 0) { return; }
+  legends.set(place, now);
   place.replaceChildren(...[...entries].map(([group, trace]) => {
     const button = make("button", {
       type: "button", "aria-pressed": String(!off.has(group)),
       onclick: () => {
         if (off.has(group)) { off.delete(group); } else { off.add(group); }
         button.setAttribute("aria-pressed", String(!off.has(group)));
+        // the button keeps the focus
+        legends.set(place, JSON.stringify([[...entries], [...off], pins]));
         target.dispatchEvent(new CustomEvent("redraw"));
       },
     }, sample(trace), text(trace.name));
     return button;
-  }));
+  }), ...pins.map((name) => make("span", { class: "pin", text: `– – ${name}` })));
 }
 
 /** The text of a name, in which the server has escaped marks. @param {string} name */
@@ -192,9 +233,10 @@ const PALETTE = [["#0072b2", "#2f7fc9"], ["#d55e00", "#ff8616"], ["#009e73", "#2
 export const colour = (/** @type {number} */ index) => PALETTE[index % PALETTE.length][isDark() ? 1 : 0];
 
 /** Draws traces of the page. @param {any} place @param {any[]} data @param {any} layout */
-export function drawOwn(place, data, layout) {
+export async function drawOwn(place, data, layout) {
   const whole = ownLayout(layout);
   place.style.height = `${whole.height}px`;
+  await loaded;
   return Plotly.react(place, data, whole, { ...CONFIG, displayModeBar: false });
 }
 
@@ -202,7 +244,7 @@ export function drawOwn(place, data, layout) {
  * Saves a figure as a picture: on white, with its title and legend.
  * @param {any} plot data of the server @param {Behind[]} behind @param {"svg" | "png"} format @param {string} filename
  */
-export function picture(plot, behind, format, filename) {
+export async function picture(plot, behind, format, filename) {
   const { data, layout } = figure(plot, { behind, wide: true, dark: false });
   const named = new Set();
   for (const trace of plot.data) {
@@ -213,13 +255,11 @@ export function picture(plot, behind, format, filename) {
     const first = data.find((/** @type {any} */ trace) => trace.owner === other.name);
     if (other.name && first) { Object.assign(first, { showlegend: true, name: other.name }); }
   });
+  await loaded;
   const height = Math.max(layout.height ?? 0, 520) + 60;
   const more = { showlegend: named.size > 0, legend: { orientation: "h", y: -0.12, yanchor: "top" }, paper_bgcolor: "#ffffff", plot_bgcolor: "#ffffff" };
   return Plotly.downloadImage({ data, layout: { ...layout, ...more, height, margin: { ...layout.margin, b: 110 } } }, { format, filename, width: 1000, height, scale: format === "png" ? 2 : 1 });
 }
-
-/** @param {any} place */
-export const forget = (place) => Plotly.purge(place);
 
 /**
  * Calls `move` with data coordinates while the pointer is pressed where `near` says yes.

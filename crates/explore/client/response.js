@@ -2,6 +2,8 @@
 
 import { run } from "./api.js";
 import { byId, make, message, perFrame } from "./dom.js";
+import * as fit from "./fit.js";
+import { PALE } from "./follow.js";
 import { digits, duration } from "./format.js";
 import { draggable, draw, legend, pixel } from "./plot.js";
 import { changeList, on, state, tell } from "./store.js";
@@ -13,7 +15,7 @@ const PATIENCE = 2;
 /** Pause of a slider after which the full curve is computed, ms. */
 const REST = 160;
 
-let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty;
+let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty, fitted;
 /** Time of the last full run, s, and its number of points. */
 let cost = { seconds: 0, points: 0 };
 /** The curve before the last change. @type {any} */
@@ -40,12 +42,13 @@ export function start(panel) {
   place = make("div", { class: "plot", id: "response-plot" });
   button = make("button", { type: "button", class: "primary", text: "Compute", hidden: true, onclick: () => { waiting = false; compute(false, true); } });
   empty = make("div", { class: "empty", hidden: true }, make("p", {}), button);
+  fitted = make("div", {});
   hint = make("p", { class: "hint", text: "Click the curve to see its orbit. Drag the vertical marker to another frequency." });
   panel.append(
     make("div", { class: "tools" },
       make("label", { class: "only-response" }, "Show", quantity), make("label", { class: "only-response" }, "Panels", panels), make("label", { class: "only-response" }, logarithmic, "logarithmic"),
       make("button", { type: "button", class: "only-response", id: "pin", text: "Pin this curve", onclick: () => tell("pin") }), status),
-    legendPlace, empty, place, hint);
+    legendPlace, empty, place, hint, fitted);
   place.addEventListener("redraw", () => show());
   place.addEventListener("tap", (/** @type {CustomEvent} */ event) => {
     const at = event.detail;
@@ -53,7 +56,7 @@ export function start(panel) {
     tell("show", "orbit");
   });
   draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
-  on("opened", () => { previous = partial = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
+  on("opened", () => { previous = partial = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
   on("moving", () => compute(true));
   on("changed", () => compute(false));
   on("theme", () => show());
@@ -116,7 +119,7 @@ async function compute(moving, asked = false) {
     });
     clearTimeout(late);
     if (event === null) { return; }
-    take(event, reduced !== null, (performance.now() - begun) / 1000);
+    take(event, { moving, reduced: reduced !== null }, (performance.now() - begun) / 1000);
   } catch (error) {
     place.classList.remove("stale");
     status.textContent = "";
@@ -134,8 +137,8 @@ function remaining(done, all, time) {
   return seconds > 2 ? `, ${duration(seconds)} left` : "";
 }
 
-/** @param {any} event @param {boolean} reduced @param {number} seconds */
-function take(event, reduced, seconds) {
+/** @param {any} event @param {{moving: boolean, reduced: boolean}} how @param {number} seconds */
+function take(event, { moving, reduced }, seconds) {
   partial = null;
   place.classList.remove("stale");
   if (event.event === "expect") {
@@ -157,10 +160,12 @@ function take(event, reduced, seconds) {
   empty.hidden = true;
   place.hidden = false;
   if (!reduced) { cost = { seconds, points: state.description.points }; }
-  if (!reduced && state.result && !state.result.reduced) { previous = state.result; }
-  state.result = { ...event, reduced };
+  // the pale curve is the last one at rest
+  if (state.result && !state.result.moving) { previous = state.result; }
+  state.result = { ...event, reduced, moving };
   hint.hidden = !hasOrbits();
   status.textContent = reduced ? "fewer points while moving" : duration(seconds);
+  fitted.replaceChildren(...(event.fitted ? [fit.table(event)] : []));
   show();
   tell("result", state.result);
 }
@@ -186,14 +191,13 @@ const show = perFrame(() => {
   const shown = partial ?? state.result;
   if (!shown || place.closest("[hidden]")) { return; }
   const { plot } = shown;
-  legend(legendPlace, plot, place);
-  for (const pin of state.pins) { legendPlace.append(make("span", { class: "pin", text: `– – ${pin.name}` })); }
+  legend(legendPlace, plot, place, state.pins.map((/** @type {any} */ pin) => pin.name));
   const behind = pinned();
-  if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: 0.28 }); }
+  if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: PALE }); }
   // the figure fills the window; on a narrow page it leaves room for the parameters
   const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - 110;
   const height = window.innerWidth < 820 ? plot.narrow?.height ?? 340 : Math.max(340, free);
-  draw(place, plot, { behind, shapes: markers(plot), height }).then(drawn);
+  draw(place, plot, { behind, shapes: markers(plot), height, moving: shown.moving === true }).then(drawn);
 });
 
 /** The vertical lines at the marked frequency. @param {any} plot */

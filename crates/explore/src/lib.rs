@@ -13,4 +13,4 @@ mod server;
 mod study;
 
 pub use server::{Embedding, ExploreError, Server, Settings, Start};
-pub use study::{answer, catalog, change, quantities, response_quantity, view};
+pub use study::{answer, catalog, change, fit, quantities, response_quantity, view};

@@ -48,6 +48,7 @@
 //! assert!(stickslip_report::html::to_html(&figure, "plotly.js").contains("plotly.js"));
 //! ```
 
+mod base64;
 pub mod compare;
 mod figure;
 pub mod output;
@@ -58,6 +59,7 @@ pub mod terminal;
 #[cfg(test)]
 mod samples;
 
+pub use base64::base64;
 pub use figure::{html, png, svg};
 pub use output::folder::check_writable;
 pub use output::result_file::{Output, ReportError, write_file};

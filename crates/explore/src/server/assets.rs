@@ -26,6 +26,8 @@ const MODULES: &[(&str, &str)] = modules![
     "api.js",
     "dom.js",
     "design.js",
+    "fit.js",
+    "follow.js",
     "format.js",
     "gallery.js",
     "mistuning.js",
@@ -38,6 +40,7 @@ const MODULES: &[(&str, &str)] = modules![
     "plot.js",
     "response.js",
     "scene.js",
+    "solid.js",
     "store.js",
     "trust.js",
 ];

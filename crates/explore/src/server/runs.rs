@@ -280,7 +280,11 @@ fn compute(run: &Run, request: &RunRequest, points: &Arc<AtomicUsize>, answers: 
     if run.stop.load(Ordering::Relaxed) {
         return Ok(Value::Null);
     }
-    let tables = if request.tables { Tables::All } else { Tables::Small };
+    let tables = match (&request.view, request.tables) {
+        (View::Orbit { .. }, _) => Tables::Motion,
+        (_, true) => Tables::All,
+        (_, false) => Tables::Small,
+    };
     Ok(answer(&study, &dataset, tables, request.quantity))
 }
 

@@ -2,13 +2,15 @@
 //! how far to trust them.
 
 use super::description::cases;
+use super::fit;
 use super::measured;
 use super::response_quantity::ResponseQuantity;
+use super::solid;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use stickslip_report::html;
 use stickslip_study::Study;
-use stickslip_study::dataset::{CellValues, Dataset, Table};
+use stickslip_study::dataset::{CellValues, Dataset, FIELDS, Table};
 use stickslip_study::result_block::Block;
 use stickslip_study::results::worst_evidence;
 use stickslip_study::run::figure_of_tables;
@@ -24,6 +26,8 @@ const NAMED_FAILURES: usize = 40;
 pub enum Tables {
     /// The tables with one row for each result, such as peaks.
     Small,
+    /// All tables except the displacements of all nodes, and these as the motion of a surface.
+    Motion,
     /// All tables.
     All,
 }
@@ -41,6 +45,8 @@ pub fn answer(study: &Study, dataset: &Dataset, tables: Tables, quantity: Option
         "plot": html::plot(&figure),
         "cases": cases(study),
         "tables": tables_json(&dataset.tables, tables),
+        "fitted": fit::fitted(study, dataset),
+        "solid": (tables == Tables::Motion).then(|| solid::solid(dataset)),
         "notes": dataset.notes,
         "failures": dataset.failures.iter().take(NAMED_FAILURES).collect::<Vec<_>>(),
         "failed": dataset.failures.len(),
@@ -69,7 +75,11 @@ pub(crate) fn partial_answer(study: &Study, block: &Block) -> Value {
 }
 
 fn tables_json(all: &[Table], tables: Tables) -> Map<String, Value> {
-    let shown = |table: &&Table| tables == Tables::All || SMALL_TABLES.contains(&table.name.as_str());
+    let shown = |table: &&Table| match tables {
+        Tables::Small => SMALL_TABLES.contains(&table.name.as_str()),
+        Tables::Motion => table.name != FIELDS,
+        Tables::All => true,
+    };
     all.iter().filter(shown).map(|table| (table.name.clone(), table_json(table))).collect()
 }
 

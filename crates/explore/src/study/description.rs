@@ -2,7 +2,9 @@
 //! from.
 
 use super::catalog::Source;
+use super::fit;
 use super::quantities::quantities;
+use super::solid;
 use serde_json::{Value, json};
 use stickslip::law;
 use stickslip_study::{Study, StudyError};
@@ -40,6 +42,8 @@ pub(crate) fn describe(study: &Study, document: &DocumentMut) -> Value {
         "frequency": frequency,
         "model": case.as_ref().map(|case| &case.model),
         "places": case.as_ref().and_then(|case| Some(case.model.assemble().ok()?.places().to_vec())),
+        "fields": solid::instants(study),
+        "targets": fit::targets(study),
         "laws": laws,
     })
 }

@@ -4,6 +4,7 @@
 //! A view replaces `[study]` of the changed file. It is again a study file, which the page can
 //! save.
 
+use super::fit::{self, FitTarget};
 use serde::Deserialize;
 use stickslip_study::kinds;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
@@ -34,6 +35,8 @@ pub enum View {
         /// Values of the varied parameters.
         #[serde(default)]
         case: Vec<Fixed>,
+        /// Instants of the period at which the displacements of all nodes of a mesh are computed.
+        fields: Option<i64>,
     },
     /// The peak over one parameter.
     Performance {
@@ -48,6 +51,15 @@ pub enum View {
         deviation: String,
         /// Number of disks.
         disks: i64,
+    },
+    /// Parameters fitted to a measured curve, from their present values.
+    Fit {
+        /// The measured curve.
+        target: FitTarget,
+        /// The fitted parameters and their ranges; their numbers of points have no effect.
+        parameters: Vec<Range>,
+        /// Further starts of the search, spread over the ranges.
+        starts: i64,
     },
     /// The peak over two parameters.
     Map {
@@ -130,13 +142,16 @@ pub fn show(document: &mut DocumentMut, view: &View, settings: &ViewSettings) ->
                 set_figure(document, "panels", Value::from(panels));
             }
         }
-        View::Orbit { frequency, case } => {
+        View::Orbit { frequency, case, fields } => {
             let old = document.get("study").and_then(Item::as_table_like).ok_or_else(missing)?;
             let mut study = Table::new();
             study.insert("kind", value("orbit"));
             study.insert("frequency", value(format!("{frequency:?} Hz")));
             study.insert("samples", value(settings.samples));
             study.insert("multipliers", value(true));
+            if let Some(instants) = fields {
+                study.insert("fields", value(*instants));
+            }
             study.insert("output", Item::Value(Value::Array(["harmonics", "contact"].into_iter().collect())));
             let varied = old.get("vary").and_then(Item::as_table_like);
             let mut fixed = InlineTable::new();
@@ -168,6 +183,7 @@ pub fn show(document: &mut DocumentMut, view: &View, settings: &ViewSettings) ->
             replace_study(document, study);
         }
         View::Mistuning { of, deviation, disks } => mistuned(document, settings, of, deviation, *disks)?,
+        View::Fit { target, parameters, starts } => fit::fit(document, target, parameters, *starts)?,
         View::Map { x, y } => {
             let mut study = search(document, "map", settings, &[x, y])?;
             let fixed = outer(document, &[x, y]);
@@ -182,7 +198,7 @@ pub fn show(document: &mut DocumentMut, view: &View, settings: &ViewSettings) ->
     Ok(())
 }
 
-fn value(value: impl Into<Value>) -> Item {
+pub(super) fn value(value: impl Into<Value>) -> Item {
     Item::Value(value.into())
 }
 
@@ -222,7 +238,7 @@ fn set_figure(document: &mut DocumentMut, key: &str, new: Value) {
 }
 
 /// Replaces `[study]`. The settings of the figure belong to the former kind.
-fn replace_study(document: &mut DocumentMut, study: Table) {
+pub(super) fn replace_study(document: &mut DocumentMut, study: Table) {
     document.insert("study", Item::Table(study));
     document.remove("figure");
 }
@@ -312,7 +328,7 @@ fn outer(document: &DocumentMut, over: &[&Range]) -> InlineTable {
     others.filter_map(|(name, item)| Some((name, item.clone().into_value().ok()?))).collect()
 }
 
-fn range_table(range: &Range) -> InlineTable {
+pub(super) fn range_table(range: &Range) -> InlineTable {
     let mut table = InlineTable::new();
     table.insert("from", Value::from(range.from.as_str()));
     table.insert("to", Value::from(range.to.as_str()));
@@ -371,7 +387,7 @@ mod tests {
         let row = 241 * 2 + 100;
         let frequency = table.numbers("frequency_Hz").unwrap()[row];
         let case = vec![Fixed { name: "Ft".into(), value: "6 N".into() }];
-        let orbit = run(&shown(&View::Orbit { frequency, case }), &Context::without_progress(1)).unwrap();
+        let orbit = run(&shown(&View::Orbit { frequency, case, fields: None }), &Context::without_progress(1)).unwrap();
         let found = orbit.tables.iter().find(|table| table.name == "orbits").unwrap();
         let [a, b] =
             [table.numbers("blade1_amplitude_m").unwrap()[row], found.numbers("blade1_amplitude_m").unwrap()[0]];

@@ -4,6 +4,7 @@
 //! `STICKSLIP_SCREENSHOTS=FOLDER` writes a picture of every view.
 
 use crate::chromium::{self, Browser};
+use crate::{fit, solid};
 use std::path::Path;
 use stickslip_explore::{Server, Settings, Start};
 use stickslip_study::run::{Context, run};
@@ -473,6 +474,68 @@ fn a_map_can_be_stopped() {
     // the server is free for the next request
     browser.evaluate(PERFORMANCE);
     browser.wait_long("document.querySelector('#design-performance').data?.length > 0");
+}
+
+/// A structure with a mesh is drawn in three dimensions, moves, and turns with the arrow keys.
+#[test]
+fn a_structure_with_a_mesh_turns_in_three_dimensions() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some((_server, mut browser)) = open(Start::File(solid::bar(folder.path()))) else { return };
+    browser.wait_long("document.querySelector('#response-plot')?.data?.length > 0 || void ((button) => button && !window.pressed && (window.pressed = true, button.click())) ([...document.querySelectorAll('button')].find((b) => b.textContent === 'Compute' && b.offsetParent))");
+    browser.evaluate("document.getElementById('tab-motion').click()");
+    browser.wait_long("document.getElementById('solid').offsetHeight > 200");
+    // WebGL forgets the picture after the frame, so that it is read in the same task
+    let seen = "(() => { const canvas = document.getElementById('solid'); canvas.dispatchEvent(new KeyboardEvent('keydown', { key: KEY })); \
+                const gl = canvas.getContext('webgl2'); const bytes = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight); \
+                gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, bytes); \
+                return bytes.reduce((sum, value, i) => sum + (i % 4 === 3 && value > 0 ? 1 : 0), 0) + 1e-3 * bytes.reduce((sum, value, i) => (sum + value * (i % 97)) % 1009, 0); })()";
+    let home = browser.number(&seen.replace("KEY", "'Home'"));
+    assert!(home > 5000.0, "{home} pixels");
+    let turned = browser.number(&seen.replace("KEY", "'ArrowLeft'"));
+    assert!(turned > 5000.0 && turned != home, "{home} {turned}");
+    let large = browser.number(&seen.replace("KEY", "'+'"));
+    assert!(large > 1.1 * turned, "{turned} {large}");
+    assert_eq!(browser.text("document.getElementById('solid-colour').value"), "state");
+    browser.picture("solid");
+    browser.check_clean();
+}
+
+/// A fit starts at the sliders, shows errors, and moves the sliders to its values.
+#[test]
+fn a_fit_moves_the_sliders_to_the_measured_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some((_server, mut browser)) = open(Start::File(fit::rig(folder.path()))) else { return };
+    browser.wait_long("document.querySelector('#response-plot')?.data?.some((t) => t.name === 'measured: rig')");
+    browser.evaluate("document.getElementById('tab-design').click()");
+    assert_eq!(
+        browser.text("document.getElementById('fit-target').selectedOptions[0].textContent"),
+        "rig: response of body"
+    );
+    browser.evaluate("document.getElementById('compute-fit').click()");
+    browser.wait_long("document.querySelector('#panel-design table.fitted tbody tr')");
+    browser.wait("document.querySelector('#design-fit').data?.length > 0");
+    browser.picture("fit");
+    browser.evaluate("document.querySelector('#panel-design button.take').click()");
+    browser.wait(&format!(
+        "Math.abs(document.getElementById('q-parameters-Ft').value / {} - 1) < 1e-4 && document.querySelectorAll('.row.changed').length >= 1",
+        fit::LIMIT
+    ));
+    browser.check_clean();
+}
+
+/// While a slider moves, only the paths of the curves change; the rest follows when it stops.
+#[test]
+fn curves_follow_a_moving_slider_and_settle() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    let path = "document.querySelector('#response-plot .scatterlayer .trace path.js-line')?.getAttribute('d')";
+    let first = browser.text(path);
+    browser.evaluate("performance.clearMarks(); const moving = document.getElementById('q-parameters-F0-slider'); moving.value = 480; moving.dispatchEvent(new Event('input')); true");
+    browser.wait(&format!("{path} !== '{first}'"));
+    // it rests: nothing of the movement stays, and the data are those of the new curve
+    browser.wait_long("document.querySelector('#panel-response .state').textContent.match(/^[0-9.]+ m?s$/) && document.querySelectorAll('path.before').length === 0");
+    browser.wait("document.querySelectorAll('#response-plot .trace[style*=visibility]').length === 0");
+    browser.check_clean();
 }
 
 /// The rules of axe-core for every tab, light and dark. `STICKSLIP_AXE` names its script, which

@@ -7,6 +7,7 @@
 //! Nodes that are not in the table are at rest.
 //! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
 
+use crate::base64::base64;
 use crate::output::result_file::{File, Output, ReportError};
 use std::fmt::Write;
 use std::ops::Range;
@@ -166,33 +167,12 @@ fn array(kind: &str, name: &str, components: usize, bytes: impl Iterator<Item = 
     )
 }
 
-fn base64(bytes: &[u8]) -> String {
-    let letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for part in bytes.chunks(3) {
-        let value = (0..3).fold(0u32, |value, i| value << 8 | u32::from(part.get(i).copied().unwrap_or(0)));
-        for i in 0..4 {
-            let letter = letters[(value >> (18 - 6 * i) & 63) as usize];
-            text.push(if i <= part.len() { char::from(letter) } else { '=' });
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::sync::Arc;
     use stickslip_formats::mesh::read_bytes;
     use stickslip_study::dataset::{CellValues, Column};
-
-    #[test]
-    fn base64_of_every_length() {
-        // RFC 4648, section 10
-        for (bytes, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
-            assert_eq!(base64(bytes.as_bytes()), text);
-        }
-    }
 
     /// Two orbits of two instants on a tetrahedron; the third node is not in the table.
     #[test]

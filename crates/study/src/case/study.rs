@@ -18,6 +18,7 @@ use crate::compile::bare_numbers::literal_unit;
 use crate::compile::compiled::{
     CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, RangeScale, check_positive, check_range,
 };
+use crate::compile::mesh::MeshSource;
 use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
 use crate::compile::torsion::of_rotation;
@@ -256,6 +257,11 @@ impl Study {
     /// Returns the text of the file.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Returns the mesh of the structure, if the file names one.
+    pub fn mesh(&self) -> Option<&MeshSource> {
+        self.structure.mesh.source.as_deref()
     }
 
     /// Returns the study kind.
@@ -541,6 +547,11 @@ impl Study {
     /// `None` if there is no such column, or if it has another dimension.
     pub fn data_column(&self, table: &str, role: &str, dimension: Dimension) -> Option<Vec<f64>> {
         self.data.iter().find(|known| known.name == table)?.values(role, dimension).ok()
+    }
+
+    /// Returns the title of a column of a table of `[[data]]`. `role` is its use or its name.
+    pub fn data_title(&self, table: &str, role: &str) -> Option<String> {
+        self.data.iter().find(|known| known.name == table)?.title(role)
     }
 
     /// Returns a checksum of the matrices of `[structure]` and of the sector's files; `None`

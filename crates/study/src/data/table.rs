@@ -72,6 +72,11 @@ impl DataTable {
         self.find(role).is_some()
     }
 
+    /// Returns the title of a column; `role` is its use or its name.
+    pub fn title(&self, role: &str) -> Option<String> {
+        self.find(role).map(|found| found.column.name.clone())
+    }
+
     /// Returns the values of a column in SI; `role` is its use or its name.
     ///
     /// # Errors

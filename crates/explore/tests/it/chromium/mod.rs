@@ -39,7 +39,7 @@ impl Browser {
         for pipe in [&to, &from] {
             assert!(Command::new("mkfifo").arg(pipe).status().unwrap().success());
         }
-        let script = "exec \"$0\" --headless=new --no-sandbox --disable-gpu --no-first-run --remote-debugging-pipe \
+        let script = "exec \"$0\" --headless=new --no-sandbox --disable-gpu --enable-unsafe-swiftshader --no-first-run --remote-debugging-pipe \
                       --user-data-dir=\"$1\" about:blank 3<\"$2\" 4>\"$3\"";
         let process = Command::new("sh")
             .args(["-c", script])
