@@ -9,8 +9,8 @@ use super::harmonic_balance::HarmonicBalance;
 use super::list::LIST;
 use super::shooting::Shooting;
 use super::{
-    Budget, Choice, Method, MethodError, MethodInfo, Options, Request, Seed, Solver, alternatives, event_driven,
-    harmonic_balance, transient,
+    Budget, Choice, ErrorEstimate, Method, MethodError, MethodInfo, Options, Request, Seed, Solver, alternatives,
+    event_driven, harmonic_balance, transient,
 };
 use crate::law::Law;
 use crate::model::System;
@@ -239,6 +239,8 @@ impl Solver for WithFallback<'_> {
         let by_second = request.seed.filter(|seed| seed.by_fallback);
         let own = Request { seed: request.seed.filter(|seed| !seed.by_fallback), ..*request };
         let error = match self.first.solve(&own, budget) {
+            // an orbit between those of the first method can be omitted
+            Err(error) if request.estimate == ErrorEstimate::Skipped && by_second.is_none() => return Err(error),
             Err(error) if may_succeed_elsewhere(&error) => error,
             outcome => return outcome,
         };
@@ -345,6 +347,11 @@ mod tests {
             let neighbour = solver.orbit_near(TAU * 121.1, Some(&orbit.seed())).unwrap();
             assert_eq!((orbit.method, neighbour.method), (next, next));
             assert_eq!(orbit.evidence.fallback_from, Some(chosen));
+            // the second method continues its own orbits, but begins none between others
+            let (mut budget, seed) = (Budget::default(), neighbour.seed());
+            let between = Request::at(TAU * 121.2).without_estimate();
+            assert!(solver.solve(&between.near(Some(&seed)), &mut budget).is_ok());
+            assert!(solver.solve(&between, &mut budget).is_err());
         }
     }
 
