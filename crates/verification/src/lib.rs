@@ -6,6 +6,7 @@
 
 pub mod law_driver;
 pub mod laws_of_seeds;
+pub mod located_contacts;
 pub mod loose_dampers;
 pub mod newmark_reference;
 pub mod single_mass;

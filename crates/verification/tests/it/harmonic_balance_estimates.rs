@@ -4,7 +4,7 @@
 //! The reference is shooting, with a thousandth of the error. For laws that shooting cannot
 //! take, it is harmonic balance with a thirtieth of the tolerance and sixteen times the
 //! samples. `STICKSLIP_ESTIMATES=50` sets the number of models per law. The test prints the
-//! worst case of every law.
+//! worst case of every law. `STICKSLIP_OPENING=500` sets the number of models with contacts that open.
 
 #![allow(clippy::print_stdout)] // tests print measured values
 
@@ -13,6 +13,7 @@ use stickslip::law::{BoucWen, Dahl, LuGre, SharedLaw, TABLE};
 use stickslip::method::{Method, harmonic_balance::HarmonicBalance, shooting::Shooting};
 use stickslip::model::{Force, GROUND, Joint, Mass, Model, Spring, System};
 use stickslip::orbit::Orbit;
+use stickslip_verification::located_contacts::{LocatedSettings, contact_model};
 use stickslip_verification::random_system_of;
 
 /// Default number of models per law.
@@ -125,4 +126,57 @@ fn the_estimate_holds_for_stiff_laws_with_states() {
         }
     }
     assert!(low.is_empty(), "{}", low.join("\n"));
+}
+
+/// Contacts that open in every period. The truth is an integration in time that locates every
+/// switch and begins at the orbit. Nearly all estimates lie within a factor of three of the error.
+#[test]
+fn the_estimate_holds_for_contacts_that_open() {
+    let models = std::env::var("STICKSLIP_OPENING").ok().and_then(|text| text.parse().ok()).unwrap_or(20);
+    let settings = LocatedSettings { steps: 2000, periods: 400, settled: 1e-9 };
+    let mut ratios: Vec<(f64, u64)> = Vec::new();
+    let (mut missed, mut unsettled) = (0, 0);
+    let mut seed = 0;
+    while ratios.len() < models {
+        seed += 1;
+        let model = contact_model(seed);
+        let Ok(found) = HarmonicBalance::default().solver(&model.system()).unwrap().orbit(model.omega) else {
+            missed += 1;
+            continue;
+        };
+        if found.is_stable() == Some(false) {
+            continue;
+        }
+        let Some((truth, open)) = model.settled(&found.initial_state, settings) else {
+            unsettled += 1;
+            continue;
+        };
+        if !(0.01..0.99).contains(&open) {
+            continue;
+        }
+        let mean = truth.column_mean();
+        let (mut apart, mut size) = (vec![0.0; truth.nrows()], vec![0.0; truth.nrows()]);
+        for (k, column) in truth.column_iter().enumerate() {
+            let sample = found.sample(found.period() * k as f64 / settings.steps as f64);
+            for i in 0..truth.nrows() {
+                let vibration = column[i] - mean[i];
+                apart[i] += (sample.displacement[i] - found.places[i].mean - vibration).powi(2);
+                size[i] += vibration * vibration;
+            }
+        }
+        let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        let error = (most(&apart) / most(&size)).sqrt();
+        let estimate = found.evidence.error_estimate.unwrap();
+        if error / estimate > 3.0 || error / estimate < 1.0 / 3.0 {
+            println!("{seed}: error {error:.2e}, estimate {estimate:.2e}, open {open:.2}");
+        }
+        ratios.push((error / estimate, seed));
+    }
+    let share = |low: f64, high: f64| {
+        ratios.iter().filter(|(ratio, _)| *ratio > low && *ratio <= high).count() as f64 / ratios.len() as f64
+    };
+    let (near, low) = (share(1.0 / 3.0, 3.0), share(3.0, f64::INFINITY));
+    println!("{seed} models, {missed} without an orbit, {unsettled} that do not settle; {} judged", ratios.len());
+    println!("within a factor of three: {:.1} %, less than a third: {:.1} %", 100.0 * near, 100.0 * low);
+    assert!(near >= 0.95 && low <= 0.01, "{near} {low}");
 }

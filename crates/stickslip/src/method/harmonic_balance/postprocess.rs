@@ -17,7 +17,6 @@ use std::cell::RefCell;
 use std::convert::Infallible;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip_numerics::eigen;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
@@ -196,16 +195,16 @@ fn orbit_of_all(
     let stuck_names = measured.stuck_names();
     let path =
         FourierPath { system: system.clone(), omega, harmonics, x, force, contact, stuck: measured.stuck.clone() };
-    let ReturnEvidence { derivative, defect } = orbit_check.map_or_else(ReturnEvidence::default, |orbit_check| {
-        orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck)
-    });
+    let ReturnEvidence { derivative, defect, displacement_error } = orbit_check
+        .map_or_else(ReturnEvidence::default, |orbit_check| {
+            orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck)
+        });
     // If a normal force changes the slip limit, or vanishes, a series with twice the harmonics
-    // may be as wrong as the shorter one. The return defect shows it, except on an unstable
-    // orbit, whose return multiplies the error.
+    // may be as wrong as the shorter one. The time integration shows it. It compares one instant of
+    // the period, at which the error may be below its maximum.
     let joints = system.joints().iter().zip(&measured.joints);
     let rubs = joints.filter(|(joint, _)| joint.law().normal().is_some()).any(|(_, moved)| moved.stick_fraction < 1.0);
-    let repels = derivative.as_ref().is_some_and(|map| eigen::largest_modulus(map).is_none_or(|modulus| modulus > 1.0));
-    let returned = defect.filter(|_| rubs && !repels).unwrap_or(0.0);
+    let returned = displacement_error.filter(|_| rubs).map_or(0.0, |error| 1.5 * error);
     let truncation = truncation.map(|error| error.max(returned));
     Some(Orbit {
         method: super::NAME,

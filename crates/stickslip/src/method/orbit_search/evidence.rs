@@ -85,6 +85,9 @@ pub(crate) struct ReturnEvidence {
     pub derivative: Option<DMatrix<f64>>,
     /// Distance between the state and its return in the energy norm, relative to the vibration.
     pub defect: Option<f64>,
+    /// Displacements of one Newton step from the state to the orbit of the integration, in the
+    /// energy norm and relative to those of the vibration. `None` without a derivative.
+    pub displacement_error: Option<f64>,
 }
 
 impl OrbitCheck {
@@ -229,17 +232,35 @@ impl OrbitCheck {
         {
             let near = derivative_at_nearby_orbit(
                 &mut **flow,
-                (start, gap, of_series),
+                (start, gap.clone(), of_series),
                 (&back, system.dofs()),
                 (one_return, &weights),
             );
             of_return = near.or(of_return);
         }
+        let displacement_error = of_return.as_ref().filter(|_| known).map(|derivative| {
+            let step = newton_step(derivative, &gap, back.sign, &weights);
+            let displacements = &weights[..system.dofs()];
+            norm(displacements, step.as_slice()) / vibration_size(path, TAU / omega, displacements).max(rest)
+        });
         ReturnEvidence {
+            displacement_error,
             derivative: of_return.map(|derivative| back.over_full_cycle(&derivative, system.dofs())),
             defect,
         }
     }
+}
+
+/// Returns the energy norm of the displacements of a vibration, without their means: the largest
+/// of 32 instants of a period.
+fn vibration_size(path: &dyn Path, period: f64, weights: &[f64]) -> f64 {
+    let count = 32;
+    let instants: Vec<Vec<f64>> =
+        (0..count).map(|k| path.sample(period * f64::from(k) / f64::from(count)).displacement).collect();
+    let mean = |i: usize| instants.iter().map(|at| at[i]).sum::<f64>() / f64::from(count);
+    let means: Vec<f64> = (0..weights.len()).map(mean).collect();
+    let vibration = |at: &Vec<f64>| at.iter().zip(&means).map(|(x, mean)| x - mean).collect::<Vec<f64>>();
+    instants.iter().map(|at| norm(weights, &vibration(at))).fold(0.0, f64::max)
 }
 
 /// The integration over one return.

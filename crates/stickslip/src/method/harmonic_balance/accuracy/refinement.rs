@@ -165,13 +165,13 @@ impl HarmonicBalanceSolver {
         warm: Option<(usize, HarmonicSolution)>,
     ) -> Result<Orbit, OrbitError> {
         let mut inaccurate = None;
-        // if the return defect exceeds the tolerance, the orbit is still returned, and its
-        // evidence shows it
+        // if the error by the time integration exceeds the tolerance, the orbit is still returned,
+        // and its evidence shows it
         self.double_until_tolerance(top, omega, warm, &mut inaccurate).or_else(|error| inaccurate.ok_or(error))
     }
 
-    /// Doubles the harmonics. `inaccurate` keeps an orbit whose return defect exceeds the
-    /// tolerance.
+    /// Doubles the harmonics. `inaccurate` keeps an orbit whose error by the time integration
+    /// exceeds the tolerance.
     fn double_until_tolerance(
         &mut self,
         mut top: usize,
