@@ -530,11 +530,11 @@ fn curves_follow_a_moving_slider_and_settle() {
     browser.wait(CURVE);
     let path = "document.querySelector('#response-plot .scatterlayer .trace path.js-line')?.getAttribute('d')";
     let first = browser.text(path);
+    // on a busy machine the page asks before it computes for more than two seconds
+    browser.evaluate("setInterval(() => [...document.querySelectorAll('#panel-response button')].find((b) => /^Compute/.test(b.textContent) && b.offsetParent && !b.disabled)?.click(), 500); true");
     browser.evaluate("performance.clearMarks(); const moving = document.getElementById('q-parameters-F0-slider'); moving.value = 480; moving.dispatchEvent(new Event('input')); true");
     browser.wait(&format!("{path} !== '{first}'"));
-    // it rests: nothing of the movement stays, and the data are those of the new curve. On a busy
-    // machine the page asks before it computes for more than two seconds
-    browser.evaluate("setInterval(() => [...document.querySelectorAll('#panel-response button')].find((b) => /^Compute/.test(b.textContent) && b.offsetParent && !b.disabled)?.click(), 500); true");
+    // it rests: nothing of the movement stays, and the data are those of the new curve
     browser.wait_long("document.querySelector('#panel-response .state').textContent.match(/^[0-9.]+ m?s$/) && document.querySelectorAll('path.before').length === 0");
     browser.wait("document.querySelectorAll('#response-plot .trace[style*=visibility]').length === 0");
     browser.check_clean();
