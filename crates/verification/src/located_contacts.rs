@@ -2,8 +2,8 @@
 //! methods of the library.
 //!
 //! While no contact changes its state, the motion is linear, and its state vector is multiplied
-//! by a matrix exponential in each step. A step in which a contact sticks, slips, opens or closes is
-//! divided at the switch, which bisection locates on the Taylor series of the motion.
+//! by a matrix exponential in each step. A step in which a contact sticks, slips, opens or
+//! closes is divided at the switch, which bisection locates on the Taylor series of the motion.
 
 use crate::Random;
 use nalgebra::{DMatrix, DVector};
