@@ -241,7 +241,7 @@ impl OrbitCheck {
         let displacement_error = of_return.as_ref().filter(|_| known).map(|derivative| {
             let step = newton_step(derivative, &gap, back.sign, &weights);
             let displacements = &weights[..system.dofs()];
-            norm(displacements, step.as_slice()) / vibration_size(path, TAU / omega, displacements).max(rest)
+            norm(displacements, step.as_slice()) / vibration_share::size(path, TAU / omega, displacements, rest)
         });
         ReturnEvidence {
             displacement_error,
@@ -249,18 +249,6 @@ impl OrbitCheck {
             defect,
         }
     }
-}
-
-/// Returns the energy norm of the displacements of a vibration, without their means: the largest
-/// of 32 instants of a period.
-fn vibration_size(path: &dyn Path, period: f64, weights: &[f64]) -> f64 {
-    let count = 32;
-    let instants: Vec<Vec<f64>> =
-        (0..count).map(|k| path.sample(period * f64::from(k) / f64::from(count)).displacement).collect();
-    let mean = |i: usize| instants.iter().map(|at| at[i]).sum::<f64>() / f64::from(count);
-    let means: Vec<f64> = (0..weights.len()).map(mean).collect();
-    let vibration = |at: &Vec<f64>| at.iter().zip(&means).map(|(x, mean)| x - mean).collect::<Vec<f64>>();
-    instants.iter().map(|at| norm(weights, &vibration(at))).fold(0.0, f64::max)
 }
 
 /// The integration over one return.

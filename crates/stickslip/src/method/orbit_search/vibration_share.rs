@@ -21,23 +21,29 @@ pub(crate) fn fraction(
     if symmetry == Symmetry::HalfPeriod {
         return 1.0; // the mean of this motion is zero
     }
+    if path.sample(0.0).displacement.is_empty() {
+        return 1.0; // no structure: the states of the joints follow the imposed motion
+    }
+    let vibration = size(path, period, weights, rest);
+    let state = norm(weights, start).max(rest);
+    if vibration < state { vibration / state } else { 1.0 }
+}
+
+/// Returns the size of a vibration, without its mean, in the energy norm of displacements and
+/// velocities, or of displacements alone if there are no more `weights`. It is at least `rest`.
+pub(crate) fn size(path: &dyn Path, period: f64, weights: &[f64], rest: f64) -> f64 {
     // Instants per period at which the motion is sampled. The energy oscillates between
     // displacement and velocity; the largest sample is accurate to some percent.
     let count = 32;
     let instants: Vec<_> = (0..count).map(|k| path.sample(period * k as f64 / count as f64)).collect();
     let n = instants[0].displacement.len();
-    if n == 0 {
-        return 1.0; // no structure: the states of the joints follow the imposed motion
-    }
     let mean = |row: usize| instants.iter().map(|at| at.displacement[row]).sum::<f64>() / count as f64;
     let mean: Vec<f64> = (0..n).map(mean).collect();
     let about = |at: &crate::orbit::Sample| {
         let moved = at.displacement.iter().zip(&mean).map(|(x, mean)| x - mean);
         norm(weights, &moved.chain(at.velocity.iter().copied()).collect::<Vec<f64>>())
     };
-    let vibration = instants.iter().map(about).fold(rest, f64::max);
-    let state = norm(weights, start).max(rest);
-    if vibration < state { vibration / state } else { 1.0 }
+    instants.iter().map(about).fold(rest, f64::max)
 }
 
 /// Returns the fraction for the next search, after a search that assumed `taken` and gave
