@@ -77,6 +77,8 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) failed_frequencies: Vec<(f64, ObservedMotion, Vec<f64>)>,
     /// Number of time integrations that were made to find an orbit.
     pub(super) time_integrations: usize,
+    /// Multiplications of the integrations in time that classified a motion of the present point.
+    pub(super) integration_work: f64,
     /// By highest harmonic, in systems with many contacts: the last solution whose error was
     /// estimated, and the finer solution with twice the harmonics.
     pub(super) comparisons: BTreeMap<usize, [HarmonicSolution; 2]>,
@@ -132,6 +134,7 @@ impl HarmonicBalanceSolver {
             limit: None,
             failed_frequencies: Vec::new(),
             time_integrations: 0,
+            integration_work: 0.0,
             comparisons: BTreeMap::new(),
         })
     }
@@ -163,6 +166,7 @@ impl HarmonicBalanceSolver {
         self.excitation_frequency = excitation;
         self.point_limit = limit;
         self.limit = None;
+        self.integration_work = 0.0;
         self.discretizations.values_mut().for_each(Discretization::begin_point);
     }
 
@@ -189,7 +193,8 @@ impl HarmonicBalanceSolver {
     /// Returns the work of the point as a fraction of the default limit.
     fn work_fraction(&self) -> f64 {
         let (used, limit) = (self.work_used(None), WorkSettings::default().point);
-        (used.multiplications / limit.multiplications).max(used.time_steps / limit.time_steps)
+        let integrated = self.integration_work / WorkSettings::default().multiplications;
+        ((used.multiplications + integrated) / limit.multiplications).max(used.time_steps / limit.time_steps)
     }
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in
@@ -429,7 +434,7 @@ impl Solver for HarmonicBalanceSolver {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Coulomb;
+    use crate::law::{Coulomb, Cubic, Jenkins, SharedLaw};
     use crate::method::Method;
     use crate::method::event_driven::EventDriven;
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
@@ -465,6 +470,31 @@ mod tests {
         let exact = EventDriven.solver(&system).unwrap().orbit(rate(15.7276)).unwrap();
         let error = (between.places[0].amplitude() / exact.places[0].amplitude() - 1.0).abs();
         assert!(error < 1e-3, "{error:.1e} with {:?} harmonics", between.evidence.harmonics);
+    }
+
+    /// A joint that sticks for a whole period at one frequency slips at the next. Its limit is
+    /// raised only while the derivative of the stuck orbit is computed.
+    #[test]
+    fn a_return_is_checked_with_the_given_limits_after_a_stuck_orbit() {
+        let ground =
+            |law: SharedLaw, name: &str| Joint { name: name.into(), between: ["m".into(), GROUND.into()], law };
+        let model = Model {
+            masses: vec![Mass::new("m", 1.0)],
+            springs: vec![Spring { between: ["m".into(), GROUND.into()], stiffness: 1.0, damping: 0.02 }],
+            joints: vec![
+                ground(Arc::new(Jenkins { stiffness: 20.0, limit: 1.0 }), "slider"),
+                ground(Arc::new(Cubic { stiffness: 1.0 }), "cubic"),
+            ],
+            forces: vec![Force { on: "m".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
+            ..Model::default()
+        };
+        let mut solver = HarmonicBalance::default().solver(&model.assemble().unwrap()).unwrap();
+        let stuck = solver.orbit(0.5).unwrap();
+        assert_eq!(stuck.joints[0].slip_fraction, 0.0);
+        let slipping = solver.orbit(1.4).unwrap();
+        assert!(slipping.joints[0].slip_fraction > 0.1);
+        let defect = slipping.evidence.return_defect.unwrap();
+        assert!(defect < 0.02 && slipping.is_stable() == Some(true), "{defect}");
     }
 
     /// A search ends when its budget is used up, and charges its work.

@@ -16,10 +16,6 @@ use std::sync::Arc;
 /// Settings of the integration and of the classification.
 #[derive(Debug, Clone, Copy)]
 struct SettlingSettings {
-    /// Most degrees of freedom of systems that are integrated; each step multiplies full matrices.
-    dofs: usize,
-    /// Most joints of systems that are integrated.
-    joints: usize,
     /// Steps per period. With 256 steps the ringing of stuck contacts keeps motions from settling
     /// that settle with 1024.
     steps: usize,
@@ -50,8 +46,6 @@ struct SettlingSettings {
 impl Default for SettlingSettings {
     fn default() -> Self {
         SettlingSettings {
-            dofs: 100,
-            joints: 60,
             steps: 1024,
             growth: 160,
             periods: 80,
@@ -66,22 +60,38 @@ impl Default for SettlingSettings {
     }
 }
 
-/// A motion that was integrated: its behaviour, its last period, and its state at the end.
-type Followed = (ObservedMotion, Arc<dyn Path>, Vec<f64>);
+/// A motion that was integrated.
+pub(crate) struct ClassifiedMotion {
+    pub course: ObservedMotion,
+    /// The last period.
+    pub path: Arc<dyn Path>,
+    /// The state at the end.
+    pub state: Vec<f64>,
+    /// Number of multiplications of the integration, roughly.
+    pub multiplications: f64,
+}
 
-/// Classifies the motion from a state and returns it with its last period and its last state.
+/// Classifies the motion from a state with at most about this number of multiplications.
 ///
-/// Returns `None` if no integration in equal steps takes the system, or if it breaks down.
-pub(crate) fn classify_motion(system: &System, omega: f64, mut start: Vec<f64>) -> Option<Followed> {
+/// Returns `None` if the first classification takes more, if no integration in equal steps takes
+/// the system, or if it breaks down.
+pub(crate) fn classify_motion(
+    system: &System,
+    omega: f64,
+    mut start: Vec<f64>,
+    most_multiplications: f64,
+) -> Option<ClassifiedMotion> {
     let settings = SettlingSettings::default();
-    if system.dofs() > settings.dofs
-        || system.joints().len() > settings.joints
-        || IntegratorKind::of(system, None) != IntegratorKind::Incremental
-    {
+    if IntegratorKind::of(system, None) != IntegratorKind::Incremental {
         return None;
     }
     let mut flow = AverageAccelerationFlow::new(system, None, "what follows a motion").ok()?;
     flow.count = settings.steps;
+    let per_period = settings.steps as f64 * flow.step_multiplications();
+    let multiplications = |periods: usize| (settings.growth + periods) as f64 * per_period;
+    if multiplications(settings.periods) > most_multiplications {
+        return None;
+    }
     let (n, period) = (system.dofs(), TAU / omega);
     start.resize(flow.states(), 0.0);
     let mut state = start;
@@ -111,10 +121,10 @@ pub(crate) fn classify_motion(system: &System, omega: f64, mut start: Vec<f64>) 
             (0..settings.instants).map(|i| path.sample(period * i as f64 / settings.instants as f64)).collect();
         let course = classified(system, omega, (count, returns.make_contiguous()), &samples);
         let may_settle = matches!(course, ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. });
-        if !may_settle || 2 * next > settings.most_periods {
-            return Some((course, path, state));
-        }
         next *= 2;
+        if !may_settle || next > settings.most_periods || multiplications(next) > most_multiplications {
+            return Some(ClassifiedMotion { course, path, state, multiplications: multiplications(count) });
+        }
     }
 }
 
@@ -206,14 +216,27 @@ mod tests {
         builder.force(0, 1, Complex64::new(1.0, 0.0)).build().unwrap()
     }
 
+    fn classified_motion(system: &System) -> ClassifiedMotion {
+        classify_motion(system, OMEGA, Vec::new(), f64::INFINITY).unwrap()
+    }
+
+    /// Nothing is integrated beyond the work limit.
+    #[test]
+    fn an_integration_keeps_within_its_work_limit() {
+        let system = block([2.0, 10.0]);
+        let used = classified_motion(&system).multiplications;
+        assert!(classify_motion(&system, OMEGA, Vec::new(), 1.01 * used).is_some());
+        assert!(classify_motion(&system, OMEGA, Vec::new(), 0.99 * used).is_none());
+    }
+
     /// The block settles on its foot. A drag of 2 N above the friction moves it at
     /// `2 N/(60 kg/s)`; a lift of 3 N moves it at `3 N/(60 kg/s)`. Damping alone then balances
     /// the excess load.
     #[test]
     fn a_block_stays_slides_or_leaves() {
-        assert_eq!(classify_motion(&block([2.0, 10.0]), OMEGA, Vec::new()).unwrap().0, ObservedMotion::Settles);
+        assert_eq!(classified_motion(&block([2.0, 10.0])).course, ObservedMotion::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
-            let (course, ..) = classify_motion(&block(load), OMEGA, Vec::new()).unwrap();
+            let course = classified_motion(&block(load)).course;
             let ObservedMotion::Drifts { ref place, speed: measured, spring, open_fraction, .. } = course else {
                 panic!("{course}")
             };
@@ -234,7 +257,7 @@ mod tests {
         let system = block([0.0, 10.0]);
         let returns =
             |of: &dyn Fn(usize) -> f64| (0..settings.window).map(|k| vec![of(k), 0.0, 0.0, OMEGA]).collect::<Vec<_>>();
-        let path = classify_motion(&system, OMEGA, Vec::new()).unwrap().1;
+        let path = classified_motion(&system).path;
         let samples = [path.sample(0.0)];
         let third = classified(&system, OMEGA, (settings.periods, &returns(&|k| (k % 3) as f64)), &samples);
         assert_eq!(third, ObservedMotion::Repeats { periods: 3 });

@@ -111,6 +111,15 @@ impl AverageAccelerationFlow {
         })
     }
 
+    /// Returns the number of multiplications of one step, roughly.
+    pub fn step_multiplications(&self) -> f64 {
+        let (n, axes) = (self.assembly.n as f64, self.assembly.axes.len() as f64);
+        // Newton iterations of a step; and multiplications that take as long as a law's evaluation.
+        // Measured: 0.9 ms per step of a ring with 60 degrees of freedom and 96 axes.
+        let (iterations, law) = (3.0, 200.0);
+        n * (3.0 * n + axes) + iterations * (axes * axes * axes / 3.0 + law * axes)
+    }
+
     /// Returns the sliders in series with springs, whose forces are among the states.
     pub fn springs(&self) -> Vec<ElasticSlider> {
         let mut springs = Vec::new();
@@ -286,10 +295,8 @@ impl Flow for AverageAccelerationFlow {
     }
 
     fn scale_limits(&mut self, joints: &[usize], factor: f64) {
-        let mut springs = self.springs();
-        springs.iter_mut().filter(|spring| joints.contains(&spring.joint)).for_each(|spring| spring.limit *= factor);
-        self.limit(&springs);
         for &joint in joints {
+            self.step.laws[joint].scale_limits(factor);
             let law = &mut self.assembly.joints[joint].law;
             if let Some(scaled) = law.with_limit_factor(factor) {
                 *law = scaled;

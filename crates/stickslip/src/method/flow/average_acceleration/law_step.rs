@@ -193,6 +193,16 @@ impl LawIntegrator {
         }
     }
 
+    /// Multiplies the limits of its sliders by a factor.
+    pub fn scale_limits(&mut self, factor: f64) {
+        for element in &mut self.elements {
+            if let IdealElement::Slider(slider) = element {
+                slider.limit *= factor;
+                slider.static_limit *= factor;
+            }
+        }
+    }
+
     /// Returns the number of arguments of a result.
     fn arguments(&self) -> usize {
         4 * self.directions + self.states

@@ -5,11 +5,11 @@ use super::found_by::FoundBy;
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::NAME;
 use crate::method::harmonic_balance::equations::HarmonicSolution;
-use crate::method::harmonic_balance::settings::TimeStartSettings;
+use crate::method::harmonic_balance::settings::{TimeStartSettings, WorkSettings};
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::return_map::APPROACH;
-use crate::method::orbit_search::settling::classify_motion;
+use crate::method::orbit_search::settling::{ClassifiedMotion, classify_motion};
 use crate::orbit::{JointSample, ObservedMotion, Orbit, Path};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -124,7 +124,10 @@ impl HarmonicBalanceSolver {
         if self.failed_frequencies.len() >= TimeStartSettings::default().integrations {
             return None;
         }
-        let (course, path, state) = classify_motion(&self.system, omega, self.static_state_or_zero())?;
+        let most_work = WorkSettings::default().multiplications * self.point_limit.min(1.0);
+        let ClassifiedMotion { course, path, state, multiplications } =
+            classify_motion(&self.system, omega, self.static_state_or_zero(), most_work)?;
+        self.integration_work += multiplications;
         if matches!(course, ObservedMotion::Settles | ObservedMotion::Settling { .. }) {
             // contacts that open and close may have no solution with few harmonics
             let mut top = top;
