@@ -348,8 +348,9 @@ impl LooseDamper {
     ///
     /// The excitation grows slowly. Returns `None` if the motion does not settle.
     pub fn settled(&self, omega: f64, course: Settings) -> Option<Vec<f64>> {
-        // Periods between two compared amplitudes.
-        let window = 40;
+        // Periods between two compared amplitudes. A prime number, so that motions which repeat
+        // after several periods of the excitation do not count as settled.
+        let window = 41;
         let Settings { steps, growth, periods, settled } = course;
         let n = self.load.len();
         let mut motion = DamperMotion::new(self, &self.matrices[1], TAU / (omega * steps as f64))?;

@@ -33,7 +33,7 @@ pub(super) fn overlay(figures: &[(&str, &Figure)]) -> Figure {
 }
 
 fn is_curve(series: &Series) -> bool {
-    !matches!(series.style, Style::Marks | Style::Missing) && !series.emphasis.is_reference()
+    !series.style.is_marks() && !series.emphasis.is_reference()
 }
 
 /// Returns the labels of all curves without repetition.
@@ -135,7 +135,7 @@ impl OverlaidRun<'_> {
         Series {
             label: match (series.style, self.names.len()) {
                 (Style::Marks, _) => series.label.clone(),
-                (Style::Missing, _) => format!("{}, {}", series.label, self.label),
+                (Style::Missing | Style::Warning, _) => format!("{}, {}", series.label, self.label),
                 (_, 1) => self.label.to_owned(),
                 // Runs beyond the number of line styles have separate legend entries.
                 (_, _) if self.index >= STYLES.len() => format!("{}, {}", series.label, self.label),

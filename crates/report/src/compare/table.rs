@@ -46,7 +46,8 @@ fn shown_differences(table: &mut Table) -> Vec<String> {
     let of = |all: &[String]| differ.iter().map(|row| all[*row].clone()).collect::<Vec<_>>();
     let mut made = vec![Column::texts("table", of(&tables)), Column::texts("column", of(&columns))];
     made.extend(runs.map(|runs| Column::texts("run", of(&runs))));
-    let shown = differ.iter().map(|row| terminal::quantity(&columns[*row], differences[*row]));
+    let column_of = |row: usize| Column::numbers(&columns[row], Vec::new());
+    let shown = differ.iter().map(|row| terminal::quantity(&column_of(*row), differences[*row]));
     made.push(Column::texts("largest_difference", shown.collect()));
     made.push(Column::texts("relative", differ.iter().map(|row| percent(relative[*row], false)).collect()));
     made.push(Column::texts("at", of(&places).iter().map(|place| rounded(place)).collect()));
@@ -97,8 +98,10 @@ mod tests {
         assert_eq!(percent(0.0, true), "0 %");
         assert_eq!(percent(3.4e-6, false), "0.000340 %");
         assert_eq!([percent(12.5, false), percent(f64::NAN, false)], ["1250 %".to_owned(), "–".to_owned()]);
-        assert_eq!(terminal::quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
-        assert_eq!(terminal::quantity("slip_fraction", 0.038_24), "0.0382");
+        let quantity = |name: &str, value: f64| terminal::quantity(&Column::numbers(name, Vec::new()), value);
+        assert_eq!(quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
+        assert_eq!(quantity("blade1_receptance_m_per_N", 4.7e-4), "470 µm/N");
+        assert_eq!(quantity("slip_fraction", 0.038_24), "0.0382");
         assert_eq!(rounded("Ft_N = 6.0, time_s = 0.030387205387205383"), "Ft_N = 6, time_s = 0.03038721");
     }
 }

@@ -66,7 +66,7 @@ pub(crate) fn has_data(panel: &Panel) -> bool {
 pub(crate) fn drawing_order(panel: &Panel) -> Vec<&Series> {
     let mut series: Vec<&Series> = panel.series.iter().collect();
     series.sort_by_key(|s| match (s.style, s.emphasis) {
-        (Style::Marks | Style::Missing, _) => 5,
+        (style, _) if style.is_marks() => 5,
         (_, Emphasis::Reference | Emphasis::OwnReference) => 0,
         (Style::Band | Style::Stripe, _) => 1,
         (Style::Bars, _) => 2,
@@ -230,14 +230,13 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<LegendEntry>, usize) {
             continue;
         }
         let colour = scheme.colour(series);
-        // References and missing points apply to all colours, so they always have a legend
-        // entry.
-        let nameless = !series.emphasis.is_reference() && series.style != Style::Missing;
+        // References, missing points and points to doubt apply to all colours, so they always
+        // have a legend entry.
+        let nameless = !series.emphasis.is_reference() && !matches!(series.style, Style::Missing | Style::Warning);
         let value = series.value.filter(|_| scheme.bar.is_some() && nameless);
         let (line, marks, area) = match line_style(series) {
             Style::Marks => (None, true, None),
-            style @ Style::Missing => (None, false, Some(style)),
-            style @ (Style::Band | Style::Bars) => (None, false, Some(style)),
+            style @ (Style::Missing | Style::Warning | Style::Band | Style::Bars) => (None, false, Some(style)),
             style => (Some(style), false, None),
         };
         let pale = series.emphasis == Emphasis::Pale;
@@ -267,7 +266,7 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<LegendEntry>, usize) {
         entries.into_iter().filter(|(_, _, named)| *named).map(|(entry, ..)| entry).collect();
     entries.sort_by_key(|entry| match entry.area {
         _ if entry.reference => 2,
-        Some(Style::Missing) => 1,
+        Some(Style::Missing | Style::Warning) => 1,
         area => u8::from(entry.line.is_none() && area.is_none()),
     });
     let more = entries.len().saturating_sub(MAX_LEGEND_ENTRIES);
@@ -277,7 +276,8 @@ pub(crate) fn legend(figure: &Figure) -> (Vec<LegendEntry>, usize) {
 
 /// Returns `true` if the number of results requires thin lines and small marks.
 pub(crate) fn crowded(panel: &Panel) -> bool {
-    let results = panel.series.iter().filter(|s| s.emphasis == Emphasis::Normal && s.style != Style::Missing);
+    let is_result = |s: &&Series| s.emphasis == Emphasis::Normal && !matches!(s.style, Style::Missing | Style::Warning);
+    let results = panel.series.iter().filter(is_result);
     // A panel with more results than this is crowded.
     results.count() > 40
 }
@@ -416,7 +416,7 @@ pub(crate) fn row_of_crosses(series: &Series) -> f64 {
 
 /// Returns `true` if x never decreases. Marks are always accepted.
 fn is_curve(panel: &Panel, series: &Series) -> bool {
-    if matches!(series.style, Style::Marks | Style::Missing) {
+    if series.style.is_marks() {
         return true;
     }
     let mut last = f64::NEG_INFINITY;

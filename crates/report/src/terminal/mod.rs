@@ -172,42 +172,16 @@ fn duration(seconds: f64) -> String {
     if seconds < 1.0 { format!("{:.0} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") }
 }
 
-/// Suffixes of column names and their units.
-const UNITS: [(&str, &str); 17] = [
-    ("_N_m_per_rad", "N m/rad"),
-    ("_N_per_m", "N/m"),
-    ("_N_m", "N m"),
-    ("_kg_per_s", "kg/s"),
-    ("_rad_per_s", "rad/s"),
-    ("_m_per_s", "m/s"),
-    ("_s_per_m", "s/m"),
-    ("_Hz_per_s", "Hz/s"),
-    ("_Hz", "Hz"),
-    ("_deg", "°"),
-    ("_rad", "rad"),
-    ("_kg", "kg"),
-    ("_m", "m"),
-    ("_s", "s"),
-    ("_N", "N"),
-    ("_J", "J"),
-    ("_W", "W"),
-];
-
 /// Powers of ten and their SI prefixes, for the units that take a prefix.
 const PREFIXES: [(i32, &str); 7] = [(9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n")];
 
-/// Returns the name without its unit, the unit, and the power of ten and prefix for `largest`.
-fn unit_of(name: &str, largest: f64) -> (&str, &'static str, i32, &'static str) {
-    let (quantity, unit) = UNITS
-        .iter()
-        .find_map(|(end, unit)| Some((name.strip_suffix(end).filter(|rest| !rest.is_empty())?, *unit)))
-        .unwrap_or((name, ""));
-    let prefixed = matches!(unit, "m" | "s" | "N" | "J" | "W" | "N/m") && largest > 0.0;
-    let (power, prefix) = PREFIXES
+/// Returns the power of ten and the prefix of a unit for numbers up to `largest`.
+fn prefix_of(unit: &str, largest: f64) -> (i32, &'static str) {
+    let prefixed = matches!(unit, "m" | "s" | "N" | "J" | "W" | "N/m" | "m/N") && largest > 0.0;
+    PREFIXES
         .into_iter()
         .find(|(power, _)| prefixed && largest < 1e12 && largest >= 0.999_999 * 10f64.powi(*power))
-        .unwrap_or((0, ""));
-    (quantity, unit, power, prefix)
+        .unwrap_or((0, ""))
 }
 
 /// Converts columns of a table to the units that the study uses. `written` maps columns to
@@ -244,35 +218,37 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// Formats one value of a column with its unit, rounded.
-pub(crate) fn quantity(name: &str, value: f64) -> String {
-    let (_, unit, power, prefix) = unit_of(name, value.abs());
+pub(crate) fn quantity(column: &Column, value: f64) -> String {
+    let unit = column.unit().unwrap_or_default();
+    let (power, prefix) = prefix_of(&unit, value.abs());
     // Digits of a difference.
     let number = engineering(&[value / 10f64.powi(power)], 3).remove(0);
-    format!("{number} {prefix}{unit}").trim_end().to_owned()
+    format!("{number} {prefix}{}", shown_unit(&unit)).trim_end().to_owned()
 }
 
-/// Returns heading and formatted cells of a column.
-fn column(name: &str, values: &CellValues, written: Option<&str>) -> (String, Vec<String>) {
+/// Returns the sign of a unit in texts.
+fn shown_unit(unit: &str) -> &str {
+    if unit == "deg" { "°" } else { unit }
+}
+
+/// Returns heading and formatted cells of a column, whose values may be in another unit.
+fn formatted(column: &Column, values: &CellValues, written: Option<&str>) -> (String, Vec<String>) {
+    let (quantity, unit) = column.quantity_and_unit();
+    let quantity = quantity.replace('_', " ");
     let CellValues::Number(numbers) = values else {
-        return (
-            name.replace('_', " "),
-            (0..values.len()).map(|row| clean(&crate::output::csv::cell(values, row))).collect(),
-        );
+        let cells = (0..values.len()).map(|row| clean(&crate::output::csv::cell(values, row)));
+        return (quantity, cells.collect());
     };
     if let Some(unit) = written {
-        let (quantity, ..) = unit_of(name, 0.0);
         // Digits of a quantity in the study's unit, as frequencies require.
-        return (format!("{} ({unit})", quantity.replace('_', " ")), engineering(numbers, 7));
+        return (format!("{quantity} ({unit})"), engineering(numbers, 7));
     }
+    let Some(unit) = unit else { return (quantity, engineering(numbers, 5)) };
     let largest = numbers.iter().filter(|v| v.is_finite()).fold(0.0, |m: f64, v| m.max(v.abs()));
-    let (quantity, unit, power, prefix) = unit_of(name, largest);
+    let (power, prefix) = prefix_of(&unit, largest);
     let scaled: Vec<f64> = numbers.iter().map(|v| v / 10f64.powi(power)).collect();
     let significant = if unit == "Hz" { 7 } else { 5 };
-    let heading = match unit {
-        "" => quantity.replace('_', " "),
-        unit => format!("{} ({prefix}{unit})", quantity.replace('_', " ")),
-    };
-    (heading, engineering(&scaled, significant))
+    (format!("{quantity} ({prefix}{})", shown_unit(&unit)), engineering(&scaled, significant))
 }
 
 /// Formats the numbers of one column with a common number of decimals.
@@ -319,7 +295,7 @@ fn shown(name: &str, table: &[ConvertedColumn<'_>], limit: usize) -> String {
         .iter()
         .map(|one| {
             let (c, unit) = (one.column, one.converted.as_ref().map(|(_, unit)| *unit));
-            let (heading, cells) = column(&c.name, &head(one.values(), rows), unit);
+            let (heading, cells) = formatted(c, &head(one.values(), rows), unit);
             let heading = clean(&heading);
             let width = cells.iter().chain([&heading]).map(|text| text.chars().count()).max().unwrap_or(0);
             let right = matches!(c.values, CellValues::Number(_) | CellValues::Integer(_));
@@ -544,10 +520,16 @@ mod tests {
 
     #[test]
     fn every_unit_of_a_parameter_is_read() {
-        for (name, heading) in
-            [("alpha_s_per_m", "alpha (s/m)"), ("v_m_per_s", "v (m/s)"), ("rate_Hz_per_s", "rate (Hz/s)"), ("n", "n")]
-        {
-            assert_eq!(column(name, &CellValues::Number(vec![2.0]), None).0, heading);
+        for (name, heading) in [
+            ("alpha_s_per_m", "alpha (s/m)"),
+            ("v_m_per_s", "v (m/s)"),
+            ("rate_Hz_per_s", "rate (Hz/s)"),
+            ("receptance_m_per_N", "receptance (m/N)"),
+            ("phase_deg", "phase (°)"),
+            ("n", "n"),
+        ] {
+            let column = Column::numbers(name, vec![2.0]);
+            assert_eq!(formatted(&column, &column.values, None).0, heading);
         }
     }
 

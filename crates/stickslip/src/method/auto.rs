@@ -14,7 +14,7 @@ use super::{
 };
 use crate::law::Law;
 use crate::model::System;
-use crate::orbit::{ObservedMotion, Orbit, OrbitError};
+use crate::orbit::{Accuracy, ObservedMotion, Orbit, OrbitError};
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -198,6 +198,20 @@ impl<'a> WithFallback<'a> {
         Some((name, build_named(name)?.solver(system).ok()?))
     }
 
+    /// Returns an orbit without truncation error, if the second method is event-driven and finds
+    /// one.
+    fn exact_orbit(&mut self, request: &Request<'_>, budget: &mut Budget) -> Option<Orbit> {
+        let chosen = self.chosen;
+        let (name, second) = self.second()?;
+        if *name != event_driven::INFO.name {
+            return None;
+        }
+        let near = Request { seed: request.seed.filter(|seed| seed.by_fallback), ..*request };
+        let mut orbit = second.solve(&near, budget).ok()?;
+        orbit.evidence.fallback_from = Some(chosen);
+        Some(orbit)
+    }
+
     /// Returns the second method with its name, made at the first use.
     fn second(&mut self) -> Option<&mut (&'static str, Box<dyn Solver + Send + 'a>)> {
         if self.second.is_none() {
@@ -241,6 +255,9 @@ impl Solver for WithFallback<'_> {
         let error = match self.first.solve(&own, budget) {
             // an orbit between those of the first method can be omitted
             Err(error) if request.estimate == ErrorEstimate::Skipped && by_second.is_none() => return Err(error),
+            Ok(orbit) if orbit.evidence.accuracy == Accuracy::Truncated => {
+                return Ok(self.exact_orbit(request, budget).unwrap_or(orbit));
+            }
             Err(error) if may_succeed_elsewhere(&error) => error,
             outcome => return outcome,
         };

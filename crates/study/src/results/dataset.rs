@@ -148,11 +148,19 @@ impl Column {
     /// assert_eq!(unit("blade_shape_per_sqrt_kg"), None); // study files have no root units
     /// ```
     pub fn unit(&self) -> Option<String> {
-        if !matches!(self.values, CellValues::Number(_)) || self.name.contains("_sqrt_") {
-            return None;
+        self.quantity_and_unit().1
+    }
+
+    /// Returns the name without its unit, and the unit.
+    pub fn quantity_and_unit(&self) -> (&str, Option<String>) {
+        let name = self.name.as_str();
+        if !matches!(self.values, CellValues::Number(_)) || name.contains("_sqrt_") {
+            return (name, None);
         }
-        let ends = self.name.match_indices('_').map(|(at, _)| &self.name[at + 1..]);
-        ends.filter(|end| !end.starts_with("per_")).find_map(parse_unit_suffix)
+        let ends = name.match_indices('_').filter(|(at, _)| *at > 0).map(|(at, _)| (&name[..at], &name[at + 1..]));
+        let mut units = ends.filter(|(_, end)| !end.starts_with("per_"));
+        let found = units.find_map(|(quantity, end)| Some((quantity, Some(parse_unit_suffix(end)?))));
+        found.unwrap_or((name, None))
     }
 
     /// Builds a column of numbers.
@@ -425,6 +433,10 @@ impl Series {
     pub fn marks(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
         Series { style: Style::Marks, ..Series::line(label, x, y, colour) }
     }
+    /// Returns triangles at points to doubt.
+    pub fn warning(label: impl Into<String>, x: Vec<f64>, y: Vec<f64>, colour: usize) -> Series {
+        Series { style: Style::Warning, ..Series::line(label, x, y, colour) }
+    }
     /// Returns crosses at abscissae without a value, in row `row` (from 1) above the lower
     /// edge.
     pub fn missing(label: impl Into<String>, x: Vec<f64>, row: usize, colour: usize) -> Series {
@@ -507,6 +519,8 @@ pub enum Style {
     Dotted,
     /// Marks without a line (peaks).
     Marks,
+    /// Triangles without a line, at points to doubt: unstable, or less exact than requested.
+    Warning,
     /// Crosses at the lower edge of the panel, at abscissae without a value (failed points);
     /// `y` is the row of crosses, from 1.
     Missing,
@@ -518,6 +532,13 @@ pub enum Style {
     /// A stripe with the colours of [`Series::shades`], around `y` with height one, or from
     /// [`Series::base`] to `y`; several stripes form a map.
     Stripe,
+}
+
+impl Style {
+    /// Returns true for marks without a line, in any order along x.
+    pub fn is_marks(self) -> bool {
+        matches!(self, Style::Marks | Style::Warning | Style::Missing)
+    }
 }
 
 /// A point that did not converge: its position and the reason.

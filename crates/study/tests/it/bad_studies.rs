@@ -363,6 +363,14 @@ fn several_errors_come_together_in_the_order_of_the_file() {
     assert_eq!((error.line(), lines), (Some(25), vec![Some(29), Some(42)]));
 }
 
+/// A misspelt required key is not reported as missing too.
+#[test]
+fn a_misspelt_required_key_is_one_error() {
+    check("limit = \"Ft\"", "limt = \"Ft\"", (38, 27), "limt", &["did you mean `limit`?"]);
+    let error = read_study("bad.toml", &EXAMPLE.replacen("limit = \"Ft\"", "limt = \"Ft\"", 1), &[]).unwrap_err();
+    assert!(error.others().is_empty(), "{error}");
+}
+
 #[test]
 fn overrides() {
     let check = |name: &str, value: &str, words: &str| {

@@ -231,6 +231,11 @@ fn sample(entry: &LegendEntry) -> String {
         )
     };
     match entry.area {
+        Some(Style::Warning) => {
+            out.push_str(
+                "<path d=\"M11 10L15 3L19 10Z\" fill=\"none\" style=\"stroke: var(--colour)\" stroke-width=\"1.5\"/>",
+            );
+        }
         Some(Style::Missing) => {
             out.push_str("<path d=\"M12 4L18 10M12 10L18 4\" style=\"stroke: var(--colour)\" stroke-width=\"1.5\"/>");
         }

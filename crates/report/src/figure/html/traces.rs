@@ -82,6 +82,11 @@ impl PanelTraces<'_> {
                     json!({ "color": GROUND, "size": 8, "line": { "color": colour, "width": 2 } })
                 };
             }
+            Style::Warning => {
+                trace["mode"] = json!("markers");
+                let line = json!({ "color": colour, "width": 1.5 });
+                trace["marker"] = json!({ "symbol": "triangle-up", "color": GROUND, "size": 8, "line": line });
+            }
             Style::Missing => {
                 let y = self.axes.y.value_at(panels::row_of_crosses(series));
                 trace["y"] = json!(self.y.numbers(series.x.iter().map(|_| y)));
@@ -221,7 +226,7 @@ fn dash(style: Style) -> &'static str {
     match style {
         Style::Dashed => "7px,4px",
         Style::Dotted => "2px,3px",
-        Style::Solid | Style::Marks | Style::Missing | Style::Band | Style::Bars | Style::Stripe => "solid",
+        _ => "solid",
     }
 }
 

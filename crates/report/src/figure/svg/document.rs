@@ -144,6 +144,16 @@ impl Svg {
         );
     }
 
+    /// Writes a triangle, which marks a point to doubt.
+    pub(super) fn triangle(&mut self, (x, y): Point, colour: &str) {
+        let [left, right, top, bottom] = [x - 4.0, x + 4.0, y - 4.4, y + 2.6].map(short);
+        let _ = writeln!(
+            self.0,
+            "<path d=\"M{left} {bottom}L{} {top}L{right} {bottom}Z\" fill=\"#ffffff\" stroke=\"{colour}\" stroke-width=\"1.4\"/>",
+            short(x)
+        );
+    }
+
     pub(super) fn dot(&mut self, (x, y): Point, colour: &str) {
         let _ = writeln!(self.0, "<circle cx=\"{}\" cy=\"{}\" r=\"2\" fill=\"{colour}\"/>", short(x), short(y));
     }

@@ -59,9 +59,9 @@ pub fn to_svg(figure: &Figure) -> String {
 /// Returns the dash pattern of a line style, if it has one.
 fn dashes(style: Style) -> Option<&'static str> {
     match style {
-        Style::Solid | Style::Marks | Style::Missing | Style::Band | Style::Bars | Style::Stripe => None,
         Style::Dashed => Some("7 4"),
         Style::Dotted => Some("2 3"),
+        _ => None,
     }
 }
 
@@ -69,6 +69,7 @@ fn draw_entry(svg: &mut Svg, PlacedEntry { entry, lines, x, y }: &PlacedEntry) {
     let colour = &entry.colour.light;
     let opacity = if entry.pale { PALE } else { 1.0 };
     match entry.area {
+        Some(Style::Warning) => svg.triangle((x + SAMPLE.0 / 2.0, *y), colour),
         Some(Style::Missing) => svg.cross((x + SAMPLE.0 / 2.0, *y), colour),
         Some(Style::Band) => svg.area(&box_around(*x, y - 5.0, SAMPLE.0, 10.0), colour, AREA),
         Some(_) => svg.area(&box_around(x + 8.0, y - 6.0, 14.0, 12.0), colour, opacity),
@@ -193,6 +194,12 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
                 let at = panels::drawn(panel, series).map(|p| plot.map(p));
                 for point in at.filter(|p| plot.clip_rect().contains(*p)) {
                     svg.mark(point, colour, size);
+                }
+            }
+            Style::Warning => {
+                let at = panels::drawn(panel, series).map(|p| plot.map(p));
+                for point in at.filter(|p| plot.clip_rect().contains(*p)) {
+                    svg.triangle(point, colour);
                 }
             }
             Style::Missing => {

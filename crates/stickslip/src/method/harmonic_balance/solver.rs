@@ -488,7 +488,8 @@ mod tests {
             forces: vec![Force { on: "m".into(), amplitude: 1.0, phase: 0.0, harmonic: 1 }],
             ..Model::default()
         };
-        let mut solver = HarmonicBalance::default().solver(&model.assemble().unwrap()).unwrap();
+        let system = model.assemble().unwrap();
+        let mut solver = HarmonicBalance::default().solver(&system).unwrap();
         let stuck = solver.orbit(0.5).unwrap();
         assert_eq!(stuck.joints[0].slip_fraction, 0.0);
         let slipping = solver.orbit(1.4).unwrap();

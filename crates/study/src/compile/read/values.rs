@@ -20,9 +20,12 @@ use stickslip::model::{NEXT, is_identifier, is_place};
 impl Reader {
     /// Reports unknown and missing keys.
     pub(super) fn check_keys(&mut self, table: &TomlTable, keys: &[Key], owner: &str) {
+        let mut misspelt = Vec::new();
         for entry in &table.entries {
             if !keys.iter().any(|key| key.name == entry.key) {
-                let help = match suggest(&entry.key, keys.iter().map(|key| key.name)) {
+                let near = suggest(&entry.key, keys.iter().map(|key| key.name));
+                misspelt.extend(near);
+                let help = match near {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => {
                         let taken = keys.iter().filter(|key| key.is_supported()).map(|key| key.name);
@@ -39,7 +42,7 @@ impl Reader {
             }
         }
         for key in keys.iter().filter(|key| key.presence == Presence::Required) {
-            if table.get(key.name).is_none() {
+            if table.get(key.name).is_none() && !misspelt.contains(&key.name) {
                 let message = format!("`{}` is missing in {owner}: {}", key.name, schema::describe_value(&key.takes));
                 let help = match key.takes {
                     ValueType::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),

@@ -1,6 +1,6 @@
 //! The figure of a response.
 
-use super::figure_data::{CasePeak, FigureData, force};
+use super::figure_data::{CasePeak, FigureData, PointsToDoubt, force};
 use super::{amplification, tables};
 use crate::kinds::shared::contact_states;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP, amplitude_of};
@@ -50,6 +50,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         joints,
         contact_joints: faces,
         failed: 0,
+        to_doubt: PointsToDoubt::of(curve),
         case_count_text: drawing.shown_cases_text(cases.len()),
     };
     drawn.failed = cases.iter().map(|case_rows| drawn.without_orbit(case_rows).len()).sum();

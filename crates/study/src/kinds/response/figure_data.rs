@@ -8,6 +8,7 @@ use crate::results::drawing::{CaseRows, FigureInput, join_title, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
+use stickslip::orbit::Accuracy;
 use stickslip_numerics::tie_break::{RELATIVE_TIE, first_largest};
 
 /// Largest number of places drawn one by one. For more places, the largest amplitude is drawn,
@@ -26,6 +27,34 @@ pub(super) struct CasePeak {
     pub(super) at: (f64, f64),
     /// True if only the reverse sweep has the peak.
     pub(super) reverse_sweep: bool,
+}
+
+/// Points that are unstable or less exact than requested.
+#[derive(Debug, Clone)]
+pub(super) struct PointsToDoubt {
+    /// Rows of the curve table.
+    rows: BTreeSet<usize>,
+    /// Legend entry.
+    label: String,
+}
+
+impl PointsToDoubt {
+    /// Reads the columns `stable` and `status` of a curve table.
+    pub(super) fn of(curve: &Table) -> PointsToDoubt {
+        let truncated = Accuracy::Truncated.status();
+        let unstable: BTreeSet<usize> = match curve.flags("stable") {
+            Some(stable) => (0..curve.rows()).filter(|row| stable[*row] == Some(false)).collect(),
+            None => BTreeSet::new(),
+        };
+        let inexact: BTreeSet<usize> = match curve.texts("status") {
+            Some(status) => (0..curve.rows()).filter(|row| status[*row] == truncated).collect(),
+            None => BTreeSet::new(),
+        };
+        let counts = [(unstable.len(), "unstable"), (inexact.len(), "less exact than requested")];
+        let counts = counts.iter().filter(|(count, _)| *count > 0).map(|(count, text)| format!("{count} {text}"));
+        let label = format!("points: {}", counts.collect::<Vec<_>>().join(", "));
+        PointsToDoubt { rows: unstable.union(&inexact).copied().collect(), label }
+    }
 }
 
 /// The data of the figure.
@@ -57,6 +86,7 @@ pub(super) struct FigureData<'a> {
     pub(super) force_factor: f64,
     /// Number of points without an orbit among all drawn points.
     pub(super) failed: usize,
+    pub(super) to_doubt: PointsToDoubt,
     /// States how many of the cases are shown, if not all.
     pub(super) case_count_text: Option<String>,
 }
@@ -70,13 +100,8 @@ impl FigureData<'_> {
 
     /// Returns the curve of one place in one case, with its peaks inserted.
     pub(super) fn line(&self, case_rows: &CaseRows, name: &str) -> (Vec<f64>, Vec<f64>) {
-        let x = numbers(self.curve, DRIVE, case_rows.rows.clone());
-        let y = self.amplitudes(name, case_rows.rows.clone());
-        self.scaled(
-            self.with_peaks(case_rows, x.into_iter().zip(y).collect(), &|peak| {
-                !peak.reverse_sweep && peak.mass == name
-            }),
-        )
+        let points = self.points(case_rows, name);
+        self.scaled(self.with_peaks(case_rows, points, &|peak| !peak.reverse_sweep && peak.mass == name))
     }
 
     /// Returns the curve of the reverse sweep if it has other orbits.
@@ -102,9 +127,14 @@ impl FigureData<'_> {
         Some(Series { style: Style::Dotted, ..Series::line("reverse sweep", x, y, colour) })
     }
 
+    /// Returns the largest amplitude of the shown places, (Hz, m), without their peaks.
+    pub(super) fn largest_points(&self, case_rows: &CaseRows) -> Vec<(f64, f64)> {
+        self.largest_at(case_rows, &self.all(case_rows))
+    }
+
     /// Returns the largest amplitude of the shown places at the frequencies of the curve.
     pub(super) fn largest(&self, case_rows: &CaseRows) -> (Vec<f64>, Vec<f64>) {
-        self.scaled(self.largest_at(case_rows, &self.all(case_rows)))
+        self.scaled(self.largest_points(case_rows))
     }
 
     /// Returns the largest amplitude with the peaks inserted, and states which place has the
@@ -256,6 +286,25 @@ impl FigureData<'_> {
         let count = self.failed;
         let label = format!("{count} point{} without an orbit", crate::syntax::format::plural_suffix(count));
         (!x.is_empty()).then(|| Series::missing(label, x, row, colour))
+    }
+
+    /// Returns triangles at the points to doubt of a curve, whose points (Hz, m) are those of the
+    /// case.
+    pub(super) fn points_to_doubt(
+        &self,
+        case_rows: &CaseRows,
+        curve: Vec<(f64, f64)>,
+        colour: usize,
+    ) -> Option<Series> {
+        let doubtful = case_rows.rows.clone().zip(curve).filter(|(row, _)| self.to_doubt.rows.contains(row));
+        let (x, y) = self.scaled(doubtful.map(|(_, point)| point).filter(|point| point.1.is_finite()).collect());
+        (!x.is_empty()).then(|| Series::warning(self.to_doubt.label.clone(), x, y, colour))
+    }
+
+    /// Returns the points of a place in a case, (Hz, m), without its peaks.
+    pub(super) fn points(&self, case_rows: &CaseRows, name: &str) -> Vec<(f64, f64)> {
+        let x = numbers(self.curve, DRIVE, case_rows.rows.clone());
+        x.into_iter().zip(self.amplitudes(name, case_rows.rows.clone())).collect()
     }
 
     /// Returns the frequencies, on the axis, at which a case has no orbit.

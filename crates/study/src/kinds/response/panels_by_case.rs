@@ -89,7 +89,9 @@ impl FigureData<'_> {
                 |shown: &(String, usize)| self.reverse_sweep_series(case_rows, &[&shown.0], colour_of(shown));
             panel.series.extend(self.shown.iter().filter_map(reverse_series));
             for (name, place) in &self.shown {
-                panel.series.extend(self.marks(case_rows, name, self.colour_of(name, *place)));
+                let colour = self.colour_of(name, *place);
+                panel.series.extend(self.points_to_doubt(case_rows, self.points(case_rows, name), colour));
+                panel.series.extend(self.marks(case_rows, name, colour));
             }
             return panel;
         }
@@ -108,6 +110,7 @@ impl FigureData<'_> {
         panel.title = join_title([panel.title, worst]);
         panel.series.push(Series::line(format!("largest of {} places", names.len()), x, y, 0));
         panel.series.extend(self.reverse_sweep_series(case_rows, &names, 0));
+        panel.series.extend(self.points_to_doubt(case_rows, self.largest_points(case_rows), 0));
         panel
     }
 

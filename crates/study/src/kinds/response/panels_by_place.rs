@@ -127,6 +127,8 @@ impl FigureData<'_> {
             panel
                 .series
                 .extend(self.reverse_sweep_series(case_rows, &names, colour).map(|back| Series { value, ..back }));
+            let points = mass.map_or_else(|| self.largest_points(case_rows), |name| self.points(case_rows, name));
+            panel.series.extend(self.points_to_doubt(case_rows, points, colour).map(|marks| Series { value, ..marks }));
             if let (Some(name), true) = (mass, group.len() <= MAX_SINGLE_PLACES) {
                 panel.series.extend(self.marks(case_rows, name, colour).map(|marks| Series { value, ..marks }));
             }

@@ -30,6 +30,10 @@ struct RefinementSettings {
     /// steep friction. A smaller distance is not believed, because two solutions may be close by
     /// chance: a distance of 1.3e-3 was seen with an error of 1e-2.
     least_error_ratio: f64,
+    /// Largest error estimate, in tolerances, with which an orbit is still returned, as truncated.
+    /// Default 10: errors up to 1 % are usable, and a series with larger ones may show another
+    /// motion.
+    accepted_error: f64,
     /// Reduction of the residual to which the finer solution of an error estimate is solved. The
     /// relative error of the estimate is about as large. With elastic friction one Newton step
     /// reaches it.
@@ -38,7 +42,13 @@ struct RefinementSettings {
 
 impl Default for RefinementSettings {
     fn default() -> Self {
-        RefinementSettings { most_harmonics: 511, order: 2.0, least_error_ratio: 0.1, estimate_reduction: 1e-3 }
+        RefinementSettings {
+            most_harmonics: 511,
+            order: 2.0,
+            least_error_ratio: 0.1,
+            accepted_error: 10.0,
+            estimate_reduction: 1e-3,
+        }
     }
 }
 
@@ -233,6 +243,9 @@ impl HarmonicBalanceSolver {
             // the comparison solved the finer series less accurately, or with other samples
             motion = self.solve(top, omega, Some((top, &finer))).map_err(|l| self.solve_error(l))?;
             x = self.places(top, omega, &motion).map_err(|l| self.solve_error(l))?;
+        }
+        if estimate <= settings.accepted_error * tolerance {
+            return self.make_orbit(top, omega, motion, x, Some(estimate));
         }
         let harmonics = checked / self.periods;
         let state =
