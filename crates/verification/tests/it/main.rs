@@ -26,6 +26,7 @@
 //! - `orbits_without_stick`: one Coulomb contact that always slips;
 //! - `paper_couple`: the blade couple of the paper;
 //! - `parallel_contacts`: contacts with proportional motions;
+//! - `plane_slider`: an elastic slider in a plane against located switches by SciPy;
 //! - `random_models`: random models by the exact method;
 //! - `refusals`: methods that refuse a system name alternatives;
 //! - `similarity`: similarity of the blade couple;
@@ -61,6 +62,7 @@ mod massless_combinations;
 mod orbits_without_stick;
 mod paper_couple;
 mod parallel_contacts;
+mod plane_slider;
 mod random_models;
 mod refusals;
 mod similarity;
