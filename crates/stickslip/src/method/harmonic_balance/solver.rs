@@ -77,8 +77,9 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) failed_frequencies: Vec<(f64, ObservedMotion, Vec<f64>)>,
     /// Number of time integrations that were made to find an orbit.
     pub(super) time_integrations: usize,
-    /// Multiplications of the integrations in time that classified a motion of the present point.
-    pub(super) integration_work: f64,
+    /// Work of the present point that its discretizations do not count, as a fraction of the
+    /// default limit: integrations in time, and searches before them.
+    pub(super) earlier_work: f64,
     /// By highest harmonic, in systems with many contacts: the last solution whose error was
     /// estimated, and the finer solution with twice the harmonics.
     pub(super) comparisons: BTreeMap<usize, [HarmonicSolution; 2]>,
@@ -134,7 +135,7 @@ impl HarmonicBalanceSolver {
             limit: None,
             failed_frequencies: Vec::new(),
             time_integrations: 0,
-            integration_work: 0.0,
+            earlier_work: 0.0,
             comparisons: BTreeMap::new(),
         })
     }
@@ -166,7 +167,7 @@ impl HarmonicBalanceSolver {
         self.excitation_frequency = excitation;
         self.point_limit = limit;
         self.limit = None;
-        self.integration_work = 0.0;
+        self.earlier_work = 0.0;
         self.discretizations.values_mut().for_each(Discretization::begin_point);
     }
 
@@ -191,10 +192,9 @@ impl HarmonicBalanceSolver {
     }
 
     /// Returns the work of the point as a fraction of the default limit.
-    fn work_fraction(&self) -> f64 {
+    pub(super) fn work_fraction(&self) -> f64 {
         let (used, limit) = (self.work_used(None), WorkSettings::default().point);
-        let integrated = self.integration_work / WorkSettings::default().multiplications;
-        ((used.multiplications + integrated) / limit.multiplications).max(used.time_steps / limit.time_steps)
+        self.earlier_work + (used.multiplications / limit.multiplications).max(used.time_steps / limit.time_steps)
     }
 
     /// Returns true if a solution with twice the harmonics takes at most seconds and fits in

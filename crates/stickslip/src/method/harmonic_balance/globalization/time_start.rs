@@ -4,7 +4,7 @@
 use super::found_by::FoundBy;
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::NAME;
-use crate::method::harmonic_balance::equations::HarmonicSolution;
+use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::settings::{TimeStartSettings, WorkSettings};
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::method::orbit_search::describing_guess::DescribingGuess;
@@ -124,11 +124,16 @@ impl HarmonicBalanceSolver {
         if self.failed_frequencies.len() >= TimeStartSettings::default().integrations {
             return None;
         }
-        let most_work = WorkSettings::default().multiplications * self.point_limit.min(1.0);
+        let WorkSettings { multiplications: of_search, point, .. } = WorkSettings::default();
+        let most = of_search * self.point_limit.min(1.0);
         let ClassifiedMotion { course, path, state, multiplications } =
-            classify_motion(&self.system, omega, self.static_state_or_zero(), most_work)?;
-        self.integration_work += multiplications;
+            classify_motion(&self.system, omega, self.static_state_or_zero(), most)?;
+        self.earlier_work += multiplications / (of_search * point.multiplications);
         if matches!(course, ObservedMotion::Settles | ObservedMotion::Settling { .. }) {
+            // An orbit exists: searches from its motion get a budget as large as that of a point,
+            // whatever the searches that failed have used.
+            (self.earlier_work, self.limit) = (self.work_fraction(), None);
+            self.discretizations.values_mut().for_each(Discretization::begin_point);
             // contacts that open and close may have no solution with few harmonics
             let mut top = top;
             for _ in 0..TimeStartSettings::default().series_lengths {
