@@ -2,7 +2,7 @@
 // map. The present point can be dragged and moves the sliders.
 
 import { run, stop } from "./api.js";
-import { make, perFrame } from "./dom.js";
+import { make, perFrame, tall } from "./dom.js";
 import { digits, duration, si } from "./format.js";
 import * as fit from "./fit.js";
 import * as mistuning from "./mistuning.js";
@@ -115,7 +115,7 @@ function search(kind, title, letters) {
     place.hidden = legendPlace.hidden = false;
     place.classList.toggle("stale", others(result.ranges) !== found);
     legend(legendPlace, result.plot, place);
-    draw(place, result.plot, { shapes: kind === "map" ? [cross()].flat() : upright(), height: 400 });
+    draw(place, result.plot, { shapes: kind === "map" ? [cross()].flat() : upright(), height: tall(400) });
   });
   place.addEventListener("redraw", () => show());
 

@@ -40,6 +40,9 @@ export function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(address), 10000);
 }
 
+/** Height of a figure: on a screen with more than 900 rows it grows with the window. @param {number} height px */
+export const tall = (height) => Math.round(height * Math.max(1, window.innerHeight / 900));
+
 /** Calls at most once per frame, with the last arguments. @template {any[]} T @param {(...a: T) => void} call */
 export function perFrame(call) {
   /** @type {T | null} */

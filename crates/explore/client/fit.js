@@ -2,7 +2,7 @@
 // values can then be given to the sliders.
 
 import { run, stop } from "./api.js";
-import { byId, make } from "./dom.js";
+import { byId, make, tall } from "./dom.js";
 import { digits, duration } from "./format.js";
 import { rangeOf } from "./parameters.js";
 import { draw, legend } from "./plot.js";
@@ -90,7 +90,7 @@ function show() {
   if (!found || tile.hidden) { return; }
   place.hidden = legendPlace.hidden = false;
   legend(legendPlace, found.plot, place);
-  draw(place, found.plot, { height: 360 });
+  draw(place, found.plot, { height: tall(360) });
 }
 
 const STATUS = { determined: "determined", "at-bound": "at the end of its range", "not-determined": "not determined by the data" };

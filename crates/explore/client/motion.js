@@ -1,6 +1,6 @@
 // The third tab: the structure, animated over one period. Joints are coloured by stick and slip.
 
-import { make } from "./dom.js";
+import { make, tall } from "./dom.js";
 import { digits } from "./format.js";
 import * as loops from "./moving_loops.js";
 import { colour, isDark } from "./plot.js";
@@ -80,7 +80,7 @@ function drawFlat(orbit, model) {
   const bounds = [...scene.masses, ...scene.ground];
   const [left, right] = [Math.min(...bounds.map((one) => one.x)) - 1.3, Math.max(...bounds.map((one) => one.x)) + 1.3];
   const [top, bottom] = [Math.min(...bounds.map((one) => one.y)) - 1.2, Math.max(...bounds.map((one) => one.y)) + 0.8];
-  const unit = Math.min(width / (right - left), Math.min(620, window.innerHeight * 0.55) / (bottom - top), scene.wheel ? 90 : 130);
+  const unit = Math.min(width / (right - left), window.innerHeight * 0.55 / (bottom - top), tall(scene.wheel ? 90 : 130));
   const height = Math.max(240, (bottom - top) * unit);
   const ratio = devicePixelRatio || 1;
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
@@ -91,8 +91,8 @@ function drawFlat(orbit, model) {
   const pen = canvas.getContext("2d");
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
-  const shift = (width - (right - left) * unit) / 2;
-  const to = (/** @type {number} */ x, /** @type {number} */ y) => [shift + (x - left) * unit, (y - top) * unit];
+  const [aside, below] = [(width - (right - left) * unit) / 2, (height - (bottom - top) * unit) / 2];
+  const to = (/** @type {number} */ x, /** @type {number} */ y) => [aside + (x - left) * unit, below + (y - top) * unit];
   const most = Math.max(1e-30, ...orbit.places.map((/** @type {string} */ name) => { const values = orbit.columns.get(`${name}_displacement_m`); return Math.max(...values) - mean(values); }));
   const gain = 0.75 * Number(size.value) / most;
   const places = new Map(bounds.map((one) => [one.name, { ...one, ...moved(orbit, one, gain) }]));

@@ -1,6 +1,6 @@
 // The loops of the joints with a point at the present time, beside the animation.
 
-import { make } from "./dom.js";
+import { make, tall } from "./dom.js";
 import { scale } from "./format.js";
 import { colour, isDark } from "./plot.js";
 
@@ -27,7 +27,7 @@ export function draw(orbit, now) {
   const labels = orbit.shown.labels;
   canvas.hidden = labels.length === 0;
   if (labels.length === 0) { return; }
-  const [width, height, ratio] = [canvas.clientWidth, 260, devicePixelRatio || 1];
+  const [width, height, ratio] = [canvas.clientWidth, tall(260), devicePixelRatio || 1];
   if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); }
   if (canvas.height !== height * ratio) { canvas.height = height * ratio; canvas.style.height = `${height}px`; }
   const pen = canvas.getContext("2d");

@@ -33,9 +33,9 @@ export function start(place) {
   grid = make("div", { class: "grid" });
   empty = make("p", { class: "empty" });
   panel.append(tools, empty, grid);
-  for (const [name, title] of [["loops", "Hysteresis loops"], ["words", "Evidence"], ["time", "Motion over one period"], ["spectrum", "Harmonics of the displacement"], ["energy", "Energy per cycle"], ["multipliers", "Floquet multipliers"]]) {
+  for (const [name, title, size] of [["loops", "Hysteresis loops", ""], ["words", "Evidence", ""], ["time", "Motion over one period", "wide"], ["spectrum", "Harmonics of the displacement", "third"], ["energy", "Energy per cycle", "third"], ["multipliers", "Floquet multipliers", "third"]]) {
     plots[name] = name === "words" ? make("ul", { id: "orbit-words" }) : make("div", { class: "plot", id: `orbit-${name}` });
-    grid.append(make("section", { class: `tile${name === "time" ? " wide" : ""}`, "aria-label": title }, make("h2", { text: title }), plots[name],
+    grid.append(make("section", { class: `tile ${size}`, "aria-label": title }, make("h2", { text: title }), plots[name],
       name === "time" ? make("p", { class: "hint", text: "Shading: a joint sticks (blue) or is open (pink); it slips where there is none. Several joints have one strip each." }) : null,
       name === "time" ? make("p", { class: "hint", id: "first-sector", hidden: true, text: "The plots show the first sector of the tuned disk; the others do the same, one after the other." }) : null));
   }
@@ -247,14 +247,18 @@ function spectrum() {
     const values = [1, 2, 3, 4, 5].map((h) => orbit.first.get(`${name}_harmonic${h}_m`) ?? null);
     return { x: [1, 2, 3, 4, 5], y: values.map((value) => (value === null ? null : value * 1e3)), name, type: "bar", marker: { color: colour(i) } };
   });
-  drawOwn(plots.spectrum, data, { xaxis: { title: "harmonic", dtick: 1 }, yaxis: { title: "amplitude (mm)", type: "log", exponentformat: "power", nticks: 6 }, bargap: 0.3, ...legendIf(data) });
+  // the even harmonics of a symmetric motion are zero except for rounding
+  const all = data.flatMap((/** @type {any} */ one) => one.y);
+  const most = Math.max(...all);
+  const range = [Math.min(...all.filter((value) => value > 1e-9 * most)) / 3, most * 2].map(Math.log10);
+  drawOwn(plots.spectrum, data, { xaxis: { title: "harmonic", dtick: 1, range: [0.5, 5.5] }, yaxis: { title: "amplitude (mm)", type: "log", exponentformat: "power", nticks: 6, ...(most > 0 ? { range } : {}) }, bargap: 0.3, ...legendIf(data) });
 }
 
 function energy() {
-  const names = ["work of the forces", "viscous loss", "friction loss"];
+  const names = ["work of<br>the forces", "viscous<br>loss", "friction<br>loss"];
   const values = ["work_in_J", "viscous_J", "friction_J"].map((name) => orbit.first.get(name));
   const { factor, unit } = scale(values, "J");
-  drawOwn(plots.energy, [{ x: names, y: values.map((value) => value * factor), type: "bar", marker: { color: [colour(0), colour(2), colour(1)] }, text: values.map((value) => si(value, "J", 3)), textposition: "auto", hoverinfo: "x+text" }], { xaxis: {}, yaxis: { title: `energy per cycle (${unit})` }, bargap: 0.4 });
+  drawOwn(plots.energy, [{ x: names, y: values.map((value) => value * factor), type: "bar", marker: { color: [colour(0), colour(2), colour(1)] }, text: values.map((value) => si(value, "J", 3)), textposition: "auto", textangle: 0, hoverinfo: "x+text" }], { xaxis: {}, yaxis: { title: `energy per cycle (${unit})` }, bargap: 0.4 });
 }
 
 function multipliers() {

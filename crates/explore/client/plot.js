@@ -1,6 +1,6 @@
 // Draws figures with plotly.js in the colours of the page.
 
-import { byId, make } from "./dom.js";
+import { byId, make, tall } from "./dom.js";
 import { REFERENCE, follow, settle } from "./follow.js";
 
 /** @type {any} */
@@ -72,7 +72,7 @@ export async function draw(place, plot, more = {}) {
   const least = more.height ?? 0;
   // several panels shrink a little, so that all of them are seen at once
   const lowest = (wide ? 0.82 : 1) * layout.height;
-  layout.height = plot.axes.length === 1 ? Math.max(340, least) : Math.min(Math.max(least, lowest), 1.3 * layout.height);
+  layout.height = plot.axes.length === 1 ? Math.max(340, least) : Math.min(Math.max(least, lowest), Math.max(1.3 * layout.height, 0.55 * place.clientWidth));
   // plotly.js takes the height of the element when the window changes its size
   place.style.height = `${layout.height}px`;
   layout.paper_bgcolor = layout.plot_bgcolor = "rgba(0,0,0,0)";
@@ -235,6 +235,7 @@ export const colour = (/** @type {number} */ index) => PALETTE[index % PALETTE.l
 /** Draws traces of the page. @param {any} place @param {any[]} data @param {any} layout */
 export async function drawOwn(place, data, layout) {
   const whole = ownLayout(layout);
+  whole.height = tall(whole.height);
   place.style.height = `${whole.height}px`;
   await loaded;
   return Plotly.react(place, data, whole, { ...CONFIG, displayModeBar: false });
