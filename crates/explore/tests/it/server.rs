@@ -75,6 +75,17 @@ pub(crate) fn events(answer: &Answer) -> Vec<Value> {
     answer.body.lines().filter(|line| line.starts_with('{')).map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
+/// Waits for the first event of a run and returns it with the rest of the answer.
+fn first_event(stream: TcpStream) -> (String, BufReader<TcpStream>) {
+    let mut lines = BufReader::new(stream);
+    let mut line = String::new();
+    while !line.starts_with('{') {
+        line.clear();
+        assert!(lines.read_line(&mut line).unwrap() > 0, "no event");
+    }
+    (line, lines)
+}
+
 pub(crate) fn study(client: &str, points: i64) -> Value {
     json!({
         "client": client, "slot": "study", "study": "template:blade-couple",
@@ -150,24 +161,35 @@ fn errors_of_a_study_name_their_key() {
 #[test]
 fn the_newest_run_of_a_slot_wins() {
     let page = Page::start();
-    let long = page.run(&study("a", 50_000));
-    let mut lines = BufReader::new(long);
-    let mut line = String::new();
-    while !line.contains("\"begin\"") {
-        line.clear();
-        assert!(lines.read_line(&mut line).unwrap() > 0, "no beginning");
-    }
+    let (first, mut lines) = first_event(page.run(&study("a", 50_000)));
+    assert!(first.contains("\"begin\""), "{first}");
     let begun = Instant::now();
-    let short = events(&read(page.run(&study("a", 9))));
-    assert_eq!(short.last().unwrap()["event"], "result");
+    let short = page.run(&study("a", 9));
     let mut rest = String::new();
     lines.read_to_string(&mut rest).unwrap();
     assert!(rest.contains("\"superseded\""), "{rest}");
+    assert_eq!(events(&read(short)).last().unwrap()["event"], "result");
     assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
     // another client is not disturbed
     let other = page.run(&study("b", 2_000));
     assert_eq!(events(&read(page.run(&study("a", 9)))).last().unwrap()["event"], "result");
     assert_eq!(events(&read(other)).last().unwrap()["event"], "result");
+}
+
+/// Runs that have lost their slot take no place from others, also while they end.
+#[test]
+fn many_changes_of_ten_pages_are_all_accepted() {
+    let page = Page::start();
+    let run = |index: i64, points: i64| first_event(page.run(&study(&format!("page {}", index % 10), points)));
+    let older: Vec<_> = (0..50).map(|index| run(index, 20_000)).collect();
+    let newest: Vec<_> = (0..10).map(|index| run(index, 9)).collect();
+    for (runs, end) in [(older, "superseded"), (newest, "\"result\"")] {
+        for (_, mut lines) in runs {
+            let mut rest = String::new();
+            lines.read_to_string(&mut rest).unwrap();
+            assert!(rest.contains(end), "{rest}");
+        }
+    }
 }
 
 /// Runs of clients that are gone end. Otherwise their number would block all others.
