@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stickslip_explore::{Server, Settings, Start};
 
@@ -283,6 +284,23 @@ fn a_long_study_waits() {
     let answer = events(&read(page.run(&request)));
     assert_eq!(answer[0]["event"], "expect");
     assert!(answer[0]["text"].as_str().unwrap().contains("on one thread"), "{}", answer[0]);
+}
+
+/// The expected time is processor time: programs that keep the machine busy do not lengthen it.
+#[test]
+fn a_short_study_starts_at_once_on_a_busy_machine() {
+    let page = Page::start();
+    let mut request = study("a", 241);
+    request["wait"] = json!(true);
+    let ended = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..4 * std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| while !ended.load(Ordering::Relaxed) {});
+        }
+        let events: Vec<_> = (0..20).map(|_| first_event(page.run(&request)).0).collect();
+        ended.store(true, Ordering::Relaxed);
+        assert!(events.iter().all(|event| event.contains("begin")), "{events:?}");
+    });
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Runs a study.
 //!
 //! - `probe`: the expected time, from a few points that are computed in advance;
+//! - `thread_time`: the processor time of a thread;
 //! - `runner`: checks a study, computes its units on all threads, and records the run;
 //! - `work`: units of work, and the results of one unit;
 //! - `result_block`: the results of consecutive units;
@@ -14,6 +15,7 @@ pub(crate) mod point_row;
 mod probe;
 pub mod result_block;
 mod runner;
+mod thread_time;
 pub mod work;
 
 pub use probe::ExpectedTime;

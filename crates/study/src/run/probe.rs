@@ -4,27 +4,32 @@
 //! A probe computes two consecutive frequencies of a case, without and with a warm start, or the
 //! beginning of a unit of work whose points depend on each other. Probes lie at the beginning,
 //! in the middle and at the end of the study. They end at a time limit, write nothing, and leave
-//! no state behind, so the results of a run do not depend on them.
+//! no state behind, so the results of a run do not depend on them. Their times are processor
+//! times: the expected time is that of a machine that does nothing else.
 
 use crate::case::study::Study;
 use crate::check::summary;
 use crate::kinds;
 use crate::kinds::kind::Probe;
+use crate::run::thread_time::{ThreadClock, ThreadTime};
 use crate::run::work::{Computed, Context, PreparedCase, Share, UnitTask, WorkUnits};
 use crate::syntax::format::{format_estimate, plural_suffix};
 use std::fmt;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 use stickslip_numerics::interrupt::StopFlag;
 
-/// Time limit of all probes of a study.
+/// Limit of the processor time of all probes of a study.
 const TIME_LIMIT: Duration = Duration::from_secs(1);
-/// Additional time for a probe that does not end at the limit, because one of its steps is long.
+/// Additional processor time for a probe that does not end at the limit, because one of its steps is long.
 /// After that, its thread is abandoned and ends after this step.
 const GRACE_TIME: Duration = Duration::from_millis(500);
+/// Longest wait for probes that get little processor time on a busy machine. After that, the time
+/// is unknown.
+const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
 /// Expected time of a run on one thread.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,29 +97,48 @@ fn plural(noun: &str) -> String {
 /// Expects the time of a run. `first` is the first case, if it is prepared; `stop` ends the probes
 /// early.
 ///
-/// Returns `None` if a probe failed, or after a stop.
+/// Returns `None` if a probe failed, after a stop, or if the machine is too busy for the probes.
 pub(super) fn expected_time(
     study: &Study,
     first: Option<Arc<PreparedCase>>,
     stop: &Arc<AtomicBool>,
 ) -> Option<ExpectedTime> {
     let plan = Plan::new(study);
-    let (study, ended) = (study.clone(), stop.clone());
+    let (study, ended, clock) = (study.clone(), stop.clone(), Arc::new(OnceLock::new()));
     let (send, receive) = mpsc::channel();
+    let own = clock.clone();
     std::thread::Builder::new()
         .spawn(move || {
+            let all = measure_on_one_thread(&study, first, &plan, &ended, &own);
             // the receiver is gone if this thread was abandoned
-            let _ = send.send(measure_on_one_thread(&study, first, &plan, &ended).map(|all| plan.extrapolate(&all)));
+            let _ = send.send(all.map(|all| plan.extrapolate(&all)));
         })
         .ok()?;
-    let time = receive.recv_timeout(TIME_LIMIT + GRACE_TIME);
-    if stop.load(Ordering::Relaxed) {
-        return None;
-    }
-    match time {
-        Ok(time) => time?,
-        Err(mpsc::RecvTimeoutError::Timeout) => Some(plan.more_than_limit()),
-        Err(mpsc::RecvTimeoutError::Disconnected) => None,
+    let (limit, begun) = (TIME_LIMIT + GRACE_TIME, Instant::now());
+    let mut wait = limit;
+    loop {
+        let time = receive.recv_timeout(wait);
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        match time {
+            Ok(time) => return time?,
+            Err(mpsc::RecvTimeoutError::Disconnected) => return None,
+            Err(mpsc::RecvTimeoutError::Timeout) => {}
+        }
+        let used = match clock.get() {
+            // the thread has not begun
+            None => Duration::ZERO,
+            // without a clock the time of this thread decides
+            Some(clock) => clock.as_ref().and_then(ThreadClock::read).unwrap_or(limit),
+        };
+        if used >= limit {
+            return Some(plan.more_than_limit());
+        }
+        if begun.elapsed() >= LONGEST_WAIT {
+            return None;
+        }
+        wait = (limit - used).max(Duration::from_millis(50));
     }
 }
 
@@ -137,7 +161,7 @@ struct Selection {
     points: Range<usize>,
 }
 
-/// The measured times of one probe, s.
+/// The measured processor times of one probe, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Measurement {
     /// Preparation of the cases.
@@ -243,16 +267,19 @@ fn measure_on_one_thread(
     first: Option<Arc<PreparedCase>>,
     plan: &Plan,
     stop: &Arc<AtomicBool>,
+    clock: &OnceLock<Option<ThreadClock>>,
 ) -> Option<Vec<Measurement>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
     pool.install(|| {
-        let begun = Instant::now();
+        let _ = clock.set(ThreadClock::of_this_thread());
+        let begun = ThreadTime::now();
         let selections = plan.selections();
         let mut all = Vec::with_capacity(selections.len());
         for (index, selection) in selections.iter().enumerate() {
             let limits = Limits {
-                probe: begun + TIME_LIMIT * (index as u32 + 1) / selections.len() as u32,
-                all: begun + TIME_LIMIT,
+                begun,
+                probe: TIME_LIMIT.as_secs_f64() * (index + 1) as f64 / selections.len() as f64,
+                all: TIME_LIMIT.as_secs_f64(),
                 stop,
             };
             match measure(study, first.as_ref(), plan.probe, selection, &limits) {
@@ -267,10 +294,12 @@ fn measure_on_one_thread(
 
 /// When a probe ends.
 struct Limits<'a> {
-    /// After at least one point.
-    probe: Instant,
-    /// In any case.
-    all: Instant,
+    /// Beginning of all probes.
+    begun: ThreadTime,
+    /// Processor time after which the probe ends if it has a point, s.
+    probe: f64,
+    /// Processor time after which it ends in any case, s.
+    all: f64,
     /// The stop flag of the caller.
     stop: &'a Arc<AtomicBool>,
 }
@@ -295,13 +324,14 @@ fn measure(
     let stamps = finished.clone();
     let stop_flag = {
         let (finished, share) = (finished.clone(), share.clone());
-        let (of_probe, of_all, stop) = (limits.probe, limits.all, limits.stop.clone());
+        let (begun, of_probe, of_all, stop) = (limits.begun, limits.probe, limits.all, limits.stop.clone());
         StopFlag::with_callback(move || {
             let any = match probe {
                 Probe::Points { .. } => !finished.lock().unwrap_or_else(PoisonError::into_inner).is_empty(),
                 Probe::Unit { .. } => share.get() > 0.0,
             };
-            stop.load(Ordering::Relaxed) || Instant::now() >= if any { of_probe } else { of_all }
+            stop.load(Ordering::Relaxed)
+                || ThreadTime::now().seconds_since(begun) >= if any { of_probe } else { of_all }
         })
     };
     let points = selection.points.len();
@@ -313,11 +343,11 @@ fn measure(
         stop: last_point,
         finished: Arc::new(move || {
             let mut stamps = stamps.lock().unwrap_or_else(PoisonError::into_inner);
-            stamps.push(Instant::now());
+            stamps.push(ThreadTime::now());
             is_last.store(matches!(probe, Probe::Points { .. }) && stamps.len() >= points, Ordering::Relaxed);
         }),
     };
-    let begun = Instant::now();
+    let begun = ThreadTime::now();
     let mut prepared = begun;
     let computed = catch_unwind(AssertUnwindSafe(|| {
         stop_flag.watch(|| {
@@ -326,12 +356,12 @@ fn measure(
                 _ => PreparedCase::new(study, index).ok().map(Arc::new),
             };
             let cases = selection.cases.clone().map(case).collect::<Option<Vec<_>>>()?;
-            prepared = Instant::now();
+            prepared = ThreadTime::now();
             let task = UnitTask { study, cases, points: selection.points.clone(), context: &context, share: &share };
             compute(study, probe, &task).ok()
         })
     }));
-    let ended = Instant::now();
+    let ended = ThreadTime::now();
     let complete = match computed {
         Ok(Some(_)) => true,
         Ok(None) => return ProbeOutcome::Failed,
@@ -339,13 +369,12 @@ fn measure(
         // a panic belongs to the run
         Err(_) => return ProbeOutcome::Failed,
     };
-    let seconds = |from: Instant, to: Instant| to.saturating_duration_since(from).as_secs_f64();
-    let preparing = seconds(begun, prepared);
+    let preparing = prepared.seconds_since(begun);
     let stamps = finished.lock().unwrap_or_else(PoisonError::into_inner);
     match probe {
         Probe::Points { .. } => {
             let Some(cold) = stamps.first() else { return ProbeOutcome::Nothing };
-            let (first, rest) = (seconds(prepared, *cold), seconds(*cold, ended));
+            let (first, rest) = (cold.seconds_since(prepared), ended.seconds_since(*cold));
             // the work after the last point belongs to all points in equal parts
             let (first, other) = match stamps.len() {
                 1 => (first + if complete { rest } else { 0.0 }, first),
@@ -355,7 +384,7 @@ fn measure(
         }
         Probe::Unit { .. } => {
             let share = if complete { 1.0 } else { share.get() };
-            let first = seconds(prepared, ended) / share;
+            let first = ended.seconds_since(prepared) / share;
             match share > 0.0 {
                 true => ProbeOutcome::Measured(Measurement { preparing, first, other: first, points: 1, complete }),
                 false => ProbeOutcome::Nothing,
