@@ -2,7 +2,8 @@
 
 use std::io::Read;
 
-use flate2::read::{DeflateDecoder, ZlibDecoder};
+use flate2::read::{DeflateDecoder, MultiGzDecoder, ZlibDecoder};
+use ruzstd::decoding::StreamingDecoder;
 
 use crate::error::{Error, ErrorKind, Location};
 
@@ -32,13 +33,17 @@ impl DecompressionLimit {
     }
 }
 
-/// The two containers of deflate.
+/// The containers of deflate, and Zstandard.
 #[derive(Clone, Copy)]
 pub(crate) enum Container {
     /// With header and checksum, in MATLAB files.
     Zlib,
     /// Without header, in zip files.
     Bare,
+    /// Gzip, in Parquet tables.
+    Gzip,
+    /// Zstandard, in Parquet tables.
+    Zstandard,
 }
 
 /// Decompresses all of `packed`.
@@ -76,6 +81,11 @@ fn up_to(packed: &[u8], container: Container, count: usize) -> (Vec<u8>, Option<
     let end = match container {
         Container::Zlib => ZlibDecoder::new(packed).take(most).read_to_end(&mut bytes),
         Container::Bare => DeflateDecoder::new(packed).take(most).read_to_end(&mut bytes),
+        Container::Gzip => MultiGzDecoder::new(packed).take(most).read_to_end(&mut bytes),
+        Container::Zstandard => match StreamingDecoder::new(packed) {
+            Ok(decoder) => decoder.take(most).read_to_end(&mut bytes),
+            Err(error) => Err(std::io::Error::other(error)),
+        },
     };
     (bytes, end.err())
 }

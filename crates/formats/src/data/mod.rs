@@ -7,6 +7,7 @@
 //! - `delimited`: text with any separator;
 //! - `universal`: Universal File Format;
 //! - `wav`: sampled sound;
+//! - `parquet`: tables of Parquet, described by values of `thrift`;
 //! - `matlab`, `hdf5`, `numpy`: arrays of MATLAB, HDF5 and NumPy;
 //! - `arrays`: from an array to columns.
 //!
@@ -25,6 +26,8 @@ mod delimited;
 mod hdf5;
 mod matlab;
 mod numpy;
+mod parquet;
+mod thrift;
 mod universal;
 mod wav;
 
@@ -69,6 +72,7 @@ pub struct DataFormat {
 pub const TABLE: &[DataFormat] = &[
     universal::FORMAT,
     wav::FORMAT,
+    parquet::FORMAT,
     hdf5::FORMAT,
     matlab::FORMAT,
     numpy::NPY,
@@ -99,12 +103,6 @@ pub fn read_bytes(bytes: &[u8]) -> Result<DataFile, Error> {
     }
     if bytes.starts_with(&[0x1f, 0x8b]) {
         return refuse("the file is compressed with gzip", "decompress it first: gunzip FILE");
-    }
-    if bytes.starts_with(b"PAR1") {
-        return refuse(
-            "the file is a Parquet table, which is not read",
-            "save it as CSV, or as .npz: numpy.savez(\"data.npz\", **table.to_dict(\"list\"))",
-        );
     }
     if crate::mat5::is_version_4(bytes) {
         return refuse(
@@ -147,7 +145,7 @@ mod tests {
         for (bytes, part) in [
             (&b""[..], "empty"),
             (b"\x1f\x8b\x08", "gunzip"),
-            (b"PAR1\x00\x00", "CSV"),
+            (b"PAR1\x00\x00", "not complete"),
             (b"\x00\x01\x02\x03\xff\xfe", "no format of data"),
             (b"hello\nworld\n", "no number"),
         ] {

@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 """Writes the files of this folder with other programs, and `expected.txt` with their values.
 
-Needs numpy, scipy, h5py and pyuff. Each block of `expected.txt` has the name of a file, then one
+Needs numpy, scipy, h5py, pyuff and pyarrow. Each block of `expected.txt` has the name of a file, then one
 line for every column: its name and its values, with as many digits as doubles have.
 """
 
+import decimal
 import os
 import struct
 
 import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pyuff
 import scipy.io
 import scipy.io.wavfile
@@ -102,8 +105,43 @@ def text():
     expect("savetxt.txt", time_s=[0, 0.5], force_N=[1, -2])
 
 
+def parquet():
+    """Tables of pyarrow: every encoding and compression of numbers, nulls, structures."""
+    rng = np.random.default_rng(4)
+    count = 40
+    force = np.round(rng.standard_normal(count), 3)
+    columns = dict(
+        time=np.arange(count) * 0.125,
+        force=force,
+        level=np.repeat(np.arange(5), 8) * 1.5,
+        single=force.astype(np.float32),
+        number=(np.arange(count) - 7).astype(np.int32) * 3,
+        large=rng.integers(0, 2**63, count).astype(np.uint64) * 2,
+        flag=force > 0,
+    )
+    table = pa.table({**columns, "title": [f"run {i // 8}" for i in range(count)]})
+    gaps = pa.array([None if i % 5 == 1 else float(value) for i, value in enumerate(force)])
+    table = table.append_column("gaps", gaps)
+    table = table.append_column("load", pa.StructArray.from_arrays([gaps, pa.array(force * 2)], ["x", "y"]))
+    table = table.append_column("list", pa.array([[1.0]] * count))
+    table = table.append_column("day", pa.array(np.arange(count), pa.timestamp("us")))
+    table = table.append_column("price", pa.array([decimal.Decimal(i) / 4 for i in range(count)], pa.decimal128(6, 2)))
+    values = {**columns, "gaps": gaps.to_numpy(zero_copy_only=False), "load__x": gaps.to_numpy(zero_copy_only=False), "load__y": force * 2}
+    split = dict.fromkeys(["time", "force", "single"], "BYTE_STREAM_SPLIT") | {"number": "DELTA_BINARY_PACKED", "flag": "RLE"}
+    for name, options in dict(
+        snappy=dict(compression="snappy", row_group_size=16),
+        gzip=dict(compression="gzip", data_page_version="2.0", store_decimal_as_integer=True),
+        zstd=dict(compression="zstd", use_dictionary=False, data_page_size=100),
+        plain=dict(compression="none", use_dictionary=False, column_encoding=split, data_page_version="2.0"),
+    ).items():
+        pq.write_table(table, path(f"{name}.parquet"), **options)
+        decimals = {"price": np.arange(count) / 4} if name == "gzip" else {}
+        expect(f"{name}.parquet", **values, **decimals)
+
+
 universal()
 arrays()
 text()
+parquet()
 with open(path("expected.txt"), "w") as file:
     file.write("\n\n".join(expected) + "\n")
