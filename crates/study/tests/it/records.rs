@@ -156,6 +156,61 @@ fn a_half_sine_shock() {
     }
 }
 
+/// A mass is pushed against a stop, rebounds, and touches it five times. Displacements by DOP853 of
+/// SciPy, which ends at every touch and release, with errors of 1e-12 per step.
+#[test]
+fn a_half_sine_shock_against_a_gap() {
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"300 N/m\"\n\
+         damping = \"1 N s/m\"\n[[joint]]\nname = \"stop\"\nbetween = [\"m\", \"ground\"]\nlaw = {{ kind = \"gap\", gap = \
+         \"20 mm\", stiffness = \"5 N/mm\" }}\n[[force]]\non = \"m\"\nsignal = {{ kind = \"half-sine\", amplitude = \"25 N\", \
+         duration = \"0.4 s\", begin = \"0.1 s\" }}\n{TRANSIENT}"
+    );
+    let found = motion("time_s,force_N\n0,0\n1,0\n", &study, "m_displacement_m");
+    for (time, x) in [
+        (0.1, 0.0),
+        (0.25, 3.2468408379e-2),
+        (0.4, 3.0158544612e-2),
+        (0.55, -1.8918220717e-2),
+        (0.7, -1.4707666246e-2),
+        (0.85, 2.2654091234e-2),
+        (1.0, -1.6827832333e-2),
+        (1.15, -1.2849698272e-2),
+        (1.3, 2.1760220953e-2),
+        (1.6, -1.6143009423e-2),
+        (1.9, 5.6822043526e-3),
+    ] {
+        let row = found.iter().find(|(t, _)| (t - time).abs() < 1e-9).expect("a row");
+        // the signal is linear between its rows
+        assert!((row.1 - x).abs() < 2e-4 * 0.03, "{time}: {} {x}", row.1);
+    }
+}
+
+/// A deck on a sliding isolator in two directions under an earthquake-like record, with 22 changes
+/// between stick and slip. `data/isolator.py` writes the record, and the motion by SciPy.
+#[test]
+fn an_isolator_slides_in_two_directions() {
+    let study = "[[mass]]\nname = \"deck\"\nmass = \"1000 kg\"\ndirections = [\"x\", \"y\"]\n\
+        [[spring]]\nbetween = [\"deck.x\", \"ground\"]\nstiffness = \"10 kN/m\"\n\
+        [[spring]]\nbetween = [\"deck.y\", \"ground\"]\nstiffness = \"10 kN/m\"\n\
+        [[joint]]\nname = \"slide\"\nbetween = [\"deck\", \"ground\"]\n\
+        law = { kind = \"jenkins-2d\", stiffness = \"200 kN/m\", limit = \"600 N\" }\n\
+        [[motion]]\non = \"ground\"\nalong = \"x\"\ndata = \"record\"\ncolumn = \"east_m_per_s2\"\n\
+        [[motion]]\non = \"ground\"\nalong = \"y\"\ndata = \"record\"\ncolumn = \"north_m_per_s2\"\n\
+        [study]\nkind = \"transient\"\nduration = \"8 s\"\ntime_step = \"10 ms\"\n";
+    let record = include_str!("data/isolator.csv");
+    let expected = include_str!("data/isolator_motion.csv");
+    for (column, at) in [("deck.x_displacement_m", 1), ("deck.y_displacement_m", 2)] {
+        let found = motion(record, study, column);
+        for line in expected.lines().skip(1) {
+            let row: Vec<f64> = line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+            let own = found.iter().find(|(time, _)| (time - row[0]).abs() < 1e-9).expect("a row");
+            // the largest displacement is 60 mm
+            assert!((own.1 - row[at]).abs() < 1e-4 * 0.06, "{column} at {} s: {} {}", row[0], own.1, row[at]);
+        }
+    }
+}
+
 /// A chirp through resonance against the classical Runge-Kutta method.
 #[test]
 fn a_chirp_through_resonance() {
