@@ -142,26 +142,37 @@ fn worst_difference(law: &FittedLaw, target: &str) -> Result<f64, String> {
     Ok(worst)
 }
 
-/// Largest difference. Where an integration adapts its steps, motions at neighbouring parameters
-/// differ by about 1e-9 of their size, and derivatives over narrow ranges by more; the equal steps
-/// under an Iwan joint are less accurate. The mode of a rigid slider is interpolated over kinks.
+/// Largest difference. Orbits by an integration with adapted steps of 1e-8 differ by about this much
+/// at neighbouring parameters, and decays by 1e-9; the equal steps under an Iwan joint are less
+/// accurate. The mode of a rigid slider is interpolated over kinks.
 fn tolerance(law: &FittedLaw, target: &str) -> f64 {
-    let is = |names: &[&str]| names.iter().any(|name| law.law.starts_with(&format!("kind = \"{name}\"")));
+    let has_states = has_states(law);
     match target {
-        "ring-down" if is(&["iwan"]) => 2e-3,
-        "backbone" if is(&["coulomb"]) => 1e-5,
-        _ if is(&["bouc-wen", "dahl", "valanis", "lugre"]) => 5e-3,
+        "ring-down" if law.law.contains("iwan") => 5e-4,
+        "ring-down" if has_states => 1e-5,
+        "response" if has_states => 1e-3,
+        "backbone" if law.law.contains("\"coulomb\"") => 1e-5,
         _ => 1e-6,
     }
 }
 
+/// Laws with rates of internal states.
+fn has_states(law: &FittedLaw) -> bool {
+    ["bouc-wen", "dahl", "valanis", "lugre"].iter().any(|name| law.law.contains(name))
+}
+
+/// The nonlinear modes of laws with states take a minute; `STICKSLIP_ALL_DERIVATIVES` adds them.
 #[test]
 fn derivatives_agree_with_differences() {
+    let all = std::env::var_os("STICKSLIP_ALL_DERIVATIVES").is_some();
     let mut wrong = Vec::new();
     for law in &LAWS {
         for target in ["loop", "response", "settled", "ring-down", "backbone"] {
             // settled values are those of the same orbits
             if target == "settled" && !law.law.contains("iwan") && !law.law.contains("jenkins") {
+                continue;
+            }
+            if target == "backbone" && has_states(law) && !all {
                 continue;
             }
             match worst_difference(law, target) {

@@ -1,8 +1,8 @@
 //! The least-squares problem: weighted residuals over scaled parameters, and their derivatives.
 //!
 //! A scaled parameter runs from 0 to 1 over its range, by differences or by ratios. Derivatives
-//! are central differences of a fraction [`FitProblem::DIFFERENCE`] of the range; the orbits at
-//! both ends begin from the orbit between them.
+//! are differences of second order with a fraction [`FitProblem::DIFFERENCE`] of the range, central
+//! inside and one-sided at its ends; all orbits begin from the orbit at the parameters.
 
 use super::targets::{Fitted, RowStates, Target};
 use crate::case::study::{Case, Study};
@@ -175,23 +175,35 @@ impl FitProblem {
     pub fn derivatives(&self, x: &[f64], columns: &[usize], which: DerivativesOf) -> Vec<DMatrix<f64>> {
         let used = |target: &dyn Target| which == DerivativesOf::AllTargets || !target.is_predicted();
         let before = self.states.lock().map(|states| states.clone()).unwrap_or_default();
-        let states: Vec<RowStates> = match self.fitted_from(x, &before, &used) {
-            Ok(found) => found.into_iter().map(|fitted| fitted.states).collect(),
-            Err(_) => before,
+        let (states, here) = match self.fitted_from(x, &before, &used) {
+            Ok(found) => found.into_iter().map(|fitted| (fitted.states, fitted.values)).unzip(),
+            Err(_) => (before, Vec::new()),
         };
+        let none = || self.targets.iter().map(|target| vec![f64::NAN; target.measured().len()]).collect();
         let column = |k: usize| -> Vec<Vec<f64>> {
-            let (mut low, mut high) = (x.to_vec(), x.to_vec());
-            low[k] = (x[k] - Self::DIFFERENCE).max(0.0);
-            high[k] = (x[k] + Self::DIFFERENCE).min(1.0);
-            let run = high[k] - low[k];
-            let ends = (self.fitted_from(&low, &states, &used), self.fitted_from(&high, &states, &used));
-            let (Ok(low), Ok(high)) = ends else {
-                return self.targets.iter().map(|target| vec![f64::NAN; target.measured().len()]).collect();
+            let at = |steps: f64| {
+                let mut x = x.to_vec();
+                x[k] += steps * Self::DIFFERENCE;
+                self.fitted_from(&x, &states, &used).ok()
             };
-            let slope = |(low, high): (&Fitted, &Fitted)| {
-                low.values.iter().zip(&high.values).map(|(low, high)| (high - low) / run).collect()
+            // at an end of the range, the two other points lie on the same side
+            let side = f64::from(i8::from(x[k] < Self::DIFFERENCE) - i8::from(x[k] > 1.0 - Self::DIFFERENCE));
+            let (Some(one), Some(other)) =
+                (at(if side == 0.0 { -1.0 } else { side }), at(if side == 0.0 { 1.0 } else { 2.0 * side }))
+            else {
+                return none();
             };
-            low.iter().zip(&high).map(slope).collect()
+            if side != 0.0 && here.is_empty() {
+                return none();
+            }
+            let slope = |target: usize| {
+                let pairs = one[target].values.iter().zip(&other[target].values).enumerate();
+                let rise = |(row, (one, other)): (usize, (&f64, &f64))| {
+                    if side == 0.0 { other - one } else { side * (4.0 * one - other - 3.0 * here[target][row]) }
+                };
+                pairs.map(|pair| rise(pair) / (2.0 * Self::DIFFERENCE)).collect()
+            };
+            (0..one.len()).map(slope).collect()
         };
         let columns: Vec<Vec<Vec<f64>>> = columns.par_iter().map(|k| column(*k)).collect();
         (0..self.targets.len())
