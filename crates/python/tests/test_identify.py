@@ -1,6 +1,7 @@
 """Fits of parameters to measured data: against the command, SciPy and closed forms."""
 
 import csv
+import pickle
 
 import numpy as np
 import pytest
@@ -96,6 +97,16 @@ def test_the_likelihood_has_its_gradient(found):
     np.testing.assert_allclose(found.gradient(x), differences, rtol=1e-3)
     assert found.log_likelihood(found.x) > found.log_likelihood(x)
     assert found.log_likelihood(-found.x) == -np.inf
+
+
+def test_a_fit_is_pickled_with_its_data(found, folder):
+    again = pickle.loads(pickle.dumps(found))
+    x = found.x * [1.02, 0.97]
+    assert again.names == found.names and again.log_likelihood(x) == found.log_likelihood(x)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(again.residuals)).jacobian(x), found.residuals.jacobian(x))
+    # without columns, the rows come from the files of the study
+    residuals = stickslip.Residuals(stickslip.Study.from_file(folder / "rig.toml"))
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(residuals)).values(x), residuals.values(x))
 
 
 def test_wrong_fits_are_refused_with_words(found, folder):

@@ -116,20 +116,20 @@ def identify(
     >>> bool(abs(found.gradient(found.x)[0]) * found.cov[0, 0] ** 0.5 < 1e-3)
     True
     """
+    source = None
     if data is not None:
         if isinstance(study, Study):
             text = study.text
         else:
             text = _toml.text(study) if isinstance(study, Mapping) else Path(study).read_text(encoding="utf-8")
-        with TemporaryDirectory() as folder:
-            for name, columns in data.items():
-                _write(Path(folder) / name, columns)
-            study = Study.from_text(text, name=str(Path(folder) / "study.toml"))
+        columns = {file: {title: np.asarray(values, float) for title, values in own.items()} for file, own in data.items()}
+        source = (text, columns)
+        study = _study(*source)
     elif not isinstance(study, Study):
         study = Study.from_dict(study) if isinstance(study, Mapping) else Study.from_file(study)
     if study.kind != "identify" or study.cases != 1:
         raise StudyError(f"`identify` needs a study of kind `identify` with one case, found {study!r}")
-    residuals = Residuals(study)
+    residuals = Residuals(study, source=source)
     result = study.run(threads=threads, progress=progress)
     if "parameters" not in result.tables:
         raise StudyError(f"no search ended at a minimum: {result.failures or result.notes}")
@@ -153,9 +153,21 @@ def identify(
     )
 
 
-def _write(path: Path, columns: Mapping[str, ArrayLike]) -> None:
+def _study(text: str, data: Mapping[str, Mapping[str, _Array]]) -> Study:
+    """Reads a study beside columns instead of files."""
+    with TemporaryDirectory() as folder:
+        for name, columns in data.items():
+            _write(Path(folder) / name, columns)
+        return Study.from_text(text, name=str(Path(folder) / "study.toml"))
+
+
+def _residuals(text: str, data: Mapping[str, Mapping[str, _Array]]) -> Residuals:
+    """Recreates residuals from their pickle."""
+    return Residuals(_study(text, data), source=(text, data))
+
+
+def _write(path: Path, arrays: Mapping[str, _Array]) -> None:
     """Writes columns as a CSV file."""
-    arrays = {title: np.asarray(values, float) for title, values in columns.items()}
     lengths = {title: array.shape for title, array in arrays.items()}
     if len(set(lengths.values())) > 1 or any(array.ndim != 1 for array in arrays.values()):
         raise ValueError(f"the columns of `{path.name}` must be one-dimensional and equally long, found {lengths}")
