@@ -253,10 +253,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let problem = FitProblem::new(work.study, case, targets, &work.context.stop);
         let settings = SearchSettings::of(&case.values);
         let found = search(&problem, &settings)?;
-        let statistics = statistics::Statistics::new(&problem, &found, settings.loss);
+        let mut statistics = statistics::Statistics::new(&problem, &found, settings.loss);
         if let Some(reason) = statistics.failure() {
             return Err(reason);
         }
+        statistics.check_intervals(&problem, &settings, &found);
         let is_profiled = case.values.flag("profile") == Some(true);
         let profiles =
             if is_profiled { profile::profiles(&problem, &settings, &found, &statistics) } else { Vec::new() };

@@ -8,8 +8,8 @@
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
 
 use super::problem::FitProblem;
-use super::search::Found;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use super::search::{Fixed, Found, SearchSettings, minimize};
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
 /// Weight of a residual that is larger than its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,6 +126,10 @@ pub(super) struct Statistics {
     /// Length of the remaining Gauss-Newton step, in standard errors.
     distance: f64,
     undetermined: Vec<Undetermined>,
+    /// Indices of the parameters that the data do not bound on one side, and of those with an
+    /// interval by the profile likelihood.
+    unbounded: Vec<usize>,
+    widened: Vec<usize>,
     searches: usize,
     agreeing: usize,
 }
@@ -142,6 +146,11 @@ const ROUNDING: f64 = 1e-3;
 /// Smallest eigenvalue of the correlations of the derivatives that differs from zero. Derivatives
 /// have relative errors of about 1e-6.
 const SINGULAR: f64 = 1e-10;
+/// Rise of the loss at an end of an interval, relative to that of the linear model, below which the
+/// end is computed by the profile likelihood.
+const FLAT: f64 = 0.5;
+/// Fits of the other parameters for such an end: steps of a factor of three, then bisection.
+const END_FITS: usize = 10;
 /// Remaining step, in standard errors, above which the minimum was not reached.
 const LARGEST_STEP: f64 = 0.5;
 /// Root mean square of residuals that are rounding, in standard deviations.
@@ -159,53 +168,23 @@ impl Statistics {
         let sum: f64 = residuals.iter().zip(&weights).map(|(r, w)| w * r * r).sum();
         let freedom = n.saturating_sub(free.len()).max(1);
         let variance = sum / freedom as f64;
-        // normal equations with columns of unit length
-        let length = |k: usize| (0..n).map(|i| weights[i] * jacobian[(i, k)].powi(2)).sum::<f64>().sqrt();
-        let lengths: Vec<f64> = free.iter().map(|k| length(*k)).collect();
-        let unit = |a: usize, i: usize| if lengths[a] > 0.0 { jacobian[(i, free[a])] / lengths[a] } else { 0.0 };
-        let normal = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-            (0..n).map(|i| weights[i] * unit(a, i) * unit(b, i)).sum::<f64>()
-        });
-        let gradient =
-            DVector::from_fn(free.len(), |a, _| (0..n).map(|i| weights[i] * unit(a, i) * residuals[i]).sum::<f64>());
-        let eigen = SymmetricEigen::new(normal);
+        let normal = |members: &[usize]| NormalEquations::new(&jacobian, &weights, members);
         let mut covariance: DMatrix<f64> = DMatrix::zeros(p, p);
-        let mut undetermined: Vec<Undetermined> = Vec::new();
-        // variances by the directions that the data determine
-        let mut own = vec![0.0; p];
         let mut squared_step = 0.0;
-        for (index, value) in eigen.eigenvalues.iter().enumerate() {
-            let vector = eigen.eigenvectors.column(index);
-            // change of the scaled parameters along the eigenvector
-            let change = |a: usize| if lengths[a] > 0.0 { vector[a] / lengths[a] } else { vector[a] };
-            let size = (0..free.len()).map(|a| change(a).powi(2)).sum::<f64>().sqrt();
-            let deviation = if *value > SINGULAR { (variance / value).sqrt() * size } else { f64::INFINITY };
-            if deviation > UNDETERMINED || !lengths.iter().all(|length| *length > 0.0) && *value <= SINGULAR {
-                let mut direction = vec![0.0; p];
-                free.iter().enumerate().for_each(|(a, k)| direction[*k] = change(a) / size);
-                let parameters = Vec::new();
-                undetermined.push(Undetermined { change: direction, deviation: deviation.min(1.0), parameters });
-            } else {
-                free.iter().enumerate().for_each(|(a, k)| own[*k] += variance / value * change(a).powi(2));
-            }
-            if *value > SINGULAR {
-                for (a, k) in free.iter().enumerate() {
-                    for (b, l) in free.iter().enumerate() {
-                        covariance[(*k, *l)] += variance / value * change(a) * change(b);
-                    }
+        let of_free = normal(&free);
+        let slopes = |k: usize| (0..n).map(|i| weights[i] * jacobian[(i, k)] * residuals[i]).sum::<f64>();
+        let gradient: Vec<f64> = free.iter().map(|k| slopes(*k)).collect();
+        for Direction { value, change } in of_free.directions().filter(|direction| direction.value > SINGULAR) {
+            for (a, k) in free.iter().enumerate() {
+                for (b, l) in free.iter().enumerate() {
+                    covariance[(*k, *l)] += variance / value * change[a] * change[b];
                 }
-                squared_step += gradient.dot(&vector).powi(2) / value;
             }
+            squared_step +=
+                gradient.iter().zip(&change).map(|(slope, change)| slope * change).sum::<f64>().powi(2) / value;
         }
+        let undetermined = undetermined(&normal(&problem.all()), variance);
         let quantile = student_quantile(freedom as f64);
-        for direction in &mut undetermined {
-            let largest = direction.change.iter().fold(0.0f64, |largest, change| largest.max(change.abs()));
-            let makes_uncertain = |k: &usize| {
-                let change = direction.change[*k].abs();
-                change > 0.1 * largest || change * direction.deviation > UNCERTAIN * own[*k].sqrt() + ROUNDING
-            };
-            direction.parameters = (0..p).filter(makes_uncertain).collect();
-        }
         let in_undetermined = |k: usize| undetermined.iter().any(|direction| direction.parameters.contains(&k));
         let estimate = |k: usize| {
             if at_bound[k] {
@@ -250,9 +229,86 @@ impl Statistics {
             bic: likelihood + count.ln() * parameter_count,
             distance: (squared_step / variance / free.len().max(1) as f64).sqrt(),
             undetermined,
+            unbounded: Vec::new(),
+            widened: Vec::new(),
             searches: found.searches,
             agreeing: found.agreeing,
         }
+    }
+
+    /// Checks every interval by the loss itself. If the loss is flat at one end of one interval, the
+    /// profile likelihood gives all ends.
+    ///
+    /// The linear model is wrong where a residual has a kink at the minimum. Example: an Iwan joint
+    /// that reaches macro-slip at its largest measured displacement. A smaller slip limit changes
+    /// the force there, a larger one with another `beta` changes nothing.
+    pub fn check_intervals(&mut self, problem: &FitProblem, settings: &SearchSettings, found: &Found) {
+        let has_error = |k: &usize| self.scaled_error(*k).is_finite() && self.scaled_error(*k) > 0.0;
+        let checked: Vec<usize> = (0..found.x.len()).filter(has_error).collect();
+        let is_flat = |k: &usize| [-1.0, 1.0].iter().any(|sign| self.is_flat(*k, *sign, problem, settings, found));
+        if !checked.iter().any(is_flat) {
+            return;
+        }
+        for k in checked {
+            let error = self.scaled_error(k);
+            let ends = [-1.0, 1.0].map(|sign| self.end(k, sign, problem, settings, found));
+            let Some(ends) = ends[0].zip(ends[1]) else {
+                self.parameters[k].estimate = Estimate::NotDetermined;
+                self.unbounded.push(k);
+                continue;
+            };
+            let range = &problem.ranges[k];
+            let parameter = &mut self.parameters[k];
+            if ends.0 < found.x[k] - 1.5 * self.quantile * error || ends.1 > found.x[k] + 1.5 * self.quantile * error {
+                (parameter.low, parameter.high) = (range.at(ends.0), range.at(ends.1));
+                parameter.standard_error = range.slope(found.x[k]) * (ends.1 - ends.0) / (2.0 * self.quantile);
+                self.widened.push(k);
+            }
+        }
+        for k in &self.unbounded {
+            let parameter = &mut self.parameters[*k];
+            (parameter.standard_error, parameter.low, parameter.high) = (f64::NAN, f64::NAN, f64::NAN);
+        }
+    }
+
+    /// Returns whether the loss at an end of an interval is far below that of the linear model, in
+    /// which the other parameters follow.
+    fn is_flat(&self, k: usize, sign: f64, problem: &FitProblem, settings: &SearchSettings, found: &Found) -> bool {
+        let step = sign * self.quantile / self.scaled_error(k);
+        let moved: Vec<f64> = (0..found.x.len()).map(|l| found.x[l] + step * self.covariance[(l, k)]).collect();
+        let is_inside = moved.iter().all(|x| (0.0..=1.0).contains(x));
+        is_inside && self.rise(settings.loss.sum(&problem.residuals(&moved)), found) < FLAT * self.quantile.powi(2)
+    }
+
+    /// Returns the rise of the loss in squared standard errors.
+    fn rise(&self, cost: f64, found: &Found) -> f64 {
+        2.0 * (cost - found.cost) / self.variance
+    }
+
+    /// Returns an end of the interval of a scaled parameter by the profile likelihood, at least that
+    /// of the linear model; `None` if the data do not bound the parameter on that side within
+    /// [`UNDETERMINED`] of its range.
+    fn end(&self, k: usize, sign: f64, problem: &FitProblem, settings: &SearchSettings, found: &Found) -> Option<f64> {
+        let step = self.quantile * self.scaled_error(k);
+        let (mut inside, mut outside, mut others) = (0.0, None, found.x.clone());
+        let mut distance = step;
+        for _ in 0..END_FITS {
+            let x = (found.x[k] + sign * distance).clamp(0.0, 1.0);
+            others[k] = x;
+            problem.forget();
+            match minimize(problem, settings, others.clone(), Some(Fixed(k))) {
+                Some((cost, best)) if self.rise(cost, found) < self.quantile.powi(2) => {
+                    (inside, others) = (distance, best);
+                    if distance > UNDETERMINED || x == 0.0 || x == 1.0 {
+                        return None;
+                    }
+                }
+                _ if inside == 0.0 => return Some(found.x[k] + sign * step),
+                _ => outside = Some(distance),
+            }
+            distance = outside.map_or(3.0 * distance, |outside| 0.5 * (inside + outside));
+        }
+        Some(found.x[k] + sign * outside.unwrap_or(distance))
     }
 
     /// Returns the standard error of a scaled parameter; NaN if it has none.
@@ -294,6 +350,21 @@ impl Statistics {
             }
         }
         warnings.extend(self.undetermined.iter().map(|direction| direction.text(problem)));
+        let name = |k: &usize| &problem.ranges[*k].name;
+        warnings.extend(self.unbounded.iter().map(|k| {
+            format!(
+                "the data do not determine `{}`: values far from the estimate, with other values of the other \
+                parameters, explain them as well.",
+                name(k)
+            )
+        }));
+        warnings.extend(self.widened.iter().map(|k| {
+            format!(
+                "the loss over `{}` is flat on one side of the estimate; its interval is that of the profile \
+                likelihood.",
+                name(k)
+            )
+        }));
         let significant = 3.0 / (self.count as f64).sqrt();
         if self.autocorrelation > significant && self.rms > EXACT {
             warnings.push(format!(
@@ -310,6 +381,72 @@ impl Statistics {
         }
         warnings
     }
+}
+
+/// The normal equations over some parameters, with columns of unit length.
+struct NormalEquations {
+    lengths: Vec<f64>,
+    eigen: SymmetricEigen<f64, Dyn>,
+}
+
+/// An eigenvector of the normal equations.
+struct Direction {
+    value: f64,
+    /// Change of the scaled parameters along it.
+    change: Vec<f64>,
+}
+
+impl NormalEquations {
+    fn new(jacobian: &DMatrix<f64>, weights: &[f64], members: &[usize]) -> Self {
+        let column = |k: &usize| {
+            jacobian.column(*k).component_mul(&DVector::from_iterator(weights.len(), weights.iter().map(|w| w.sqrt())))
+        };
+        let columns: Vec<DVector<f64>> = members.iter().map(column).collect();
+        let lengths: Vec<f64> = columns.iter().map(|column| column.norm()).collect();
+        let unit = |a: usize| if lengths[a] > 0.0 { lengths[a] } else { 1.0 };
+        let product = |a: usize, b: usize| columns[a].dot(&columns[b]) / (unit(a) * unit(b));
+        let eigen = SymmetricEigen::new(DMatrix::from_fn(members.len(), members.len(), product));
+        NormalEquations { lengths, eigen }
+    }
+
+    fn directions(&self) -> impl Iterator<Item = Direction> + '_ {
+        let change = |index: usize, a: usize| {
+            let part = self.eigen.eigenvectors[(a, index)];
+            if self.lengths[a] > 0.0 { part / self.lengths[a] } else { part }
+        };
+        self.eigen.eigenvalues.iter().enumerate().map(move |(index, value)| Direction {
+            value: *value,
+            change: (0..self.lengths.len()).map(|a| change(index, a)).collect(),
+        })
+    }
+}
+
+/// Returns the directions that the data do not determine. Parameters at an end of their range
+/// count: they may move away from it, and take others along.
+fn undetermined(normal: &NormalEquations, variance: f64) -> Vec<Undetermined> {
+    let p = normal.lengths.len();
+    // variances by the directions that the data determine
+    let mut own = vec![0.0; p];
+    let mut undetermined: Vec<Undetermined> = Vec::new();
+    for Direction { value, change } in normal.directions() {
+        let size = change.iter().map(|change| change * change).sum::<f64>().sqrt();
+        let deviation = if value > SINGULAR { (variance / value).sqrt() * size } else { f64::INFINITY };
+        if deviation > UNDETERMINED || value <= SINGULAR && normal.lengths.contains(&0.0) {
+            let change = change.iter().map(|change| change / size).collect();
+            undetermined.push(Undetermined { change, deviation: deviation.min(1.0), parameters: Vec::new() });
+        } else {
+            own.iter_mut().zip(&change).for_each(|(own, change)| *own += variance / value * change * change);
+        }
+    }
+    for direction in &mut undetermined {
+        let largest = direction.change.iter().fold(0.0f64, |largest, change| largest.max(change.abs()));
+        let makes_uncertain = |k: &usize| {
+            let change = direction.change[*k].abs();
+            change > 0.1 * largest || change * direction.deviation > UNCERTAIN * own[*k].sqrt() + ROUNDING
+        };
+        direction.parameters = (0..p).filter(makes_uncertain).collect();
+    }
+    undetermined
 }
 
 impl Undetermined {
