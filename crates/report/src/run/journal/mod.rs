@@ -663,4 +663,24 @@ mod tests {
         let difference = own.difference(&head(8e4f64.next_up())).unwrap();
         assert!(difference.contains("other matrices"), "{difference}");
     }
+
+    #[test]
+    fn a_journal_of_other_data_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = "schema = 1\n[[data]]\nname = \"rig\"\nfile = \"rig.csv\"\n[parameters]\nk = \"1 N/mm\"\n[[mass]]\n\
+            name = \"m\"\nmass = \"1 kg\"\n[[joint]]\nname = \"pad\"\nbetween = [\"m\", \"ground\"]\n\
+            law = { kind = \"jenkins\", stiffness = \"k\", limit = \"1 N\" }\n[study]\nkind = \"identify\"\n\
+            fit.k = { from = \"0.1 N/mm\", to = \"9 N/mm\" }\ntargets = [{ data = \"rig\", is = \"loop\", at = \"pad\" }]\n";
+        std::fs::write(folder.path().join("rig.toml"), text).unwrap();
+        let head = |force: &str| {
+            std::fs::write(folder.path().join("rig.csv"), format!("displacement_m,force_N\n0,0\n1e-3,{force}\n"))
+                .unwrap();
+            let study = stickslip_study::read_file(&folder.path().join("rig.toml"), &[]).unwrap();
+            RunHeader::new(&check(&study).unwrap(), 0..1, 1)
+        };
+        let own = head("0.5");
+        assert_eq!(own.difference(&head("0.50")), None);
+        let difference = own.difference(&head("0.5000000000000001")).unwrap();
+        assert!(difference.contains("file of [[data]] has changed"), "{difference}");
+    }
 }
