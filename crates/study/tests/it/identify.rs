@@ -3,34 +3,39 @@
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
+use std::path::Path;
 use stickslip_study::dataset::{Dataset, Table};
 use stickslip_study::results::fitted_study;
 use stickslip_study::run::{Context, run};
-use stickslip_study::{read_file, read_study};
+use stickslip_study::{Study, read_file, read_study};
 
 /// Normally distributed numbers: the sum of twelve uniform ones of a linear congruential generator
 /// (Knuth, MMIX).
-struct Noise(u64);
+pub(super) struct Noise(pub u64);
 
 impl Noise {
-    fn uniform(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 
 /// Writes data and study into a folder and runs the study.
-fn identify(data: &str, study: &str) -> Dataset {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("data.csv"), data).expect("the data");
-    let file = folder.path().join("study.toml");
+pub(super) fn identify_in(folder: &Path, data: &str, study: &str) -> (Study, Dataset) {
+    std::fs::write(folder.join("data.csv"), data).expect("the data");
+    let file = folder.join("study.toml");
     std::fs::write(&file, study).expect("the study");
     let study = read_file(&file, &[]).unwrap_or_else(|error| panic!("{error}"));
-    run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"))
+    let dataset = run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"));
+    (study, dataset)
+}
+
+fn identify(data: &str, study: &str) -> Dataset {
+    identify_in(tempfile::tempdir().expect("a folder").path(), data, study).1
 }
 
 fn table<'d>(dataset: &'d Dataset, name: &str) -> &'d Table {
@@ -39,15 +44,15 @@ fn table<'d>(dataset: &'d Dataset, name: &str) -> &'d Table {
 }
 
 /// A fitted parameter: value, standard error, ends of the interval, status.
-struct Estimate {
-    value: f64,
+pub(super) struct Estimate {
+    pub value: f64,
     error: f64,
-    low: f64,
-    high: f64,
-    status: String,
+    pub low: f64,
+    pub high: f64,
+    pub status: String,
 }
 
-fn estimate(dataset: &Dataset, name: &str) -> Estimate {
+pub(super) fn estimate(dataset: &Dataset, name: &str) -> Estimate {
     let table = table(dataset, "parameters");
     let row = table.texts("parameter").expect("names").iter().position(|own| own == name).expect(name);
     let number = |column: &str| table.numbers(column).expect(column)[row];

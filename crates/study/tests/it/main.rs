@@ -25,7 +25,8 @@
 //! - `responses`: results of a response against closed forms;
 //! - `results`: results as typed values;
 //! - `structure`: structures given by matrices;
-//! - `summary`: the summary of a study before it runs.
+//! - `summary`: the summary of a study before it runs;
+//! - `synthetic_truth`: parameters of random models from noisy data.
 
 mod bad_studies;
 mod bodies;
@@ -56,3 +57,4 @@ mod results;
 mod rotations;
 mod structure;
 mod summary;
+mod synthetic_truth;
