@@ -10,23 +10,24 @@ import { changeList, on, state, tell } from "./store.js";
 
 /** Time of an answer that feels immediate while a slider moves, s. */
 const LIVE = 0.06;
-/** Time above which a study waits for its button, s. */
-const PATIENCE = 2;
 /** Pause of a slider after which the full curve is computed, ms. */
 const REST = 160;
 
 let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty, fitted;
 /** Time of the last full run, s, and its number of points. */
 let cost = { seconds: 0, points: 0 };
+/** Points of a curve that take the time of a live answer, as learned from those that moved. */
+let live = Infinity;
 /** The curve before the last change. @type {any} */
 let previous = null;
 /** The finished part of a run that takes long. @type {any} */
 let partial = null;
 /** @type {any} */
 let timer = 0;
-/** True until the user has asked for a long study. */
-let waiting = false;
-let inFlight = false;
+/** True if the server expects that the study takes long: it then waits for its button. */
+let long = false;
+/** Number of the newest run, and of the one for a moving slider if it has not ended. */
+let newest = 0, movingRun = 0;
 let again = false;
 
 /** @param {any} panel */
@@ -40,7 +41,7 @@ export function start(panel) {
   status = make("span", { class: "state", role: "status" });
   legendPlace = make("div", { class: "legend" });
   place = make("div", { class: "plot", id: "response-plot" });
-  button = make("button", { type: "button", class: "primary", text: "Compute", hidden: true, onclick: () => { waiting = false; compute(false, true); } });
+  button = make("button", { type: "button", class: "primary", text: "Compute", hidden: true, onclick: () => compute(false, true) });
   empty = make("div", { class: "empty", hidden: true }, make("p", {}), button);
   fitted = make("div", {});
   hint = make("p", { class: "hint", text: "Click the curve to see its orbit. Drag the vertical marker to another frequency." });
@@ -56,7 +57,7 @@ export function start(panel) {
     tell("show", "orbit");
   });
   draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
-  on("opened", () => { previous = partial = null; waiting = true; cost = { seconds: 0, points: 0 }; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
+  on("opened", () => { previous = partial = null; long = false; cost = { seconds: 0, points: 0 }; live = Infinity; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
   on("moving", () => compute(true));
   on("changed", () => compute(false));
   on("theme", () => show());
@@ -82,22 +83,26 @@ function opened() {
  */
 async function compute(moving, asked = false) {
   clearTimeout(timer);
-  if (moving && cost.seconds > PATIENCE) { stale(); return; }
-  // the change may have made the study short: the server estimates its time again
-  const first = !asked && (waiting || cost.seconds > PATIENCE);
+  if (moving && long) { stale(); return; }
+  // the server expects the time from a few points; nothing is known of a study that never ran
+  const wait = !asked && (!moving || cost.points === 0);
   if (moving) {
     timer = setTimeout(() => compute(false), REST);
     // one run at a time while the slider moves: the next one takes the newest values
-    if (inFlight) { again = true; return; }
+    if (movingRun) { again = true; return; }
   }
   const { points } = state.description;
   const cases = Math.max(1, state.description.cases.length);
-  const few = Math.max(16, Math.floor((points / cases) * LIVE / Math.max(cost.seconds, 1e-3)));
-  const reduced = moving && state.description.kind === "response" && cost.seconds > LIVE ? few : null;
+  const all = points / cases;
+  const few = Math.round(Math.max(16, Math.min(live, all * LIVE / Math.max(cost.seconds, 1e-3))));
+  const reduced = moving && state.description.kind === "response" && few < all ? few : null;
   const begun = performance.now();
-  inFlight = true;
+  newest += 1;
+  const own = newest;
+  movingRun = moving ? own : 0;
+  again = false;
   const request = {
-    study: state.study, changes: changeList(), wait: first, quantity: quantity.value || null,
+    study: state.study, changes: changeList(), wait, quantity: quantity.value || null,
     view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" && logarithmic.checked ? "log" : null, panels: panels.value || null },
   };
   let points_done = 0;
@@ -119,15 +124,20 @@ async function compute(moving, asked = false) {
     });
     clearTimeout(late);
     if (event === null) { return; }
-    take(event, { moving, reduced: reduced !== null }, (performance.now() - begun) / 1000);
+    if (wait) { long = event.event === "expect"; }
+    const seconds = (performance.now() - begun) / 1000;
+    if (moving && !wait) { live = Math.max(16, Math.min(all, (reduced ?? all) * Math.sqrt(LIVE / seconds))); }
+    take(event, { moving, reduced: reduced !== null }, seconds);
   } catch (error) {
     place.classList.remove("stale");
     status.textContent = "";
     partial = null;
     tell("offline", error);
   } finally {
-    inFlight = false;
-    if (again) { again = false; compute(true); }
+    if (own === newest) {
+      movingRun = 0;
+      if (again) { compute(true); }
+    }
   }
 }
 
@@ -142,7 +152,6 @@ function take(event, { moving, reduced }, seconds) {
   partial = null;
   place.classList.remove("stale");
   if (event.event === "expect") {
-    waiting = true;
     cost = { seconds: Infinity, points: 0 };
     explain(`This study takes ${event.text}.`, "Compute", state.result !== null);
     place.classList.toggle("stale", state.result !== null);
@@ -155,7 +164,6 @@ function take(event, { moving, reduced }, seconds) {
     if (!state.result) { explain(event.message, null); }
     return;
   }
-  waiting = false;
   message();
   empty.hidden = true;
   place.hidden = false;
@@ -195,7 +203,8 @@ const show = perFrame(() => {
   const behind = pinned();
   if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: PALE }); }
   // the figure fills the window; on a narrow page it leaves room for the parameters
-  const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - 110;
+  const below = byId("trust").offsetHeight + hint.offsetHeight + 56;
+  const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - below;
   const height = window.innerWidth < 820 ? plot.narrow?.height ?? 340 : Math.max(340, free);
   draw(place, plot, { behind, shapes: markers(plot), height, moving: shown.moving === true }).then(drawn);
 });
@@ -229,6 +238,7 @@ function moveMarker(at, last) {
 let listened = false;
 /** Marks the time, so that a test can measure it, and listens to clicks. */
 function drawn() {
+  performance.clearMarks("curve-drawn");
   performance.mark("curve-drawn");
   if (listened) { return; }
   listened = true;
