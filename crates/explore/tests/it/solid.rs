@@ -31,6 +31,86 @@ pub fn bar(folder: &Path) -> PathBuf {
     file
 }
 
+/// Writes a twisted blade of 6 by 1 by 20 bricks and a response with a damper pad on one side;
+/// returns its study file. A spring joins every two corners of a brick.
+pub fn blade(folder: &Path) -> PathBuf {
+    const COUNTS: [usize; 3] = [6, 1, 20];
+    let number = |[i, j, k]: [usize; 3]| i + (COUNTS[0] + 1) * (j + (COUNTS[1] + 1) * k);
+    let grid = |last: [usize; 3]| {
+        (0..=last[2])
+            .flat_map(move |k| (0..=last[1]).flat_map(move |j| (0..=last[0]).map(move |i| [i, j, k])))
+            .collect::<Vec<_>>()
+    };
+    let place = |[i, j, k]: [usize; 3]| {
+        let (along, up) = (i as f64 / COUNTS[0] as f64 - 0.5, k as f64 / COUNTS[2] as f64);
+        let camber = 5.0 * (0.25 - along * along);
+        let y = (j as f64 - 0.5) * (6.0 - 3.0 * up) * (1.0 - 1.6 * along * along) + camber;
+        let (x, (sin, cos)) = (32.0 * (1.0 - 0.25 * up) * along, (0.6 * up).sin_cos());
+        [x * cos - y * sin, x * sin + y * cos, 100.0 * up]
+    };
+    let nodes = grid(COUNTS);
+    let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+    let bricks: Vec<[[usize; 3]; 8]> = grid(COUNTS.map(|count| count - 1))
+        .into_iter()
+        .map(|first| corners.map(|corner| [0, 1, 2].map(|axis| first[axis] + corner[axis])))
+        .collect();
+    let mut stiffness = vec![vec![0.0; 3 * nodes.len()]; 3 * nodes.len()];
+    let mut mass = vec![0.0; 3 * nodes.len()];
+    for brick in &bricks {
+        for (index, a) in brick.iter().enumerate() {
+            (0..3).for_each(|axis| mass[3 * number(*a) + axis] += 1.2e-7);
+            for b in &brick[index + 1..] {
+                let [from, to] = [place(*a), place(*b)];
+                let between = [0, 1, 2].map(|axis| to[axis] - from[axis]);
+                let length = between.iter().map(|part| part * part).sum::<f64>().sqrt();
+                for (r, c) in (0..3).flat_map(|r| (0..3).map(move |c| (r, c))) {
+                    let value = 4e4 * between[r] * between[c] / length.powi(3);
+                    for (p, q, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
+                        stiffness[3 * number(*p) + r][3 * number(*q) + c] += sign * value;
+                    }
+                }
+            }
+        }
+    }
+    nodes.iter().filter(|node| node[2] == 0).for_each(|root| {
+        (0..3).for_each(|axis| stiffness[3 * number(*root) + axis][3 * number(*root) + axis] += 1e6);
+    });
+    let (mut sti, mut mas, mut dof, mut deck) = (String::new(), String::new(), String::new(), String::from("*NODE\n"));
+    for (r, row) in stiffness.iter().enumerate() {
+        let entries = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
+        entries.for_each(|(c, value)| sti += &format!("{} {} {value:?}\n", r + 1, c + 1));
+        mas += &format!("{0} {0} {1:?}\n", r + 1, mass[r]);
+        dof += &format!("{}.{}\n", r / 3 + 1, r % 3 + 1);
+    }
+    for node in &nodes {
+        let [x, y, z] = place(*node);
+        deck += &format!("{},{x},{y},{z}\n", number(*node) + 1);
+    }
+    deck += "*ELEMENT,TYPE=C3D8\n";
+    for (index, brick) in bricks.iter().enumerate() {
+        let list = brick.map(|corner| (number(corner) + 1).to_string()).join(",");
+        deck += &format!("{},{list}\n", index + 1);
+    }
+    let pad = nodes.iter().filter(|[i, j, k]| (2..5).contains(i) && *j == 0 && (5..8).contains(k));
+    let pad: Vec<String> = pad.map(|node| (number(*node) + 1).to_string()).collect();
+    deck += &format!("*NSET,NSET=PAD\n{}\n", pad.join(","));
+    let files = [("sti", sti), ("mas", mas), ("dof", dof), ("inp", deck)];
+    files.iter().for_each(|(end, text)| std::fs::write(folder.join(format!("blade.{end}")), text).unwrap());
+    let text = format!(
+        "schema = 1\ntitle = \"A blade with a damper pad\"\n[parameters]\np = \"4 MPa\"     # pressure of the damper\n\
+        F0 = \"8 N\"      # amplitude of the force at the tip\n\
+        [structure]\nstiffness = \"blade.sti\"\nmass = \"blade.mas\"\ndofs = \"blade.dof\"\nunits = \"mm-t-s\"\nmesh = \"blade.inp\"\n\
+        modal_damping = 0.01\n[[place]]\nname = \"tip\"\ndof = \"{}.y\"\n[[contact]]\nname = \"pad\"\nbetween = [\"PAD\", \"ground\"]\n\
+        law = {{ kind = \"friction-contact\", tangential = \"60 N/mm^3\", normal = \"80 N/mm^3\", friction = 0.4, preload = \"p\" }}\n\
+        [[force]]\non = \"tip\"\namplitude = \"F0\"\n[study]\nkind = \"response\"\n\
+        frequency = {{ from = \"150 Hz\", to = \"210 Hz\", points = 5 }}\npeaks = false\n[method]\nkind = \"harmonic-balance\"\nharmonics = 7\ntolerance = 0.05\n",
+        number([3, 1, COUNTS[2]]) + 1
+    );
+    let file = folder.join("blade.toml");
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
 /// Decodes base 64 (RFC 4648).
 fn bytes(text: &Value) -> Vec<u8> {
     let digit = |byte: u8| match byte {
