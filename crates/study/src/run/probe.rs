@@ -24,8 +24,8 @@ use stickslip_numerics::interrupt::StopFlag;
 
 /// Limit of the processor time of all probes of a study.
 const TIME_LIMIT: Duration = Duration::from_secs(1);
-/// Additional processor time for a probe that does not end at the limit, because one of its steps is long.
-/// After that, its thread is abandoned and ends after this step.
+/// Additional processor time for a probe that does not end at the limit, because one of its steps
+/// is long. After that, its thread is abandoned and ends after this step.
 const GRACE_TIME: Duration = Duration::from_millis(500);
 /// Longest wait for probes that get little processor time on a busy machine. After that, the time
 /// is unknown.

@@ -236,8 +236,8 @@ impl Statistics {
         }
     }
 
-    /// Checks every interval by the loss itself. If the loss is flat at one end of one interval, the
-    /// profile likelihood gives all ends.
+    /// Checks every interval by the loss itself. If the loss is flat at one end of one interval,
+    /// the profile likelihood gives all ends.
     ///
     /// The linear model is wrong where a residual has a kink at the minimum. Example: an Iwan joint
     /// that reaches macro-slip at its largest measured displacement. A smaller slip limit changes
@@ -285,8 +285,8 @@ impl Statistics {
         2.0 * (cost - found.cost) / self.variance
     }
 
-    /// Returns an end of the interval of a scaled parameter by the profile likelihood, at least that
-    /// of the linear model; `None` if the data do not bound the parameter on that side within
+    /// Returns an end of the interval of a scaled parameter by the profile likelihood, at least
+    /// that of the linear model; `None` if the data do not bound the parameter on that side within
     /// [`UNDETERMINED`] of its range.
     fn end(&self, k: usize, sign: f64, problem: &FitProblem, settings: &SearchSettings, found: &Found) -> Option<f64> {
         let step = self.quantile * self.scaled_error(k);
