@@ -295,7 +295,11 @@ fn a_short_study_starts_at_once_on_a_busy_machine() {
     let ended = AtomicBool::new(false);
     std::thread::scope(|scope| {
         for _ in 0..4 * std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| while !ended.load(Ordering::Relaxed) {});
+            scope.spawn(|| {
+                while !ended.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
         }
         let events: Vec<_> = (0..20).map(|_| first_event(page.run(&request)).0).collect();
         ended.store(true, Ordering::Relaxed);

@@ -4,6 +4,8 @@
 //! `STICKSLIP_MODELS` sets the number of models, by default one of each family but the responses,
 //! which take half a minute. `STICKSLIP_FAMILY` selects one family by its number from 0.
 
+#![allow(clippy::print_stdout)] // tests print their measurements
+
 use super::identify::{Noise, estimate, identify_in};
 use std::f64::consts::TAU;
 use std::fmt::Write;
