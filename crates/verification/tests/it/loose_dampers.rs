@@ -163,8 +163,8 @@ fn a_roof_damper_has_its_orbits_at_all_speeds() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
-/// Newton's method with few harmonics does not reach an orbit, but it does with 63 harmonics from
-/// the motion of a time integration. The second method finds an orbit that depends on the history,
+/// Newton's method does not reach an orbit from a guess, but it does from the motion of a time
+/// integration. The second method finds an orbit that depends on the history,
 /// and reports how much.
 #[test]
 fn orbits_are_found_from_a_time_integration_and_by_the_second_method() {
@@ -174,11 +174,12 @@ fn orbits_are_found_from_a_time_integration_and_by_the_second_method() {
         (omega, Auto.solver(&damper.system()).unwrap().orbit(omega).unwrap())
     };
     let damper = loose_damper(66);
-    let (omega, orbit) = orbit_of(&damper, 174.747);
+    let (omega, orbit) = orbit_of(&damper, 240.838);
     assert_eq!(orbit.evidence.found_by, "time-integration");
     let amplitudes: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
-    let distance = apart(&damper, &amplitudes, &damper.settled(omega, COURSES[2]).unwrap());
-    assert!(distance < NEAR, "{distance:.1e}");
+    let distance = apart(&damper, &amplitudes, &damper.settled(omega, COURSES[1]).unwrap());
+    let error = orbit.evidence.error_estimate.unwrap();
+    assert!(error < 0.01 && distance < NEAR.max(error), "{distance:.1e} {error:.1e}");
     // stuck contacts have 4.0922 um, slipping ones up to 4.1020 um
     let (_, orbit) = orbit_of(&loose_damper(40), 58.345);
     assert_eq!(orbit.evidence.fallback_from, Some("harmonic-balance"));
