@@ -343,8 +343,8 @@ fn one(
     let exit = report(&assembled, &outline.notes, Display { json: options.json, open: options.open });
     match exit {
         Exit::Done | Exit::SomeFailed if stop.load(Ordering::Relaxed) => {
-            let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&destination.out);
             let whole = destination.out.join(study.name());
+            let results = assembled.files.first().and_then(|file| file.parent()).unwrap_or(&whole);
             let earlier = if results == whole || !interrupted {
                 String::new()
             } else {
@@ -352,6 +352,9 @@ fn one(
             };
             let resume = if interrupted { "; continue with --resume" } else { "" };
             let what = match assembled.dataset.tables.iter().all(|table| table.rows() == 0) {
+                _ if assembled.files.is_empty() => {
+                    "interrupted before a further point was finished; the earlier results stay in"
+                }
                 true => {
                     "interrupted before any unit of work was finished (a block of points, or a whole branch); \
                      the record is in"

@@ -33,6 +33,11 @@ pub(crate) fn run_folder(out: &Path, name: &str, interrupted: bool) -> PathBuf {
     if interrupted && holds_whole_run(&folder) { out.join(format!("{name}.{INTERRUPTED_SUFFIX}")) } else { folder }
 }
 
+/// Returns `true` if the folder holds the results of an interrupted run.
+pub(crate) fn holds_interrupted_run(folder: &Path) -> bool {
+    record(folder).is_some_and(|record| record["interrupted"] == Value::Bool(true))
+}
+
 /// Returns `true` if the folder holds the results of a complete run.
 fn holds_whole_run(folder: &Path) -> bool {
     match record(folder) {
@@ -290,7 +295,9 @@ mod tests {
         };
         assert_eq!(folder_of(&cut), "fig06", "nothing to destroy");
         assert_eq!(folder_of(&cut), "fig06", "nor here");
+        assert!(holds_interrupted_run(&out.path().join("fig06")));
         assert_eq!(folder_of(&whole), "fig06");
+        assert!(!holds_interrupted_run(&out.path().join("fig06")));
         let before = fs::read(out.path().join("fig06").join(RECORD)).unwrap();
         assert_eq!(folder_of(&cut), "fig06.interrupted");
         assert_eq!(fs::read(out.path().join("fig06").join(RECORD)).unwrap(), before);

@@ -71,6 +71,12 @@ pub fn assemble(
     match done {
         Ok((dataset, is_whole, files)) => {
             let folder = folder::run_folder(out, file_name(&dataset.name, "study")?, dataset.record.interrupted);
+            let is_empty = dataset.record.interrupted && dataset.tables.iter().all(|table| table.rows() == 0);
+            if is_empty && folder::holds_interrupted_run(&folder) {
+                // the earlier interruption also kept points of unfinished units
+                staging.remove();
+                return Ok(Assembled { files: Vec::new(), dataset, is_whole });
+            }
             Ok(Assembled { files: staging.replace(&folder, &files)?, dataset, is_whole })
         }
         Err(error) => {
