@@ -57,7 +57,7 @@ pub(crate) struct RunRequest {
 /// Limits of runs.
 #[derive(Debug, Clone, Copy)]
 struct RunSettings {
-    /// Largest number of runs at a time. Default 24: ten pages with two slots each, and some.
+    /// Largest number of runs at a time. Default 24: ten pages with two slots each, and some more.
     runs: usize,
     /// Largest number of threads of runs, with those that have lost their slot and end after
     /// their current orbits. Default 96; a thread that waits takes 0.1 MB.

@@ -71,8 +71,7 @@ pub fn assemble(
     match done {
         Ok((dataset, is_whole, files)) => {
             let folder = folder::run_folder(out, file_name(&dataset.name, "study")?, dataset.record.interrupted);
-            let is_empty = dataset.record.interrupted && dataset.tables.iter().all(|table| table.rows() == 0);
-            if is_empty && folder::holds_interrupted_run(&folder) {
+            if ended_before_first_row(&dataset) && folder::holds_interrupted_run(&folder) {
                 // the earlier interruption also kept points of unfinished units
                 staging.remove();
                 return Ok(Assembled { files: Vec::new(), dataset, is_whole });
@@ -144,8 +143,8 @@ fn written(
     let figure = draw(study, &tables);
     let dataset = parts.outline.clone().with_results(tables, figure, tally, Duration::from_secs_f64(time));
     let mut files = Vec::new();
-    // A run that was stopped before its first result has nothing to draw.
-    let empty = dataset.record.interrupted && shapes.iter().all(|shape| shape.rows == 0);
+    // Without a row there is nothing to draw.
+    let empty = ended_before_first_row(&dataset);
     let makes = |output: &&Output| output.sink.is_none() && !(empty && FIGURES.contains(&output.name));
     for output in outputs.iter().filter(makes) {
         files.extend((output.make)(&dataset)?);
@@ -160,6 +159,11 @@ fn written(
     });
     let files = with_record(&dataset, &shapes, out, &names, files)?;
     Ok((dataset, is_whole, files))
+}
+
+/// Returns true for a run that was stopped before its first result.
+fn ended_before_first_row(dataset: &Dataset) -> bool {
+    dataset.record.interrupted && dataset.tables.iter().all(|table| table.rows() == 0)
 }
 
 fn join(shapes: &mut Vec<TableShape>, more: Vec<TableShape>) {

@@ -56,42 +56,36 @@ fn loop_rows(scale: f64, spring: f64, mut force: impl FnMut(f64, f64) -> f64) ->
 const LOOP_HEAD: &str = "displacement_m,force_N";
 const LOOP: &str = "is = \"loop\", at = \"pad\"";
 
-fn jenkins_loop(random: &mut Noise) -> Synthetic {
+/// Loop of a law with a stiffness and a limit beside a spring. `step` returns the force after a
+/// straight step from the force before, the stiffness, the limit and the change of displacement.
+fn limited_loop(random: &mut Noise, law: &'static str, step: impl Fn(f64, f64, f64, f64) -> f64) -> Synthetic {
     let kt = 1e4 * 10f64.powf(random.uniform() - 0.5);
     let limit = kt * 1e-4 * (1.0 + 3.0 * random.uniform());
     let k = kt * (0.05 + 0.3 * random.uniform());
-    let mut held = 0.0f64;
+    let mut force = 0.0;
     Synthetic {
         head: LOOP_HEAD,
         rows: loop_rows(1.0, k, |from, to| {
-            held = (held + kt * (to - from)).clamp(-limit, limit);
-            held
-        }),
-        noisy: &[1],
-        truth: vec![truth("a", kt, "N/m"), truth("b", limit, "N"), truth("k", k, "N/m")],
-        law: "kind = \"jenkins\", stiffness = \"a\", limit = \"b\"",
-        target: LOOP,
-    }
-}
-
-/// Dahl: `df/du = kt (1 - f sign(u')/limit)`, so that f tends exponentially to the limit.
-fn dahl_loop(random: &mut Noise) -> Synthetic {
-    let kt = 1e4 * 10f64.powf(random.uniform() - 0.5);
-    let limit = kt * 1e-4 * (1.0 + 3.0 * random.uniform());
-    let k = kt * (0.05 + 0.3 * random.uniform());
-    let mut force = 0.0f64;
-    Synthetic {
-        head: LOOP_HEAD,
-        rows: loop_rows(1.0, k, |from, to| {
-            let end = limit * (to - from).signum();
-            force = end + (force - end) * (-kt * (to - from).abs() / limit).exp();
+            force = step(force, kt, limit, to - from);
             force
         }),
         noisy: &[1],
         truth: vec![truth("a", kt, "N/m"), truth("b", limit, "N"), truth("k", k, "N/m")],
-        law: "kind = \"dahl\", stiffness = \"a\", limit = \"b\"",
+        law,
         target: LOOP,
     }
+}
+
+fn jenkins_loop(random: &mut Noise) -> Synthetic {
+    limited_loop(random, SLIDER, |force, kt, limit, run| (force + kt * run).clamp(-limit, limit))
+}
+
+/// Dahl: `df/du = kt (1 - f sign(u')/limit)`, so that f tends exponentially to the limit.
+fn dahl_loop(random: &mut Noise) -> Synthetic {
+    limited_loop(random, "kind = \"dahl\", stiffness = \"a\", limit = \"b\"", |force, kt, limit, run| {
+        let end = limit * run.signum();
+        end + (force - end) * (-kt * run.abs() / limit).exp()
+    })
 }
 
 /// Bouc-Wen with the exponent 1: `dz/du = 1 - (beta sign(u' z) + gamma) |z|`.

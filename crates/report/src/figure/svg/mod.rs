@@ -189,17 +189,14 @@ fn draw_panel(svg: &mut Svg, panel: &Panel, plot: &PlotArea, scheme: &ColourSche
     for series in panels::drawing_order(panel) {
         let colour = &scheme.colour(series).light;
         match series.style {
-            Style::Marks => {
+            Style::Marks | Style::Warning => {
                 let size = if crowd { 2.0 } else { MARK };
                 let at = panels::drawn(panel, series).map(|p| plot.map(p));
                 for point in at.filter(|p| plot.clip_rect().contains(*p)) {
-                    svg.mark(point, colour, size);
-                }
-            }
-            Style::Warning => {
-                let at = panels::drawn(panel, series).map(|p| plot.map(p));
-                for point in at.filter(|p| plot.clip_rect().contains(*p)) {
-                    svg.triangle(point, colour);
+                    match series.style {
+                        Style::Warning => svg.triangle(point, colour),
+                        _ => svg.mark(point, colour, size),
+                    }
                 }
             }
             Style::Missing => {
