@@ -57,7 +57,7 @@ export function start(panel) {
     tell("show", "orbit");
   });
   draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
-  on("opened", () => { previous = partial = null; long = false; cost = { seconds: 0, points: 0 }; live = Infinity; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); explain("Computing …", null); opened(); compute(false); });
+  on("opened", () => { previous = partial = null; long = false; cost = { seconds: 0, points: 0 }; live = Infinity; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); place.removeAttribute("aria-busy"); explain("Computing …", null); opened(); compute(false); });
   on("moving", () => compute(true));
   on("changed", () => compute(false));
   on("theme", () => show());
@@ -206,6 +206,8 @@ const show = perFrame(() => {
   const below = byId("trust").offsetHeight + hint.offsetHeight + 56;
   const free = window.innerHeight - (place.getBoundingClientRect().top + window.scrollY) - below;
   const height = window.innerWidth < 820 ? plot.narrow?.height ?? 340 : Math.max(340, free);
+  drawing += 1;
+  newestDrawn = shown;
   draw(place, plot, { behind, shapes: markers(plot), height, moving: shown.moving === true }).then(drawn);
 });
 
@@ -236,10 +238,19 @@ function moveMarker(at, last) {
 }
 
 let listened = false;
-/** Marks the time, so that a test can measure it, and listens to clicks. */
+/** Number of drawings that have not ended; they can end in another order than they began. */
+let drawing = 0;
+/** The result whose drawing began last. @type {any} */
+let newestDrawn = null;
+/**
+ * Marks the time, so that a test can measure it, says whether the figure is whole, and listens to
+ * clicks.
+ */
 function drawn() {
   performance.clearMarks("curve-drawn");
   performance.mark("curve-drawn");
+  drawing -= 1;
+  place.setAttribute("aria-busy", String(drawing > 0 || newestDrawn !== state.result));
   if (listened) { return; }
   listened = true;
   place.on("plotly_click", (/** @type {any} */ event) => {
