@@ -77,3 +77,23 @@ fn other_places_are_in_equilibrium() {
     assert!((at("") - 3e-3).abs() < 1e-12, "{}", at(""));
     assert_eq!(at("begin = \"unloaded\"\n"), 0.0);
 }
+
+/// Two masses of which one is displaced move in two modes, and the swings of each grow at times: a
+/// warning says that the damping is not that of one mode. In the shape of a mode there is none.
+#[test]
+fn a_decay_of_several_modes_is_named() {
+    let notes = |start: &str| {
+        let text = format!(
+            "schema = 1\n[[mass]]\nname = \"a\"\nmass = \"1 kg\"\n[[mass]]\nname = \"b\"\nmass = \"1 kg\"\n\
+             [[spring]]\nbetween = [\"a\", \"ground\"]\nstiffness = \"1 N/um\"\ndamping = \"2 N s/m\"\n\
+             [[spring]]\nbetween = [\"b\", \"ground\"]\nstiffness = \"1 N/um\"\ndamping = \"2 N s/m\"\n\
+             [[spring]]\nbetween = [\"a\", \"b\"]\nstiffness = \"0.1 N/um\"\n\
+             [study]\nkind = \"transient\"\nstart = {{ {start} }}\nduration = \"0.2 s\"\ntime_step = \"0.1 ms\"\n"
+        );
+        dataset(&text).notes.join("\n")
+    };
+    let both = notes("a = \"1 mm\", b = \"0 mm\"");
+    assert!(both.contains("grow in") && both.contains("several modes"), "{both}");
+    let one = notes("a = \"1 mm\", b = \"1 mm\"");
+    assert!(!one.contains("grow"), "{one}");
+}

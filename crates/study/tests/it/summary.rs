@@ -581,6 +581,23 @@ fn stuck_contacts_count_as_closed() {
     assert!(found.stuck.elastic[0].omega > found.free.elastic[0].omega, "{found}");
 }
 
+/// A force on the wrong side of a contact is reported with the places to exchange; in the right
+/// order there is no warning.
+#[test]
+fn a_contact_in_the_wrong_direction() {
+    let text = |between: &str| {
+        format!(
+            "schema = 1\n[[mass]]\nname = \"blade\"\nmass = \"1 kg\"\n[[mass]]\nname = \"damper\"\nmass = \"20 g\"\n\
+             [[spring]]\nbetween = [\"blade\", \"ground\"]\nstiffness = \"100 N/mm\"\ndamping = \"3 N s/m\"\n\
+             [[joint]]\nname = \"face\"\nbetween = {between}\nlaw = {{ kind = \"gap\", gap = \"0 m\", stiffness = \"8 N/um\" }}\n\
+             [[force]]\non = \"damper\"\namplitude = \"20 N\"\nharmonic = 0\n[[force]]\non = \"blade\"\namplitude = \"1 N\"\n\
+             [study]\nkind = \"orbit\"\nfrequency = \"30 Hz\"\n"
+        )
+    };
+    warns(&text("[\"blade\", \"damper\"]"), &["`face` is open", "exchange the two places of its `between`"]);
+    silent(&text("[\"damper\", \"blade\"]"));
+}
+
 /// A wedge without a load lies loose between its faces: one warning for all wedges says what is
 /// missing.
 #[test]

@@ -73,9 +73,34 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
             pronoun(bodies.len())
         )
     });
+    let open = open_under_load(&cases[0]).or(open);
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
     let others = others.filter(|one| !between(one) && !one.held_in_motion);
     others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
+}
+
+/// Warns of open contacts of a structure that can move freely although constant forces act on it:
+/// these may have been meant to press the contacts.
+fn open_under_load(one: &SurveyedCase) -> Option<String> {
+    let constant = one.case.model.forces.iter().find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
+    let slips = one.survey.first_slip();
+    let mut open: Vec<String> = slips
+        .iter()
+        .filter(|slip| slip.preload == Some(0.0))
+        .map(|slip| slip.joint.split('.').next().unwrap_or(&slip.joint).to_owned())
+        .collect();
+    open.dedup();
+    if open.is_empty() || one.survey.is_too_large() || one.survey.free().rigid == 0 {
+        return None;
+    }
+    let (verb, each) = if open.len() == 1 { ("is", "its") } else { ("are", "their") };
+    Some(format!(
+        "{} {verb} open in static equilibrium, and a part of the structure can move freely: the constant force on `{}` \
+         does not press {each} faces together; if it should, exchange the two places of {each} `between` (a contact \
+         closes where its first place moves along the normal towards the second), or reverse the force",
+        list_names(&open),
+        constant.on
+    ))
 }
 
 /// Warns of a preload that no constant force balances, for the first such case.

@@ -14,7 +14,7 @@ use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::motion_warnings;
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
-use crate::results::decay::{Decay, PlaceMotionFn};
+use crate::results::decay::{Cycle, Decay, PlaceMotionFn};
 use crate::results::drawing::MAX_PANELS;
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
@@ -359,8 +359,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             Note::TimeHistory(reduction.up_to).merge_into(&mut part.notes);
         }
         if is_free {
-            let unread = write_decay(prepared, &decays, step, &mut decay, &mut summary);
-            part.notes.extend(unread.map(|text| Note::for_case(&case.label(), text)));
+            let warning = write_decay(prepared, &decays, step, &mut decay, &mut summary);
+            part.notes.extend(warning.map(|text| Note::for_case(&case.label(), text)));
         }
         (work.context.finished)();
         let location = || drive.map_or_else(|| case.label(), |omega| describe_location(case, omega));
@@ -383,24 +383,24 @@ fn largest_range(decays: &[Decay]) -> Option<usize> {
 
 /// Writes frequency and damping, cycle by cycle, of the place that moves most.
 ///
-/// Returns the warning for too few samples.
+/// Returns the warning for too few samples, or for several modes.
 fn write_decay(
     prepared: &PreparedCase,
     decays: &[Decay],
     step: f64,
     rows: &mut TableBuilder,
     summary: &mut TableBuilder,
-) -> Option<&'static str> {
+) -> Option<String> {
     let displacements = (0..decays.len()).filter(|place| !prepared.system.place_axes()[*place].is_rotation());
     let most = displacements.max_by(|&a, &b| decays[a].largest().total_cmp(&decays[b].largest()));
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     // Samples per cycle that turning points need. With 20 the damping ratio has an error of 1e-3
     // of the decrement of a cycle; with 3 it is meaningless.
     if cycles.iter().any(|cycle| cycle.frequency * step * 20.0 > 1.0) {
-        return Some(
-            "warning: the samples are too far apart to compute damping from the decay: use a `time_step` below a \
-             twentieth of the period",
-        );
+        return Some(format!(
+            "{WARNING}the samples are too far apart to compute damping from the decay: use a `time_step` below a \
+             twentieth of the period"
+        ));
     }
     for cycle in &cycles {
         rows.varied(&prepared.case);
@@ -423,5 +423,20 @@ fn write_decay(
     named.iter().for_each(|(when, cycle)| summary.number(&format!("{when}_frequency_Hz"), cycle.frequency));
     summary.reduction_error(prepared.system.reduction_evidence());
     summary.end_row();
-    None
+    growing_swings(mass, &cycles)
+}
+
+/// Returns the warning for a decay whose swings grow, as those of several modes do.
+fn growing_swings(place: &str, cycles: &[Cycle]) -> Option<String> {
+    // Growth of a swing in one cycle, as a negative damping ratio, above the error of the turning points.
+    let growth = -1e-3;
+    let growing = cycles.iter().filter(|cycle| cycle.damping_ratio < growth).count();
+    (growing > 0).then(|| {
+        format!(
+            "{WARNING}the swings of `{place}` grow in {growing} of {} cycles, so that several modes take part, or a \
+             joint supplies energy: frequency and damping of a cycle are not those of one mode; begin with a \
+             displacement in the shape of one mode, or use kind `modes`",
+            cycles.len()
+        )
+    })
 }
