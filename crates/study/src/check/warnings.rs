@@ -97,8 +97,7 @@ fn no_resonance(cases: &[SurveyedCase]) -> Option<String> {
         }
         // friction puts the resonance between the frequencies of a mode with the joint free and
         // stuck
-        let between = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
-        let between = between.map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
+        let between = paired(free, stuck).into_iter().map(|(a, b)| (a.omega.min(b.omega), a.omega.max(b.omega)));
         let single =
             |modes: &LinearModes| modes.elastic.iter().map(|mode| (mode.omega, mode.omega)).collect::<Vec<_>>();
         let intervals: Vec<(f64, f64)> = between.chain(single(free)).chain(single(stuck)).collect();
@@ -206,13 +205,25 @@ fn narrowest_in_wave(one: &SurveyedCase) -> Option<NarrowResonance> {
 /// higher one (joints free and stuck), and the width, rad/s.
 fn resonances(free: &LinearModes, stuck: &LinearModes, harmonic: u32) -> Vec<(f64, f64, f64)> {
     let width = |mode: &NaturalMode| 2.0 * mode.damping * mode.omega;
-    let paired = free.elastic.iter().zip(stuck.elastic.iter().skip(free.rigid.saturating_sub(stuck.rigid)));
     let h = f64::from(harmonic);
     let between = |(free, stuck): (&NaturalMode, &NaturalMode)| {
         let width = width(free).max(width(stuck));
         (free.omega.min(stuck.omega) / h, free.omega.max(stuck.omega) / h, width / h)
     };
-    paired.map(between).collect()
+    paired(free, stuck).into_iter().map(between).collect()
+}
+
+/// Pairs the modes with joints free and stuck, both by ascending frequency.
+///
+/// A body that is held by joints alone moves freely without them and has a mode with them. This
+/// mode is the lowest one for a heavy body and a high one for a light damper, so as many of the
+/// lowest stuck modes stay without a partner as give the smallest shifts of frequency.
+fn paired<'a>(free: &'a LinearModes, stuck: &'a LinearModes) -> Vec<(&'a NaturalMode, &'a NaturalMode)> {
+    let pairs = |skipped: usize| free.elastic.iter().zip(stuck.elastic.iter().skip(skipped));
+    let shift = |skipped: usize| pairs(skipped).map(|(a, b)| (b.omega / a.omega).ln().abs()).sum::<f64>();
+    let most = free.rigid.saturating_sub(stuck.rigid);
+    let best = (0..=most).rev().min_by(|a, b| shift(*a).total_cmp(&shift(*b)));
+    pairs(best.unwrap_or(0)).collect()
 }
 
 /// Returns the narrowest resonance within a range of frequencies, if it is narrower than their

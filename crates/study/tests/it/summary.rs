@@ -581,6 +581,20 @@ fn stuck_contacts_count_as_closed() {
     assert!(found.stuck.elastic[0].omega > found.free.elastic[0].omega, "{found}");
 }
 
+/// A light body that only a joint holds has its mode far above the resonance of the blade, whose
+/// frequency it hardly changes: steps that are too wide for this resonance are reported.
+#[test]
+fn steps_too_wide_for_the_blade_of_a_light_damper() {
+    let text = "schema = 1\n[[mass]]\nname = \"blade\"\nmass = \"1 kg\"\n[[mass]]\nname = \"damper\"\nmass = \"20 g\"\n\
+         [[spring]]\nbetween = [\"blade\", \"ground\"]\nstiffness = \"100 N/mm\"\ndamping_ratio = \"0.3 %\"\n\
+         [[joint]]\nname = \"face\"\nbetween = [\"damper\", \"blade\"]\nlaw = { kind = \"jenkins\", stiffness = \"8 N/um\", limit = \"5 N\" }\n\
+         [[force]]\non = \"blade\"\namplitude = \"1 N\"\n\
+         [study]\nkind = \"response\"\nfrequency = { from = \"40 Hz\", to = \"60 Hz\", points = 11 }\n";
+    let warnings = summary(text).warnings.join("\n");
+    // 2 x 0.003 x 49.8 Hz
+    assert!(warnings.contains("2 Hz apart") && warnings.contains("only 0.3 Hz wide"), "{warnings}");
+}
+
 /// A force on the wrong side of a contact is reported with the places to exchange; in the right
 /// order there is no warning.
 #[test]
