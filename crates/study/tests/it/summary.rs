@@ -324,10 +324,10 @@ fn studies_that_need_too_much_memory_are_refused_in_advance() {
         ],
     );
     refused(&orbits, "frequencies");
-    // half a million cases of one frequency each
+    // eighty thousand cases of one frequency each
     let cases = template(
         "element",
-        &[("[\"1.25 mm\", \"2 mm\", \"2.75 mm\"]", "{ from = \"1.25 mm\", to = \"2 mm\", points = 500000 }")],
+        &[("[\"1.25 mm\", \"2 mm\", \"2.75 mm\"]", "{ from = \"1.25 mm\", to = \"2 mm\", points = 80000 }")],
     );
     refused(&cases, "vary");
 }
