@@ -7,6 +7,7 @@ use std::path::Path;
 use stickslip_study::dataset::{Dataset, Table};
 use stickslip_study::results::fitted_study;
 use stickslip_study::run::{Context, run};
+use stickslip_study::summary::ModelSummary;
 use stickslip_study::{Study, read_file, read_study};
 
 /// Normally distributed numbers: the sum of twelve uniform ones of a linear congruential generator
@@ -389,6 +390,23 @@ fn rows_that_are_predicted_are_not_fitted() {
         Some(1)
     );
     assert!(dataset.notes.iter().any(|note| note.starts_with("prediction of `rig`, group 1")), "{:?}", dataset.notes);
+}
+
+/// A stated value outside of the range of a parameter is a warning of `check`, before the search.
+#[test]
+fn a_start_outside_of_its_range_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("data.csv"), "displacement_m,force_N\n0,0\n1,1\n0.5,0\n").expect("the data");
+    let warnings = |study: &str| {
+        let name = folder.path().join("study.toml").display().to_string();
+        ModelSummary::new(&read_study(&name, study, &[]).expect("a study")).expect("a summary").warnings
+    };
+    assert_eq!(warnings(&loop_study("")), Vec::<String>::new());
+    let outside = warnings(&loop_study("").replace("from = \"0.02 N\"", "from = \"1 N\""));
+    assert!(
+        outside.len() == 1 && outside[0].contains("`Ft` = 0.2 N is outside of its range, 1 N to 200 N"),
+        "{outside:?}"
+    );
 }
 
 #[test]

@@ -37,12 +37,14 @@ use crate::case::initial_state::{self, begin_values};
 use crate::case::study::Study;
 use crate::case::values::Values;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
+use crate::check::survey::SurveyedCase;
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, NOT_REACHED, UnitResult, UnitSize, UnitTask};
 use crate::syntax::error::StudyError;
+use crate::syntax::expression::quantity_text;
 use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
 use problem::FitProblem;
 pub use residuals::Residuals;
@@ -183,7 +185,7 @@ pub(super) const KIND: Kind = Kind {
     },
     unit_size: |_| UnitSize::Case,
     size,
-    warnings: |_| Vec::new(),
+    warnings: starts_outside,
     probe: Probe::Unit { name: "case" },
     compute,
     draw: figure::draw,
@@ -215,6 +217,26 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
         targets::check(target, values, model)?;
     }
     initial_state::check_names(values, model)
+}
+
+/// Warns of parameters whose value in `[parameters]` is outside of their range.
+fn starts_outside(cases: &[SurveyedCase]) -> Vec<String> {
+    let case = &cases[0].case;
+    let ranges = case.values.fit("fit").unwrap_or_default();
+    let outside = ranges.iter().filter_map(|range| {
+        let (value, _) = case.parameters.get(&range.name)?;
+        let text = |value: f64| quantity_text(value, range.dimension);
+        (!(range.from..=range.to).contains(value)).then(|| {
+            format!(
+                "`{}` = {} is outside of its range, {} to {}: the search begins inside, near the closer end",
+                range.name,
+                text(*value),
+                text(range.from),
+                text(range.to)
+            )
+        })
+    });
+    outside.collect()
 }
 
 /// Checks the targets of a study together with their data.
