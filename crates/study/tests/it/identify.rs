@@ -392,6 +392,20 @@ fn rows_that_are_predicted_are_not_fitted() {
     assert!(dataset.notes.iter().any(|note| note.starts_with("prediction of `rig`, group 1")), "{:?}", dataset.notes);
 }
 
+/// With every parameter at a bound nothing is left to estimate; the run says so.
+#[test]
+fn all_parameters_at_a_bound() {
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f]);
+    let one = |line: &str| !line.starts_with("fit.kt") && !line.starts_with("fit.k ");
+    let study = loop_study("").replace("from = \"0.02 N\", to = \"200 N\"", "from = \"0.02 N\", to = \"1 N\"");
+    let study = study.replace("kt = \"1e5 N/m\"", "kt = \"1e4 N/m\"").replace("k = \"1e2 N/m\"", "k = \"1e3 N/m\"");
+    let study: Vec<&str> = study.lines().filter(|line| one(line)).collect();
+    let dataset = identify(&csv("displacement_m,force_N", rows), &study.join("\n"));
+    let found = estimate(&dataset, "Ft");
+    assert!(found.status == "at-bound" && found.error.is_nan() && (found.value - 1.0).abs() < 1e-9, "{}", found.status);
+    assert!(dataset.notes.iter().any(|note| note.contains("end of its range")), "{:?}", dataset.notes);
+}
+
 /// A stated value outside of the range of a parameter is a warning of `check`, before the search.
 #[test]
 fn a_start_outside_of_its_range_is_named() {

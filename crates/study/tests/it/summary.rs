@@ -610,6 +610,14 @@ fn a_contact_in_the_wrong_direction() {
     };
     warns(&text("[\"blade\", \"damper\"]"), &["`face` is open", "exchange the two places of its `between`"]);
     silent(&text("[\"damper\", \"blade\"]"));
+    // a force that slides the damper off its face presses it: nothing is exchanged
+    let sliding = "schema = 1\n[[mass]]\nname = \"block\"\nmass = \"0.5 kg\"\ndirections = [\"x\", \"z\"]\n\
+         [[joint]]\nname = \"floor\"\nbetween = [\"block\", \"ground\"]\n\
+         law = { kind = \"friction-contact\", tangential = \"50 N/mm\", normal = \"100 N/mm\", friction = 0.4 }\n\
+         [[force]]\non = \"block.z\"\namplitude = \"10 N\"\nharmonic = 0\n[[force]]\non = \"block.x\"\namplitude = \"6 N\"\nharmonic = 0\n\
+         [[force]]\non = \"block.x\"\namplitude = \"1 N\"\n[study]\nkind = \"orbit\"\nfrequency = \"20 Hz\"\n";
+    let warnings = summary(sliding).warnings.join("\n");
+    assert!(!warnings.contains("exchange"), "{warnings}");
 }
 
 /// A wedge without a load lies loose between its faces: one warning for all wedges says what is

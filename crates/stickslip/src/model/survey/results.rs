@@ -48,6 +48,9 @@ pub struct FirstSlip {
     /// `None` if it is unknown: without preload, in models with rigid friction, or in models
     /// too large for a quick answer.
     pub equilibrium_force: Option<f64>,
+    /// Component along this direction of the constant forces on the places that it connects, N.
+    /// Along a normal direction a positive component closes the contact.
+    pub constant_force: f64,
 }
 
 /// Load of a stuck joint relative to its limit under the model's excitation, over a range of

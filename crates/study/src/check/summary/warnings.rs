@@ -79,14 +79,13 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
 }
 
-/// Warns of open contacts of a structure that can move freely although constant forces act on it:
-/// these may have been meant to press the contacts.
+/// Warns of open contacts of a structure that can move freely, if the constant forces move their
+/// faces apart: these forces may have been meant to press the contacts.
 fn open_under_load(one: &SurveyedCase) -> Option<String> {
-    let constant = one.case.model.forces.iter().find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
     let slips = one.survey.first_slip();
     let mut open: Vec<String> = slips
         .iter()
-        .filter(|slip| slip.preload == Some(0.0))
+        .filter(|slip| slip.preload == Some(0.0) && slip.constant_force < 0.0)
         .map(|slip| slip.joint.split('.').next().unwrap_or(&slip.joint).to_owned())
         .collect();
     open.dedup();
@@ -95,11 +94,10 @@ fn open_under_load(one: &SurveyedCase) -> Option<String> {
     }
     let (verb, each) = if open.len() == 1 { ("is", "its") } else { ("are", "their") };
     Some(format!(
-        "{} {verb} open in static equilibrium, and a part of the structure can move freely: the constant force on `{}` \
-         does not press {each} faces together; if it should, exchange the two places of {each} `between` (a contact \
-         closes where its first place moves along the normal towards the second), or reverse the force",
-        list_names(&open),
-        constant.on
+        "{} {verb} open in static equilibrium, and a part of the structure can move freely: the constant forces move \
+         {each} faces apart; if they should press them together, exchange the two places of {each} `between` (a contact \
+         closes where its first place moves along the normal towards the second), or reverse the forces",
+        list_names(&open)
     ))
 }
 
@@ -115,7 +113,8 @@ fn unbalanced_preload(cases: &[SurveyedCase]) -> Option<String> {
     let preload = quantity_text(found.preload, Some(Dimension::FORCE));
     Some(format!(
         "the preload of {joints}, {preload} in total, pushes {names} away: no spring holds {}, and no constant force \
-         presses the faces; add a force with `harmonic = 0` that presses them",
+         presses the faces; add a force with `harmonic = 0` that presses them; if one should press them already, \
+         exchange the two places of `between`, or reverse the force",
         if bodies.len() == 1 { "it" } else { "them" }
     ))
 }

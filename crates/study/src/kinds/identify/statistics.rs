@@ -405,7 +405,11 @@ impl NormalEquations {
         let lengths: Vec<f64> = columns.iter().map(|column| column.norm()).collect();
         let unit = |a: usize| if lengths[a] > 0.0 { lengths[a] } else { 1.0 };
         let product = |a: usize, b: usize| columns[a].dot(&columns[b]) / (unit(a) * unit(b));
-        let eigen = SymmetricEigen::new(DMatrix::from_fn(members.len(), members.len(), product));
+        // nalgebra refuses an empty matrix: all parameters ended at a bound
+        let eigen = match members.len() {
+            0 => SymmetricEigen { eigenvalues: DVector::zeros(0), eigenvectors: DMatrix::zeros(0, 0) },
+            p => SymmetricEigen::new(DMatrix::from_fn(p, p, product)),
+        };
         NormalEquations { lengths, eigen }
     }
 

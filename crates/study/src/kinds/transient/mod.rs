@@ -433,8 +433,8 @@ fn growing_swings(place: &str, cycles: &[Cycle]) -> Option<String> {
     let growing = cycles.iter().filter(|cycle| cycle.damping_ratio < growth).count();
     (growing > 0).then(|| {
         format!(
-            "{WARNING}the swings of `{place}` grow in {growing} of {} cycles, so that several modes take part, or a \
-             joint supplies energy: frequency and damping of a cycle are not those of one mode; begin with a \
+            "{WARNING}the swings of `{place}` grow in {growing} of {} cycles, so that several modes take part, or \
+             something supplies energy: frequency and damping of a cycle are not those of one mode; begin with a \
              displacement in the shape of one mode, or use kind `modes`",
             cycles.len()
         )
