@@ -24,7 +24,7 @@ fn couple() -> Start {
 
 /// The whole figure of a study with several panels is drawn. (A busy machine draws parts before.)
 pub(crate) const CURVE: &str = "document.querySelector('#response-plot[aria-busy=\"false\"]')?.data?.length > 7 && document.getElementById('trust').childElementCount > 0";
-/// Waits for the figure of a study that a busy machine expects to take long, so that it waits for its button.
+/// Waits for the figure of a study. Presses the button if a busy machine expects a long run.
 fn wait_or_compute(browser: &mut Browser, figure: &str) {
     let button = "[...document.querySelectorAll('button')].find((b) => b.textContent === 'Compute' && b.offsetParent)";
     let press =

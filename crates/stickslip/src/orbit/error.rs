@@ -385,20 +385,24 @@ impl std::fmt::Display for ObservedMotion {
             ObservedMotion::Repeats { periods } => {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
-            ObservedMotion::Drifts { place, periods, speed, joint, open_fraction: 1.0, .. } => write!(
-                f,
-                "drifts: `{place}` moves at {:.3} mm/s over {periods} periods, and `{joint}` is never closed: the \
-                 constant forces do not press it; if they should, exchange the two places of its `between`, or reverse \
-                 the force; else hold the body by a spring",
-                1e3 * speed,
-            ),
-            ObservedMotion::Drifts { place, periods, speed, spring, joint, open_fraction } => write!(
-                f,
-                "drifts: `{place}` moves at {:.3} mm/s over {periods} periods{}; hold it by a weak spring along this \
-                 direction ({spring:.1e} N/m hardly changes the vibration), increase the normal loads, or add damping",
-                1e3 * speed,
-                apart(joint, *open_fraction)
-            ),
+            ObservedMotion::Drifts { place, periods, speed, spring, joint, open_fraction } => {
+                write!(
+                    f,
+                    "drifts: `{place}` moves at {:.3} mm/s over {periods} periods{}; hold it by a weak spring along \
+                     this direction ({spring:.1e} N/m hardly changes the vibration), increase the normal loads, or add \
+                     damping",
+                    1e3 * speed,
+                    apart(joint, *open_fraction)
+                )?;
+                if *open_fraction < 1.0 {
+                    return Ok(());
+                }
+                write!(
+                    f,
+                    "; if a constant force should close `{joint}`, exchange the two places of its `between`, or \
+                     reverse the force"
+                )
+            }
             ObservedMotion::Irregular { periods, joint, open_fraction } => write!(
                 f,
                 "neither repeats nor settles in {periods} periods{}, which does not exclude an orbit; increase the \

@@ -246,6 +246,8 @@ mod tests {
             assert_eq!(spring, 0.01 * OMEGA * OMEGA);
             assert_eq!(open_fraction, if along == "z" { 1.0 } else { 0.0 });
             assert!(course.to_string().contains(&format!("`{along}`")), "{course}");
+            // the force that lifts the block may have been meant to press it
+            assert_eq!(course.to_string().contains("exchange the two places"), along == "z", "{course}");
         }
     }
 

@@ -428,7 +428,7 @@ fn write_decay(
 
 /// Returns the warning for a decay whose swings grow, as those of several modes do.
 fn growing_swings(place: &str, cycles: &[Cycle]) -> Option<String> {
-    // Growth of a swing in one cycle, as a negative damping ratio, above the error of the turning points.
+    // Growth in one cycle, as a negative damping ratio, above the error of the turning points.
     let growth = -1e-3;
     let growing = cycles.iter().filter(|cycle| cycle.damping_ratio < growth).count();
     (growing > 0).then(|| {
