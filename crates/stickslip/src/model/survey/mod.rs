@@ -241,11 +241,7 @@ impl Survey {
     /// Returns the onset of slip of each joint, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
         let rigid = self.joints.iter().any(|joint| matches!(joint.state, StuckState::Rigid { .. }));
-        let excitation = self.system.excitation(0.0);
-        let constant = |row: usize| {
-            let forces = excitation.iter().filter(|(harmonic, _)| *harmonic == 0);
-            forces.map(|(_, force)| force[row].re).sum::<f64>()
-        };
+        let constant = preload::constant_forces(&self.system);
         let one = |(joint, carried): (&StuckAxis, &Option<f64>)| {
             let (limit, displacement) = match joint.state {
                 StuckState::Nothing => (0.0, None),
@@ -259,7 +255,7 @@ impl Survey {
                 gradual: joint.gradual,
                 preload: joint.pressed,
                 equilibrium_force: carried.filter(|_| !rigid),
-                constant_force: joint.at.iter().map(|&(row, weight)| weight * constant(row)).sum(),
+                constant_force: joint.at.iter().map(|&(row, weight)| weight * constant[row]).sum(),
             }
         };
         self.joints.iter().zip(&self.at_rest).map(one).collect()

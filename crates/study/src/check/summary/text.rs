@@ -124,7 +124,7 @@ pub(crate) fn line(name: &str, text: &str) -> String {
 }
 
 /// Returns the joint of a direction.
-fn joint_of_direction(name: &str) -> &str {
+pub(super) fn joint_of_direction(name: &str) -> &str {
     name.split('.').next().unwrap_or(name)
 }
 

@@ -2,6 +2,7 @@
 
 use crate::case::linear_reference::LinearReference;
 use crate::case::study::{Study, evaluate};
+use crate::check::summary::text::joint_of_direction;
 use crate::check::survey::SurveyedCase;
 use crate::compile::compiled::{CompiledTable, Environment};
 use crate::results::notes::WARNING;
@@ -86,7 +87,7 @@ fn open_under_load(one: &SurveyedCase) -> Option<String> {
     let mut open: Vec<String> = slips
         .iter()
         .filter(|slip| slip.preload == Some(0.0) && slip.constant_force < 0.0)
-        .map(|slip| slip.joint.split('.').next().unwrap_or(&slip.joint).to_owned())
+        .map(|slip| joint_of_direction(&slip.joint).to_owned())
         .collect();
     open.dedup();
     if open.is_empty() || one.survey.is_too_large() || one.survey.free().rigid == 0 {
