@@ -23,10 +23,10 @@ use stickslip_study::run::{CONVERGED, Context, check, run};
 use stickslip_study::{Study, read_study};
 
 /// Number of studies of a normal run, and the first seed.
-const STUDIES: usize = 1000;
+const STUDIES: usize = 400;
 const SEED: u64 = 1;
 /// Number of solver steps after which a study ends: Newton steps, switches, time steps.
-const STEPS: u64 = 10_000;
+const STEPS: u64 = 2000;
 /// Number of studies with the most steps that are printed.
 const LONGEST: usize = 8;
 /// Largest memory of a study, bytes.

@@ -164,29 +164,29 @@ fn parameters_reach_every_repeated_entry() {
     assert!((last(1) / last(0) - 2.0).abs() < 1e-15);
 }
 
-/// A ring of twenty thousand blades that move together: no joint is loaded, and each blade is
+/// A ring of four thousand blades that move together: no joint is loaded, and each blade is
 /// an independent oscillator.
 #[test]
-fn twenty_thousand_blades() {
+fn four_thousand_blades() {
     let text = r#"
 schema = 1
 title = "Ring of many blades"
 [[mass]]
-repeat = { i = 20000 }
+repeat = { i = 4000 }
 name = "blade{i}"
 mass = "0.2 kg"
 [[spring]]
-repeat = { i = 20000 }
+repeat = { i = 4000 }
 between = ["blade{i}", "ground"]
 stiffness = "100 N/mm"
 damping = "0.4 N s/m"
 [[joint]]
-repeat = { i = 20000, wrap = true }
+repeat = { i = 4000, wrap = true }
 name = "shroud{i}"
 between = ["blade{i}", "blade{i+1}"]
 law = { kind = "jenkins", stiffness = "2 N/mm", limit = "1 N" }
 [[force]]
-repeat = { i = 20000 }
+repeat = { i = 4000 }
 on = "blade{i}"
 amplitude = "1 N"
 [study]
@@ -200,7 +200,7 @@ harmonics = 1
     let study = read_study("ring.toml", text, &[]).unwrap();
     let checked = stickslip_study::run::check(&study).unwrap();
     let dataset = checked.run(&stickslip_study::run::Context::without_progress(1)).unwrap();
-    for name in ["blade1_amplitude_m", "blade13777_amplitude_m"] {
+    for name in ["blade1_amplitude_m", "blade3777_amplitude_m"] {
         let amplitudes = dataset.tables[0].numbers(name).unwrap();
         for (hertz, amplitude) in [111.0, 112.0].into_iter().zip(amplitudes) {
             let omega: f64 = TAU * hertz;

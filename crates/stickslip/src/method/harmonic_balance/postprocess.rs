@@ -75,9 +75,9 @@ pub(super) fn mean_forces_balance(
     let mut size = left.norm();
     for q in 0..setting.ports.count() {
         let force = motion.force[q * nh].re;
-        let direction = setting.ports.axis(system, q).dense(system.dofs());
-        left -= direction.map(|w| Complex64::new(w * force, 0.0));
-        size += direction.norm() * force.abs();
+        let rows = setting.ports.axis(system, q).rows();
+        rows.iter().for_each(|&(i, weight)| left[i] -= weight * force);
+        size += rows.iter().map(|(_, weight)| weight * weight).sum::<f64>().sqrt() * force.abs();
     }
     // at large displacements the balance is limited by the rounding of the spring forces
     let (mut held, mut rounding) = (vec![0.0; system.dofs()], vec![0.0; system.dofs()]);
