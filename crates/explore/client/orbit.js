@@ -8,7 +8,7 @@ import { mark } from "./response.js";
 import { colour, drawOwn, isDark } from "./plot.js";
 import { changeList, on, state, tell } from "./store.js";
 
-let panel, tools, grid, empty, frequency, caseMenu, status;
+let panel, tools, grid, empty, frequency, caseMenu, peakButton, status;
 /** @type {Record<string, any>} */
 const plots = {};
 /** The orbit on the screen. @type {any} */
@@ -26,10 +26,11 @@ export function start(place) {
     onchange: () => { const value = Number(frequency.value.replace(",", ".")); frequency.setAttribute("aria-invalid", String(!(value > 0))); if (value > 0) { mark(value, state.marker?.case ?? 0, true); } },
     onkeydown: (/** @type {KeyboardEvent} */ event) => step(event),
   });
-  caseMenu = make("select", { id: "orbit-case", onchange: () => mark(state.marker.frequency, Number(caseMenu.value), true) });
+  caseMenu = make("select", { id: "orbit-case", onchange: () => (state.marker.atPeak ? atPeak(Number(caseMenu.value)) : mark(state.marker.frequency, Number(caseMenu.value), true)) });
   status = make("span", { class: "state", role: "status" });
+  peakButton = make("button", { type: "button", text: "At the peak", onclick: () => atPeak(state.marker?.case ?? 0) });
   tools = make("div", { class: "tools" }, make("label", {}, "Frequency", frequency, "Hz"), make("label", { id: "case-label" }, "Case", caseMenu),
-    make("button", { type: "button", text: "At the peak", onclick: () => atPeak() }), status);
+    peakButton, status);
   grid = make("div", { class: "grid" });
   empty = make("p", { class: "empty" });
   panel.append(tools, empty, grid);
@@ -41,9 +42,9 @@ export function start(place) {
   }
   on("opened", () => { orbit = null; wanted = ""; inMotion = false; grid.hidden = true; status.textContent = ""; });
   on("marker", () => { follow(); });
-  on("result", () => { atPeakFirst(); follow(); });
+  on("result", () => { followPeak(); follow(); });
   on("theme", () => show());
-  on("tab", (/** @type {string} */ name) => { visible = name === "orbit" || name === "motion"; inMotion ||= name === "motion"; if (visible) { atPeakFirst(); follow(); show(); } });
+  on("tab", (/** @type {string} */ name) => { visible = name === "orbit" || name === "motion"; inMotion ||= name === "motion"; if (visible) { followPeak(); follow(); show(); } });
 }
 
 /** The orbit that is shown, for the animation. */
@@ -70,9 +71,7 @@ function peakFrequency(index) {
     const same = chosen.every((/** @type {any} */ one, /** @type {number} */ k) => Math.abs(table[k].values[row] - siLike(table[k], one)) <= 1e-9 * Math.abs(table[k].values[row]));
     if (same && frequencies[row] !== null && (best === null || amplitudes[row] > amplitudes[best])) { best = row; }
   }
-  if (best !== null) { return frequencies[best]; }
-  const range = state.description.frequency;
-  return range ? (range.from + range.to) / 2 : null;
+  return best === null ? null : frequencies[best];
 }
 
 /** The number of a case in the unit of its column. @param {any} column @param {any} one */
@@ -84,15 +83,21 @@ function siLike(column, one) {
   return list.sort((a, b) => a - b)[all.indexOf(one.value)] ?? NaN;
 }
 
-function atPeakFirst() {
-  if (state.marker || !canShow()) { return; }
-  const at = peakFrequency(0);
-  if (at !== null) { mark(at, 0, true); }
+/** The marker follows the peak until another frequency is chosen. While a slider moves it stays. */
+function followPeak() {
+  if (!canShow() || (state.marker && (!state.marker.atPeak || state.result?.reduced))) { return; }
+  atPeak(state.marker?.case ?? 0);
 }
 
-function atPeak() {
-  const at = peakFrequency(state.marker?.case ?? 0);
-  if (at !== null) { mark(at, state.marker?.case ?? 0, true); }
+/** Marks the highest peak of a case, or the middle of the range if it has none. @param {number} wanted */
+function atPeak(wanted) {
+  const index = state.result?.cases[wanted] ? wanted : 0;
+  const range = state.description.frequency;
+  const peak = peakFrequency(index);
+  const at = peak ?? (range.from + range.to) / 2;
+  const now = state.marker;
+  if (now?.atPeak && now.case === index && now.frequency === Number(digits(at, 9))) { return; }
+  mark(at, index, true, true);
 }
 
 const canShow = () => state.description?.frequency && !["campbell", "nodal-diameter", "modes", "transient"].includes(state.description.kind);
@@ -108,6 +113,7 @@ async function follow() {
     return;
   }
   frequency.value = digits(state.marker.frequency, 9);
+  peakButton.setAttribute("aria-pressed", String(state.marker.atPeak && peakFrequency(state.marker.case) !== null));
   const cases = state.result?.cases ?? state.description.cases;
   caseMenu.parentElement.hidden = cases.length < 2;
   caseMenu.replaceChildren(...cases.map((/** @type {any} */ one, /** @type {number} */ index) => make("option", { value: index, text: one.label, selected: index === state.marker.case })));

@@ -155,7 +155,7 @@ const legends = new WeakMap();
 
 /**
  * The legend of a figure: buttons that hide and show curves, and the names of pins.
- * @param {any} place @param {any} plot @param {any} target @param {string[]} [pins]
+ * @param {any} place @param {any} plot @param {any} target @param {{name: string, dash: string}[]} [pins]
  */
 export function legend(place, plot, target, pins = []) {
   const off = hidden.get(target) ?? new Set();
@@ -180,7 +180,7 @@ export function legend(place, plot, target, pins = []) {
       },
     }, sample(trace), text(trace.name));
     return button;
-  }), ...pins.map((name) => make("span", { class: "pin", text: `– – ${name}` })));
+  }), ...pins.map(({ name, dash }) => make("span", { class: "pin" }, sample({ mode: "lines", line: { dash } }), name)));
 }
 
 /** The text of a name, in which the server has escaped marks. @param {string} name */

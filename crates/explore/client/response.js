@@ -199,7 +199,7 @@ const show = perFrame(() => {
   const shown = partial ?? state.result;
   if (!shown || place.closest("[hidden]")) { return; }
   const { plot } = shown;
-  legend(legendPlace, plot, place, state.pins.map((/** @type {any} */ pin) => pin.name));
+  legend(legendPlace, plot, place, state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => ({ name: pin.name, dash: dashOf(index) })));
   const behind = pinned();
   if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: PALE }); }
   // the figure fills the window; on a narrow page it leaves room for the parameters
@@ -271,11 +271,20 @@ function panelCase(panel) {
   return Math.max(0, found);
 }
 
-/** Marks a frequency. @param {number} frequency Hz @param {number} index case @param {boolean} last false while the marker moves */
-export function mark(frequency, index, last) {
-  state.marker = { frequency: Number(digits(frequency, 9)), case: index };
+/**
+ * Marks a frequency. @param {number} frequency Hz @param {number} index case
+ * @param {boolean} last false while the marker moves @param {boolean} [atPeak] true if the marker follows the peak
+ */
+export function mark(frequency, index, last, atPeak = false) {
+  state.marker = { frequency: Number(digits(frequency, 9)), case: index, atPeak };
   tell("marker", last);
 }
 
+/** Dashes and gaps that tell pins apart: their colours are those of the places. */
+const DASHES = ["7px,4px", "2px,3px", "9px,3px,2px,3px", "14px,4px", "9px,3px,2px,3px,2px,3px", "14px,3px,5px,3px", "4px,8px", "18px,3px,2px,3px"];
+
+/** The dashes of a pin. @param {number} index */
+const dashOf = (index) => DASHES[index % DASHES.length];
+
 /** The pinned curves, to be drawn behind. @returns {import("./plot.js").Behind[]} */
-export const pinned = () => state.pins.map((/** @type {any} */ pin) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: "dash" }));
+export const pinned = () => state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: dashOf(index) }));

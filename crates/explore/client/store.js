@@ -12,7 +12,7 @@ export const state = {
   original: null,
   /** Changes by path. @type {Map<string, Change>} */
   changes: new Map(),
-  /** Frequency (Hz) and case of the orbit that is shown. */
+  /** Frequency (Hz) and case of the orbit that is shown, and whether it follows the peak. */
   marker: null,
   /** The last result of the study itself. */
   result: null,
@@ -78,9 +78,16 @@ export function restore() {
 
 on("changed", keep);
 
-/** Ends a movement: one step of undo. */
+/** @param {Map<string, Change>} changes */
+const textOf = (changes) => JSON.stringify([...changes]);
+
+/** Ends a movement: one step of undo, if a value changed. */
 export function commit() {
   if (!before) { return; }
+  if (textOf(before) === textOf(state.changes)) {
+    before = null;
+    return;
+  }
   past.push(before);
   past = past.slice(-200);
   future = [];

@@ -57,6 +57,34 @@ fn a_slider_changes_the_curve_and_undo_brings_it_back() {
     browser.wait(&format!("Math.abs({HIGHEST} / {before} - 1) < 1e-9"));
     browser.wait("document.querySelectorAll('.row.changed').length === 0");
     browser.picture("response");
+    // Enter reports a typed value, and leaving the field reports it again: one step of undo
+    browser.evaluate(&type_value("q-parameters-Ft", "6"));
+    browser.evaluate("document.getElementById('q-parameters-Ft').dispatchEvent(new Event('change')); true");
+    browser.wait("document.querySelectorAll('.row.changed').length > 0");
+    browser.evaluate("document.getElementById('undo').click()");
+    browser.wait("document.querySelectorAll('.row.changed').length === 0");
+    browser.check_clean();
+}
+
+/// The orbit follows the peak until another frequency is chosen. The peaks are those of the
+/// couple at 6 N and at 8 N.
+#[test]
+fn the_orbit_follows_the_peak() {
+    let Some((_server, mut browser)) = open(couple()) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('tab-orbit').click()");
+    let near = |hertz: f64| format!("Math.abs(document.getElementById('orbit-frequency').value - {hertz}) < 0.002");
+    let pressed = "[...document.querySelectorAll('button')].find((b) => b.textContent === 'At the peak').getAttribute('aria-pressed')";
+    for (limit, hertz) in [("6", 121.231), ("8", 120.842)] {
+        browser.evaluate(&type_value("q-parameters-Ft", limit));
+        browser.wait(&near(hertz));
+        assert_eq!(browser.text(pressed), "true");
+    }
+    browser.evaluate(&type_value("orbit-frequency", "121"));
+    browser.evaluate(&type_value("q-parameters-Ft", "6"));
+    browser.wait("document.getElementById('orbit-words').textContent.length > 0");
+    assert_eq!(browser.text(pressed), "false");
+    assert_eq!(browser.text("document.getElementById('orbit-frequency').value"), "121");
     browser.check_clean();
 }
 
@@ -129,6 +157,11 @@ fn a_pin_survives_other_panels() {
     browser.wait("document.querySelector('#response-plot').layout.xaxis2 === undefined");
     let dashed = "document.querySelector('#response-plot').data.filter((t) => t.owner === 'as in the file')";
     assert_eq!(browser.number(&format!("{dashed}.length")), 12.0, "three places in four cases");
+    browser.evaluate("document.getElementById('pin').click()");
+    browser.wait("document.querySelectorAll('.legend .pin').length === 2");
+    let dashes = "new Set([...document.querySelectorAll('.legend .pin path')].map((path) => path.getAttribute('stroke-dasharray'))).size";
+    assert_eq!(browser.number(dashes), 2.0, "pins have different dashes");
+    browser.picture("pins");
     // the pinned peak of 2 N is inside the axis
     let inside = format!(
         "document.querySelector('#response-plot')._fullLayout.yaxis.range[1] > Math.max(...{dashed}.flatMap((t) => t.y))"

@@ -617,7 +617,8 @@ fn a_contact_in_the_wrong_direction() {
          [[force]]\non = \"block.z\"\namplitude = \"10 N\"\nharmonic = 0\n[[force]]\non = \"block.x\"\namplitude = \"6 N\"\nharmonic = 0\n\
          [[force]]\non = \"block.x\"\namplitude = \"1 N\"\n[study]\nkind = \"orbit\"\nfrequency = \"20 Hz\"\n";
     let warnings = summary(sliding).warnings.join("\n");
-    assert!(!warnings.contains("exchange"), "{warnings}");
+    assert!(!warnings.contains("exchange") && !warnings.contains("preload"), "{warnings}");
+    assert!(warnings.contains("push along them with more than friction can carry"), "{warnings}");
 }
 
 /// A wedge without a load lies loose between its faces: one warning for all wedges says what is

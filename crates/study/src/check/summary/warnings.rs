@@ -65,13 +65,19 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
         let bodies: Vec<String> = unpressed.iter().flat_map(|one| one.masses.clone()).collect();
         let mut joints: Vec<String> = unpressed.iter().flat_map(|one| one.faces.clone()).collect();
         joints.dedup();
+        let pressed = |slip: &FirstSlip| {
+            slip.constant_force > 0.0 && joints.iter().any(|joint| joint == joint_of_direction(&slip.joint))
+        };
+        let reason = match survey.first_slip().iter().any(pressed) {
+            true => "the constant forces press them, but push along them with more than friction can carry; press them more",
+            false => "they have no preload; add a preload",
+        };
         format!(
-            "{} can move freely in static equilibrium: only the faces of {} touch {}, and they have no preload; add \
-             a preload, or hold {} by a spring",
+            "{} can move freely in static equilibrium: only the faces of {} touch {them}, and {reason}, or hold {them} by \
+             a spring",
             list_names(&bodies),
             list_names(&joints),
-            pronoun(bodies.len()),
-            pronoun(bodies.len())
+            them = pronoun(bodies.len()),
         )
     });
     let open = open_under_load(&cases[0]).or(open);
