@@ -89,15 +89,11 @@ function followPeak() {
   atPeak(state.marker?.case ?? 0);
 }
 
-/** Marks the highest peak of a case, or the middle of the range if it has none. @param {number} wanted */
-function atPeak(wanted) {
-  const index = state.result?.cases[wanted] ? wanted : 0;
+/** Marks the highest peak of a case, or the middle of the range if it has none. @param {number} chosen */
+function atPeak(chosen) {
+  const index = state.result?.cases[chosen] ? chosen : 0;
   const range = state.description.frequency;
-  const peak = peakFrequency(index);
-  const at = peak ?? (range.from + range.to) / 2;
-  const now = state.marker;
-  if (now?.atPeak && now.case === index && now.frequency === Number(digits(at, 9))) { return; }
-  mark(at, index, true, true);
+  mark(peakFrequency(index) ?? (range.from + range.to) / 2, index, true, true);
 }
 
 const canShow = () => state.description?.frequency && !["campbell", "nodal-diameter", "modes", "transient"].includes(state.description.kind);

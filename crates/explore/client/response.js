@@ -199,8 +199,8 @@ const show = perFrame(() => {
   const shown = partial ?? state.result;
   if (!shown || place.closest("[hidden]")) { return; }
   const { plot } = shown;
-  legend(legendPlace, plot, place, state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => ({ name: pin.name, dash: dashOf(index) })));
   const behind = pinned();
+  legend(legendPlace, plot, place, behind.map(({ name = "", dash = "" }) => ({ name, dash })));
   if (previous && previous !== shown) { behind.push({ plot: previous.plot, opacity: PALE }); }
   // the figure fills the window; on a narrow page it leaves room for the parameters
   const below = byId("trust").offsetHeight + hint.offsetHeight + 56;
@@ -280,11 +280,8 @@ export function mark(frequency, index, last, atPeak = false) {
   tell("marker", last);
 }
 
-/** Dashes and gaps that tell pins apart: their colours are those of the places. */
+/** Dashes and gaps of the eight pins, whose colours are those of the places. */
 const DASHES = ["7px,4px", "2px,3px", "9px,3px,2px,3px", "14px,4px", "9px,3px,2px,3px,2px,3px", "14px,3px,5px,3px", "4px,8px", "18px,3px,2px,3px"];
 
-/** The dashes of a pin. @param {number} index */
-const dashOf = (index) => DASHES[index % DASHES.length];
-
 /** The pinned curves, to be drawn behind. @returns {import("./plot.js").Behind[]} */
-export const pinned = () => state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: dashOf(index) }));
+export const pinned = () => state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => ({ plot: pin.result.plot, opacity: 0.9, name: pin.name, dash: DASHES[index] }));

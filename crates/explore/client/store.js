@@ -84,13 +84,11 @@ const textOf = (changes) => JSON.stringify([...changes]);
 /** Ends a movement: one step of undo, if a value changed. */
 export function commit() {
   if (!before) { return; }
-  if (textOf(before) === textOf(state.changes)) {
-    before = null;
-    return;
+  if (textOf(before) !== textOf(state.changes)) {
+    past.push(before);
+    past = past.slice(-200);
+    future = [];
   }
-  past.push(before);
-  past = past.slice(-200);
-  future = [];
   before = null;
   tell("changed");
 }

@@ -82,7 +82,8 @@ fn the_orbit_follows_the_peak() {
     }
     browser.evaluate(&type_value("orbit-frequency", "121"));
     browser.evaluate(&type_value("q-parameters-Ft", "6"));
-    browser.wait("document.getElementById('orbit-words').textContent.length > 0");
+    // the loop of Coulomb's law has the limits ± Ft: the orbit is that of 6 N
+    browser.wait("Math.abs(Math.max(...document.querySelector('#orbit-loops').data[0].y) - 6) < 1e-9");
     assert_eq!(browser.text(pressed), "false");
     assert_eq!(browser.text("document.getElementById('orbit-frequency').value"), "121");
     browser.check_clean();

@@ -103,8 +103,8 @@ fn checked_studies_are_not_refused() {
         for (kind, keys) in STUDIES {
             for mass in ["1", "0"] {
                 if mass == "0" && row.name.starts_with("stribeck") && ["response", "hysteresis"].contains(kind) {
-                    // Without mass, the velocity jumps where friction falls with it, and all
-                    // algorithms are tried in vain for half a minute. `orbit` tests the refusals.
+                    // These two kinds need half a minute to find that the motion of a massless
+                    // body jumps. The refusals are those of kind `orbit`, which is tested.
                     continue;
                 }
                 let text = format!("{}[study]\nkind = \"{kind}\"\n{keys}\n", model(row, mass));
