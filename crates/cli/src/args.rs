@@ -79,7 +79,7 @@ pub enum Command {
         #[arg(required = true, value_name = "DIR")]
         folders: Vec<PathBuf>,
         /// Folder of the results; the study gets a subfolder with its name
-        #[arg(long, default_value = "stickslip-out")]
+        #[arg(short, long, default_value = "stickslip-out")]
         out: PathBuf,
         /// Write only these outputs: csv, parquet, json, fitted, svg, png, html (comma-separated)
         #[arg(long, value_delimiter = ',')]
@@ -120,7 +120,7 @@ pub enum Command {
         #[arg(long, value_name = "FILE")]
         study: Option<PathBuf>,
         /// Folder that gets the folder of the comparison [default: stickslip-out]
-        #[arg(long, requires = "overlay")]
+        #[arg(short, long, requires = "overlay")]
         out: Option<PathBuf>,
         /// Write only these outputs: svg, png, html; with --overlay also csv and json
         /// (comma-separated)
@@ -146,7 +146,7 @@ pub enum Command {
         /// Study file (TOML) with a [structure]
         file: PathBuf,
         /// Folder for the matrices and for the TOML tables that refer to them
-        #[arg(long)]
+        #[arg(short, long)]
         out: PathBuf,
         /// Set a parameter, for example --set zeta=1% (repeatable)
         #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
@@ -197,7 +197,7 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct Destination {
     /// Folder of the results; each study gets a subfolder with its name
-    #[arg(long, default_value = "stickslip-out")]
+    #[arg(short, long, default_value = "stickslip-out")]
     pub out: PathBuf,
     /// Number of threads; default: all cores. The results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]

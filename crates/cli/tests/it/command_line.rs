@@ -150,7 +150,7 @@ fn the_bits_do_not_depend_on_threads() {
     let tables: Vec<Vec<Vec<u8>>> = ["1", "2", "3"]
         .iter()
         .map(|threads| {
-            let output = stickslip(folder.path(), &["run", "study.toml", "--threads", threads, "--out", threads]);
+            let output = stickslip(folder.path(), &["run", "study.toml", "--threads", threads, "-o", threads]);
             assert_eq!(code(&output), 0, "{}", stderr(&output));
             ["curve.csv", "peaks.csv", "figure.svg"]
                 .iter()

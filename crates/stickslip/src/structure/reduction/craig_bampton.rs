@@ -66,9 +66,11 @@ impl FullStructure {
             };
             interior.iter().zip(from).for_each(|(&i, x)| column[i] = *x);
         }
+        let count = modes.count();
+        let word = if count == 1 { "mode" } else { "modes" };
         ReducedMatrices::project(
             self,
-            format!("Craig-Bampton: {} fixed-interface modes, {outer} interface degrees of freedom", modes.count()),
+            format!("Craig-Bampton: {count} fixed-interface {word}, {outer} interface degrees of freedom"),
             basis,
         )
     }
