@@ -196,7 +196,7 @@ function axisFields(id, index) {
   const menu = make("select", { id: `${id}-name`, "aria-label": "Parameter", onchange: () => fill() });
   const [from, to, points] = [field("from", "First value", 9), field("to", "Last value", 9), field("points", "Number of values", 3)];
   const logarithmic = make("input", { type: "checkbox", id: `${id}-log`, checked: true });
-  const box = make("span", { class: "tools" }, menu, make("label", {}, "from", from), make("label", {}, "to", to), make("label", {}, "values", points), make("label", {}, logarithmic, "log"));
+  const box = make("span", { class: "tools" }, menu, make("label", {}, "from", from), make("label", {}, "to", to), make("label", {}, "values", points), make("label", {}, logarithmic, "log spacing"));
   function fill() {
     const quantity = plainOf(menu.value);
     if (!quantity) { return; }

@@ -116,11 +116,12 @@ function drawFlat(orbit, model) {
   }
   pen.textAlign = "center";
   pen.font = `${Math.max(11, Math.min(14, unit * 0.24))}px system-ui, sans-serif`;
-  scene.masses.forEach((mass, index) => {
+  scene.masses.forEach((mass) => {
     const place = /** @type {any} */ (places.get(mass.name));
     const [x, y] = to(place.x, place.y);
     const r = 0.45 * mass.radius * unit;
-    pen.fillStyle = scene.wheel ? colour(0) : colour(index);
+    // colours are those of stick and slip, at the joints alone
+    pen.fillStyle = grey;
     pen.beginPath();
     if (pen.roundRect) { pen.roundRect(x - r, y - r, 2 * r, 2 * r, 0.3 * r); } else { pen.rect(x - r, y - r, 2 * r, 2 * r); }
     pen.fill();

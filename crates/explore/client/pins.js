@@ -8,6 +8,7 @@ import { keyOf, on, state, tell } from "./store.js";
 const MOST = 24;
 
 let panel;
+let visible = false;
 
 /** @param {any} place */
 export function start(place) {
@@ -15,16 +16,32 @@ export function start(place) {
   on("pin", pin);
   on("opened", show);
   on("pins", show);
+  on("result", () => { if (visible) { show(); } });
+  on("tab", (/** @type {string} */ name) => { visible = name === "compare"; if (visible) { show(); } });
+}
+
+/** The key of changes, whatever their order. @param {any[]} changes */
+const changesKey = (changes) => JSON.stringify(changes.map((change) => [keyOf(change.path), change.value]).sort());
+
+/** The pins, and the present curve if it is none of them. @returns {any[]} */
+function compared() {
+  const { result, changes, pins } = state;
+  const all = pins.map((/** @type {any} */ pin, /** @type {number} */ index) => ({ ...pin, index }));
+  const now = [...changes.values()];
+  if (!result || result.reduced || pins.some((/** @type {any} */ pin) => changesKey(pin.changes) === changesKey(now))) { return all; }
+  return [...all, { name: `${nameOf(now)} (not pinned)`, result, index: null }];
 }
 
 function pin() {
   if (!state.result || state.result.reduced) { return; }
   const changes = [...state.changes.values()];
-  const name = changes.map(words).filter((text) => text !== "").join(", ") || "as in the file";
-  state.pins.push({ name: unique(name), changes, result: state.result });
+  state.pins.push({ name: unique(nameOf(changes)), changes, result: state.result });
   state.pins = state.pins.slice(-8);
   tell("pins");
 }
+
+/** @param {any[]} changes */
+const nameOf = (changes) => changes.map(words).filter((text) => text !== "").join(", ") || "as in the file";
 
 /** @param {any} change */
 function words(change) {
@@ -59,20 +76,26 @@ function show() {
     panel.append(make("p", { class: "empty", text: "Nothing is pinned. Move sliders, then press “Pin this curve” beside the response: the curve stays in the plot, dashed, and its peaks are compared here." }));
     return;
   }
-  panel.append(summary(), make("h2", { text: "Peaks of every place and case" }), make("div", { class: "scroll" }, make("table", {},
-    make("thead", {}, make("tr", {}, ...["Pin", "Case", "Place", "Peak at (Hz)", "Peak", "Action"].map((text, i) => make("th", { text, scope: "col", class: i === 3 || i === 4 ? "number" : null })))),
-    make("tbody", {}, ...state.pins.flatMap((/** @type {any} */ one, /** @type {number} */ index) => rows(one, index))))));
+  const all = compared();
+  const isCase = all.some((one) => peaks(one.result).some((/** @type {any} */ peak) => peak.case));
+  panel.append(summary(all, isCase), make("h2", { text: "Peaks of every place and case" }), make("div", { class: "scroll" }, make("table", {},
+    make("thead", {}, header(["Pin", isCase && "Case", "Place", "Peak at (Hz)", "Peak", "Action"], ["Peak at (Hz)", "Peak"])),
+    make("tbody", {}, ...all.flatMap((one) => rows(one, isCase))))));
 }
 
-/** The highest peak of every pin, and how it compares with the first pin. */
-function summary() {
-  const best = state.pins.map((/** @type {any} */ pin) => peaks(pin.result).reduce((/** @type {any} */ so, /** @type {any} */ peak) => (so && so.amplitude >= peak.amplitude ? so : peak), null));
+/** @param {(string | false)[]} titles @param {string[]} numbers titles of columns of numbers */
+const header = (titles, numbers) => make("tr", {}, ...titles.filter((text) => text).map((text) => make("th", { text, scope: "col", class: numbers.includes(String(text)) ? "number" : null })));
+
+/** The highest peak of every curve, and how it compares with the first pin. @param {any[]} all @param {boolean} isCase */
+function summary(all, isCase) {
+  const best = all.map((one) => peaks(one.result).reduce((/** @type {any} */ so, /** @type {any} */ peak) => (so && so.amplitude >= peak.amplitude ? so : peak), null));
   const change = (/** @type {any} */ one) => (one && best[0] && one !== best[0] ? `${one.amplitude > best[0].amplitude ? "+" : "−"}${digits(Math.abs(100 * (one.amplitude / best[0].amplitude - 1)), 3)} %` : "");
+  const numbers = ["Highest peak", "Against the first pin", "At (Hz)"];
   return make("div", { class: "scroll" }, make("table", { id: "pin-summary" }, make("caption", { text: "Highest peak of each pin" }),
-    make("thead", {}, make("tr", {}, ...["Pin", "Highest peak", "Against the first pin", "At (Hz)", "Place", "Case"].map((text, i) => make("th", { text, scope: "col", class: i >= 1 && i <= 3 ? "number" : null })))),
-    make("tbody", {}, ...state.pins.map((/** @type {any} */ pin, /** @type {number} */ index) => make("tr", {}, make("th", { scope: "row", text: pin.name }),
-      make("td", { class: "number", text: best[index] ? si(best[index].amplitude, "m", 4) : "–" }), make("td", { class: "number", text: change(best[index]) }),
-      make("td", { class: "number", text: best[index]?.frequency ? digits(best[index].frequency, 6) : "" }), make("td", { text: best[index]?.mass ?? "" }), make("td", { text: best[index]?.case ?? "" }))))));
+    make("thead", {}, header(["Pin", ...numbers, "Place", isCase && "Case"], numbers)),
+    make("tbody", {}, ...all.map((one, row) => make("tr", {}, make("th", { scope: "row", text: one.name }),
+      make("td", { class: "number", text: best[row] ? si(best[row].amplitude, "m", 4) : "–" }), make("td", { class: "number", text: change(best[row]) }),
+      make("td", { class: "number", text: best[row]?.frequency ? digits(best[row].frequency, 6) : "" }), make("td", { text: best[row]?.mass ?? "" }), isCase ? make("td", { text: best[row]?.case ?? "" }) : null)))));
 }
 
 /** The highest peak of every place in every case. @param {any[]} list */
@@ -85,13 +108,18 @@ function highest(list) {
   return [...best.values()];
 }
 
-/** @param {any} pin @param {number} index */
-function rows(pin, index) {
-  const list = highest(peaks(pin.result));
+/** The rows of a pin, or of the present curve. @param {any} one @param {boolean} isCase */
+function rows(one, isCase) {
+  const list = highest(peaks(one.result));
   const shown = list.length > 0 ? list : [{ case: "", mass: "", frequency: null, amplitude: null }];
+  const pin = one.index === null ? null : state.pins[one.index];
+  const id = `pin-${one.index}`;
+  const name = pin ? make("input", { type: "text", id, "aria-label": "Name of the pin", value: pin.name, size: "22", onchange: () => { pin.name = byId(id).value; tell("pins"); } }) : one.name;
+  const action = pin
+    ? make("button", { type: "button", class: "link", text: "remove", "aria-label": `Remove ${pin.name}`, onclick: () => { state.pins.splice(one.index, 1); tell("pins"); } })
+    : make("button", { type: "button", class: "link", text: "pin", "aria-label": "Pin the present curve", onclick: () => tell("pin") });
   return shown.slice(0, MOST).map((/** @type {any} */ peak, /** @type {number} */ row) => make("tr", {},
-    make("td", {}, row === 0 ? make("input", { type: "text", id: `pin-${index}`, "aria-label": "Name of the pin", value: pin.name, size: "22", onchange: () => { pin.name = byId(`pin-${index}`).value; tell("pins"); } }) : ""),
-    make("td", { text: peak.case }), make("td", { text: peak.mass }), make("td", { class: "number", text: peak.frequency === null ? "" : digits(peak.frequency, 6) }),
-    make("td", { class: "number", text: peak.amplitude === null ? "" : si(peak.amplitude, "m", 4) }),
-    make("td", {}, row === 0 ? make("button", { type: "button", class: "link", text: "remove", "aria-label": `Remove ${pin.name}`, onclick: () => { state.pins.splice(index, 1); tell("pins"); } }) : "")));
+    make("td", {}, row === 0 ? name : ""), isCase ? make("td", { text: peak.case }) : null,
+    make("td", { text: peak.mass }), make("td", { class: "number", text: peak.frequency === null ? "" : digits(peak.frequency, 6) }),
+    make("td", { class: "number", text: peak.amplitude === null ? "" : si(peak.amplitude, "m", 4) }), make("td", {}, row === 0 ? action : "")));
 }

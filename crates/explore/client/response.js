@@ -172,7 +172,7 @@ function take(event, { moving, reduced }, seconds) {
   if (state.result && !state.result.moving) { previous = state.result; }
   state.result = { ...event, reduced, moving };
   hint.hidden = !hasOrbits();
-  status.textContent = reduced ? "fewer points while moving" : duration(seconds);
+  status.textContent = reduced ? "fewer points while moving" : "";
   fitted.replaceChildren(...(event.fitted ? [fit.table(event)] : []));
   show();
   tell("result", state.result);
