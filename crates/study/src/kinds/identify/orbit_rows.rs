@@ -109,11 +109,13 @@ impl OrbitRows {
                     let seed = own.or(before.as_ref());
                     let request = Request::at(row.omega).without_estimate();
                     let found = solver.solve(&request.near(seed), &mut Budget::default());
+                    // an orbit of other parameters may be no good initial guess; only a search with an
+                    // error estimate takes the second method of `auto`
                     let found = match (found, seed) {
-                        // an orbit of other parameters may be no good initial guess
                         (Err(_), Some(_)) => solver.solve(&request, &mut Budget::default()),
                         (found, _) => found,
                     };
+                    let found = found.or_else(|_| solver.solve(&Request::at(row.omega), &mut Budget::default()));
                     let orbit = found.map_err(|error| format!("no orbit at {:.6} Hz: {error}", hertz(row.omega)))?;
                     let force = excited.map_or(1.0, |force| model.force_amplitude(force, row.omega));
                     let force = row.force.unwrap_or(force);

@@ -320,8 +320,12 @@ impl Statistics {
     }
 
     /// Returns why the minimum was not reached, if it was not.
-    pub fn failure(&self) -> Option<String> {
+    pub fn failure(&self, problem: &FitProblem) -> Option<String> {
         let reached = self.rms <= EXACT || self.distance <= LARGEST_STEP;
+        if !reached && self.distance.is_nan() {
+            let reason = problem.failure().unwrap_or_else(|| "a derivative is not a number".to_owned());
+            return Some(format!("the model has no derivatives where the search ended: {reason}"));
+        }
         (!reached).then(|| {
             format!(
                 "the search ended {:.1} standard errors before the minimum: use more `starts`, or narrower ranges",
