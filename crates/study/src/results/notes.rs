@@ -306,8 +306,8 @@ impl Note {
                 })
             }
             Note::HistorySpread(count, largest) => Some(format!(
-                "At {} the amplitudes depend on the history of a stuck joint: they change by up to {} % if the joint \
-                 begins without the friction force of static equilibrium, or with the opposite one.",
+                "{WARNING}at {} the amplitudes depend on the history of a stuck joint: they change by up to {} % if the \
+                 joint begins without the friction force of static equilibrium, or with the opposite one.",
                 points(*count),
                 format_significant(100.0 * largest, 2)
             )),

@@ -581,6 +581,13 @@ fn stuck_contacts_count_as_closed() {
     assert!(found.stuck.elastic[0].omega > found.free.elastic[0].omega, "{found}");
 }
 
+/// Pressed faces without friction slide freely along the face.
+#[test]
+fn faces_without_friction_are_free() {
+    let found = summary(&pressed("40 N", "0 N").replace("friction = 0.3", "friction = 0"));
+    assert!(found.to_string().contains("face.t         free: no force in static equilibrium"), "{found}");
+}
+
 /// A light body that only a joint holds has its mode far above the resonance of the blade, whose
 /// frequency it hardly changes: steps that are too wide for this resonance are reported.
 #[test]

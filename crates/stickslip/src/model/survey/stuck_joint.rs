@@ -115,6 +115,8 @@ impl StuckState {
         let (limit, stiffness) = (law.force_scale(), small_stiffness(law, axis));
         match (limit > 0.0, stiffness > 0.0) {
             (false, _) => StuckState::Nothing,
+            // faces without friction slide freely
+            _ if limit.is_infinite() && law.normal().is_some() => StuckState::Nothing,
             // a law of displacement alone acts as its spring and never slips
             (true, false) if limit.is_infinite() => StuckState::Nothing,
             (true, true) => StuckState::Spring { stiffness, limit, displacement: limit / stiffness },
