@@ -7,11 +7,14 @@
 //! and preloads grow from zero in one ramp, and joints slip where their limits require it. The
 //! vibration then begins from there. A slider that the vibration does not move stays where the
 //! ramp left it; another slider moves only as far as necessary.
+//!
+//! The force of rigid friction depends on velocities alone. During the ramp, a stiff spring with its
+//! slip limit takes its place.
 
 use super::flow::average_acceleration::law_step;
 use super::harmonic_balance;
-use crate::law::{IdealElement, Jenkins, Law, MAX_DIRECTIONS, RelativeMotion, SharedLaw};
-use crate::model::{Axis, System};
+use crate::law::{IdealElement, Jenkins, Jenkins2d, Law, MAX_DIRECTIONS, RelativeMotion, SharedLaw};
+use crate::model::{Axis, System, SystemJoint};
 use crate::orbit::Orbit;
 use num_complex::Complex64;
 use std::sync::Arc;
@@ -47,8 +50,8 @@ pub struct StaticEquilibrium {
     /// An orbit without motion.
     orbit: Orbit,
     dofs: usize,
-    /// Number of the last joints of `orbit`, which hold places and have one internal state each.
-    held: usize,
+    /// Internal states of all joints, in the order of the joints.
+    states: Vec<f64>,
 }
 
 impl StaticEquilibrium {
@@ -86,31 +89,36 @@ impl StaticEquilibrium {
     /// assert!((held.displacement()[1] - 3e-3).abs() < 1e-12);
     /// ```
     pub fn holding(system: &System, held: &[(Axis, f64)]) -> Option<Self> {
-        let made = |orbit: Orbit| StaticEquilibrium { orbit, dofs: system.dofs(), held: held.len() };
+        let given = system;
+        let system = &given.with_laws(|joint| rigid_friction_spring(given, joint));
+        let made = |orbit: Orbit| StaticEquilibrium {
+            states: states_of(given, &orbit.initial_state[2 * given.dofs()..]),
+            dofs: given.dofs(),
+            orbit,
+        };
         if held.is_empty() {
             return harmonic_balance::static_equilibrium_of(system).map(made);
         }
         let largest = held.iter().fold(0.0f64, |largest, (_, value)| largest.max(value.abs()));
-        let [mass, _, stiffness] = system.structure().largest();
+        let axis_stiffnesses: Vec<f64> = held.iter().map(|(axis, _)| stiffness_along(system, axis)).collect();
         let mut targets: Vec<f64> = held.iter().map(|(_, value)| *value).collect();
-        // each pass leaves the share `k/(k + spring)` of the distances, with the stiffness k of
-        // a place
-        let mut spring = 100.0 * if stiffness > 0.0 { stiffness } else { mass };
+        // stiffness of the springs relative to that of the structure; each pass leaves less than its
+        // inverse of the distances
+        let mut factor = 100.0;
         let mut left = f64::INFINITY;
         for _ in 0..20 {
-            let springs = held.iter().zip(&targets).map(|((axis, _), target)| {
-                let weight: f64 = axis.rows().iter().map(|(_, weight)| weight * weight).sum();
-                let stiffness = spring / weight;
-                // the spring never slips
-                let limit = 1e6 * stiffness * (largest + target.abs()).max(f64::MIN_POSITIVE);
-                let imposed = axis.clone().with_imposed_motion([(0, Complex64::from(-target))]);
-                (Arc::new(Jenkins { stiffness, limit }) as SharedLaw, imposed)
+            let springs = held.iter().zip(&targets).zip(&axis_stiffnesses).map(|(((axis, _), target), along)| {
+                let stiffness = factor * along;
+                (axis, stiffness, stiffness * target)
             });
-            let mut orbit = harmonic_balance::static_equilibrium_of(&system.with_joints(springs))?;
+            let pulled = system.with_springs(&springs.collect::<Vec<_>>())?;
+            let mut orbit = harmonic_balance::static_equilibrium_of(&pulled)?;
             let displacement = &orbit.initial_state[..system.dofs()];
             let distances: Vec<f64> = held.iter().map(|(axis, value)| value - axis.component(displacement)).collect();
             let farthest = distances.iter().fold(0.0f64, |farthest, distance| farthest.max(distance.abs()));
-            if farthest <= 1e-12 * largest {
+            // the distance no longer shrinks: it is rounding, or the spring is too soft
+            let stalls = farthest > 0.1 * left;
+            if farthest <= if stalls { 1e-9 } else { 1e-12 } * largest {
                 for (axis, value) in held {
                     if let [(row, 1.0)] = *axis.rows() {
                         orbit.initial_state[row] = *value;
@@ -118,8 +126,8 @@ impl StaticEquilibrium {
                 }
                 return Some(made(orbit));
             }
-            if farthest > 0.1 * left {
-                spring *= 100.0;
+            if stalls {
+                factor *= 100.0;
             }
             left = farthest;
             targets.iter_mut().zip(&distances).for_each(|(target, distance)| *target += distance);
@@ -142,14 +150,76 @@ impl StaticEquilibrium {
 
     /// Returns the forces of each joint along its directions, N.
     pub fn forces(&self) -> Vec<[f64; MAX_DIRECTIONS]> {
-        let joints = self.orbit.sample(0.0).joints;
-        joints[..joints.len() - self.held].iter().map(|joint| joint.force).collect()
+        self.orbit.sample(0.0).joints.iter().map(|joint| joint.force).collect()
     }
 
     /// Returns the internal states of all joints, in the order of the joints.
     pub fn joint_states(&self) -> &[f64] {
-        let state = &self.orbit.initial_state;
-        &state[2 * self.dofs..state.len() - self.held]
+        &self.states
+    }
+}
+
+/// Returns the states of the joints of a system from those of the joints whose rigid friction was
+/// replaced by springs, and which have no states themselves.
+fn states_of(system: &System, of_all: &[f64]) -> Vec<f64> {
+    let mut left = of_all;
+    let mut states = Vec::with_capacity(of_all.len());
+    for joint in system.joints() {
+        let spring = rigid_friction_spring(system, joint);
+        let count = law_step::states(spring.as_ref().unwrap_or(joint.law())).map_or(0, |(own, _)| own);
+        let (own, rest) = left.split_at(count.min(left.len()));
+        if spring.is_none() {
+            states.extend(own);
+        }
+        left = rest;
+    }
+    states
+}
+
+/// Returns a stiffness of the structure along an axis, N/m, from the diagonal of its matrix: exact
+/// for modal coordinates without rigid-body motions, otherwise not less than that of the structure.
+fn stiffness_along(system: &System, axis: &Axis) -> f64 {
+    let structure = system.structure();
+    let compliance: f64 = axis
+        .rows()
+        .iter()
+        .map(|(row, weight)| (weight * weight, structure.diagonal_stiffness(*row)))
+        .filter(|(_, stiffness)| *stiffness > 0.0)
+        .map(|(square, stiffness)| square / stiffness)
+        .sum();
+    let [mass, _, stiffness] = structure.largest();
+    match compliance {
+        _ if compliance > 0.0 => 1.0 / compliance,
+        _ if stiffness > 0.0 => stiffness,
+        _ => mass,
+    }
+}
+
+/// Returns the spring with a slip limit that acts in place of rigid friction during a slow ramp;
+/// `None` for other laws. The friction of a law that drops at the onset of slip is its lower limit.
+fn rigid_friction_spring(system: &System, joint: &SystemJoint) -> Option<SharedLaw> {
+    /// A stuck joint moves by less than a millionth of its motion without friction.
+    const RIGID: f64 = 1e6;
+    let law = joint.law();
+    let limit = match (law.ideal_elements(), law.sliding()) {
+        (Some(elements), _) => {
+            let rigid = elements.iter().filter_map(|element| match element {
+                IdealElement::Slider(slider) if slider.stiffness.is_none() => Some(slider.limit),
+                _ => None,
+            });
+            rigid.sum()
+        }
+        (None, Some(sliding)) => sliding.slip_force(0.0).0,
+        (None, None) if law.prox().is_some() && law.rate().is_none() => law.force_scale(),
+        (None, None) => 0.0,
+    };
+    let stiffest = joint.axes().iter().map(|axis| stiffness_along(system, axis)).fold(0.0, f64::max);
+    let stiffness = RIGID * stiffest;
+    match joint.axes() {
+        _ if limit.is_nan() || limit <= 0.0 || limit.is_infinite() => None,
+        [_] => Some(Arc::new(Jenkins { stiffness, limit })),
+        [_, _] => Some(Arc::new(Jenkins2d { stiffness, limit })),
+        _ => None,
     }
 }
 

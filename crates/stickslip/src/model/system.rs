@@ -494,8 +494,12 @@ impl System {
     /// # Errors
     /// See [`SystemBuilder::build`].
     pub fn with_structure(&self, structure: Structure) -> Result<System, SystemError> {
+        self.builder_on(structure).build()
+    }
+
+    fn builder_on(&self, structure: Structure) -> SystemBuilder {
         let loads = self.loads.iter().map(|load| (load.harmonic, load.clone()));
-        let builder = SystemBuilder {
+        SystemBuilder {
             places: Some((self.places.clone(), self.place_axes.clone())),
             reduced: self.reduced.clone(),
             earlier: self.earlier,
@@ -503,15 +507,28 @@ impl System {
             loads: loads.collect(),
             moved: self.moved.clone(),
             ..System::builder(structure)
-        };
-        builder.build()
+        }
     }
 
-    /// Returns the same system with further joints in one direction, after its own.
-    pub(crate) fn with_joints(&self, joints: impl IntoIterator<Item = (SharedLaw, Axis)>) -> System {
-        let mut system = System { cyclic: None, ..self.clone() };
-        let further = joints.into_iter().map(|(law, axis)| SystemJoint { name: String::new(), law, axes: vec![axis] });
-        system.joints.extend(further);
+    /// Returns the same system with further springs to ground along axes: stiffness (N/m), and a
+    /// constant force along the same axis (N). Returns `None` if an entry is then not finite.
+    pub(crate) fn with_springs(&self, springs: &[(&Axis, f64, f64)]) -> Option<System> {
+        let added: Vec<_> = springs.iter().map(|(axis, stiffness, _)| (axis.rows().to_vec(), *stiffness)).collect();
+        let mut builder = self.builder_on(self.structure.with_springs(&added)?);
+        for (axis, _, force) in springs {
+            for (row, weight) in axis.rows() {
+                builder = builder.force(*row, 0, Complex64::from(weight * force));
+            }
+        }
+        builder.build().ok()
+    }
+
+    /// Returns the same system with other laws in the joints for which `law` returns one.
+    pub(crate) fn with_laws(&self, law: impl Fn(&SystemJoint) -> Option<SharedLaw>) -> System {
+        let mut system = self.clone();
+        for joint in &mut system.joints {
+            joint.law = law(joint).unwrap_or_else(|| joint.law.clone());
+        }
         system
     }
 

@@ -56,8 +56,7 @@ pub(crate) struct Start {
 }
 
 impl Start {
-    /// Returns the state of `start`, `start_velocity` and `begin`. The joints are unloaded if there
-    /// is no equilibrium.
+    /// Returns the state of `start`, `start_velocity` and `begin`.
     pub fn new(system: &System, values: &Values) -> Start {
         let start = values.by_name("start");
         let begin = values.text("begin").unwrap_or(if start.is_some() { EQUILIBRIUM } else { UNLOADED });

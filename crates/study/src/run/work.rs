@@ -308,6 +308,8 @@ pub struct UnitResult {
 /// Status of a point that converged,
 /// [`Accuracy::Converged`](stickslip::orbit::Accuracy::Converged).
 pub const CONVERGED: &str = "converged";
+/// Status of a point without a result.
+pub const NOT_CONVERGED: &str = "not-converged";
 /// Status of a point that an interrupted run did not reach.
 pub const NOT_REACHED: &str = "not-reached";
 

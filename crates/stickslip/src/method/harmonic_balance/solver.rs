@@ -12,7 +12,7 @@ use super::memory_estimate::{MEMORY, check_memory, level_memory};
 use super::newton::SolveError;
 use super::options::{FIRST_HARMONICS, HarmonicBalance, NAME, TOLERANCE};
 use super::settings::WorkSettings;
-use super::static_equilibrium::{SolvedEquilibrium, static_equilibrium};
+use super::static_equilibrium::{SolvedEquilibrium, characteristic_rate, static_equilibrium};
 use super::{cost_model, postprocess};
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
@@ -109,7 +109,7 @@ impl HarmonicBalanceSolver {
         let mut static_start = None;
         if kept.contains(0)
             && let Some(SolvedEquilibrium { orbit, states }) =
-                static_equilibrium(&system, (&ports, around.as_ref()), &dynamics)
+                static_equilibrium(&system, (&ports, around.as_ref()), &dynamics, characteristic_rate(&system))
         {
             ports.set_static_states(&states);
             around.iter_mut().for_each(|around| around.set_static_states(&states));

@@ -37,9 +37,15 @@ const SAMPLES: usize = 8;
 /// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     let (ports, ring_ports) = Ports::for_sector(system).ok()?;
-    let dynamics = LinearDynamics::new(system, &ports);
     let system = Arc::new(system.clone());
-    static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics).map(|found| found.orbit)
+    let rate = characteristic_rate(&system);
+    // springs that regularize rigid-body motions are proportional to the square of the rate: the
+    // lower one is exact to rounding, the higher one finds such motions beside that rounding
+    [1e-3 * rate, rate].into_iter().find_map(|rate| {
+        let dynamics = LinearDynamics::new(&system, &ports);
+        let found = static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics, rate)?;
+        Some(found.orbit)
+    })
 }
 
 /// Static equilibrium of a system.
@@ -50,15 +56,16 @@ pub(super) struct SolvedEquilibrium {
     pub states: Vec<StaticState>,
 }
 
-/// Returns the static equilibrium. Returns `None` if the iteration finds none, for example if
+/// Returns the static equilibrium, with a rate (1/s) of which a small share regularizes motions that
+/// nothing holds. Returns `None` if the iteration finds none, for example if
 /// no joint and no spring carries a constant load.
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, ring_ports): (&Ports, Option<&Ports>),
     dynamics: &LinearDynamics,
+    omega: f64,
 ) -> Option<SolvedEquilibrium> {
     let harmonics = vec![0];
-    let omega = characteristic_rate(system);
     let banded = BandedForm::new(system, ports, &harmonics);
     let mut discretization = Discretization::new(harmonics, SAMPLES, ports, banded);
     discretization.set_frequency(system, ports, dynamics, omega).ok()?;
@@ -93,8 +100,8 @@ pub(super) fn static_equilibrium(
     Some(SolvedEquilibrium { orbit, states })
 }
 
-/// Newton's method from closed contacts, then the proximal point method if only contacts
-/// support a body.
+/// Newton's method from `solution` and from stuck joints, then the homotopy in the slip limits, then
+/// the proximal point method if only contacts support a body.
 ///
 /// Each proximal point is the equilibrium of the structure on springs that tie it to the
 /// previous point. The springs become softer after each success. A body may so slide far along
@@ -110,6 +117,16 @@ fn solve_static(
 ) -> Option<()> {
     let begin = solution.clone();
     if discretization.newton_from(ports, omega, solution, ITERATIONS).is_ok() {
+        return Some(());
+    }
+    // with all joints stuck
+    *solution = HarmonicSolution::zero(begin.c.len());
+    if discretization.newton_from(ports, omega, solution, ITERATIONS).is_ok() {
+        return Some(());
+    }
+    *solution = begin.clone();
+    discretization.begin_search(ports);
+    if discretization.slip_limit_homotopy(ports, omega, solution).is_ok() {
         return Some(());
     }
     if !discretization.is_held_by_contacts() {
@@ -143,7 +160,7 @@ fn solve_static(
 
 /// Returns a rate of the system, 1/s, from its largest stiffness and mass. Equations at rest
 /// need one.
-fn characteristic_rate(system: &System) -> f64 {
+pub(super) fn characteristic_rate(system: &System) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let rate = (stiffness / mass).sqrt();
     if rate.is_finite() && rate > 0.0 { rate } else { 1.0 }
@@ -178,7 +195,7 @@ mod tests {
 
     fn equilibrium(system: &Arc<System>) -> Option<SolvedEquilibrium> {
         let ports = Ports::new(system).unwrap();
-        static_equilibrium(system, (&ports, None), &LinearDynamics::new(system, &ports))
+        static_equilibrium(system, (&ports, None), &LinearDynamics::new(system, &ports), characteristic_rate(system))
     }
 
     /// In stick, `z (kn sin² + kt cos²) = Q`. In slip, `z kn (sin² + µ sin cos) = Q`. The

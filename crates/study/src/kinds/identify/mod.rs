@@ -42,7 +42,7 @@ use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
-use crate::run::work::{CONVERGED, Computed, NOT_REACHED, UnitResult, UnitSize, UnitTask};
+use crate::run::work::{CONVERGED, Computed, NOT_CONVERGED, NOT_REACHED, UnitResult, UnitSize, UnitTask};
 use crate::syntax::error::StudyError;
 use crate::syntax::expression::quantity_text;
 use crate::syntax::key::{Bounds, Key, ValueType, default, optional, required};
@@ -276,7 +276,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let settings = SearchSettings::of(&case.values);
         let found = search(&problem, &settings)?;
         let mut statistics = statistics::Statistics::new(&problem, &found, settings.loss);
-        if let Some(reason) = statistics.failure() {
+        if let Some(reason) = statistics.failure(&problem) {
             return Err(reason);
         }
         statistics.check_intervals(&problem, &settings, &found);
@@ -303,7 +303,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             );
             part.count(|| case.label(), CONVERGED, None);
         }
-        Err(reason) => part.count(|| case.label(), "not-converged", Some(reason)),
+        Err(reason) => part.count(|| case.label(), NOT_CONVERGED, Some(reason)),
     }
     Ok(part)
 }

@@ -19,7 +19,7 @@ use crate::results::drawing::MAX_PANELS;
 use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::describe_location;
-use crate::run::work::{CONVERGED, Computed, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
+use crate::run::work::{CONVERGED, Computed, NOT_CONVERGED, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optional, required};
 use further_tables::History;
 use record::Records;
@@ -250,9 +250,15 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     let start = Start::new(&prepared.system, values);
     if start.lacks_equilibrium {
-        let text = "the pulled structure has no static equilibrium, so the motion begins with unloaded joints, as \
-            with begin = \"unloaded\"";
-        part.notes.push(Note::for_case(&case.label(), format!("{WARNING}{text}")));
+        let reason = "no static equilibrium was found to begin with: hold every body by a spring, a contact or \
+            `start`, or use begin = \"unloaded\"";
+        for drive in drives {
+            let location = || drive.map_or_else(|| case.label(), |omega| describe_location(case, omega));
+            part.count(location, NOT_CONVERGED, Some(reason.to_owned()));
+            (work.context.finished)();
+        }
+        part.tables = (0..4 + further_tables::ALL.len()).map(|_| TableBuilder::default()).collect();
+        return Ok(part);
     }
     if records.as_ref().is_some_and(|records| records.ground_moves) {
         let text = "the ground moves; displacements and velocities are relative to it.";

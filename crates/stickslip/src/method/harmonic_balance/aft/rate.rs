@@ -28,14 +28,17 @@ struct RateSettings {
     /// Change of the stages, relative to the size of states, at which a step is solved. Newton's
     /// method squares the error, so that the next change is rounding.
     tolerance: f64,
-    /// Duration of the initial step from static equilibrium to the beginning of the period, as a
-    /// share of the period.
-    initial_step_share: f64,
+    /// Duration of the initial step from static equilibrium to the beginning of the period, in
+    /// periods. It is so long that velocities have no part in the force.
+    initial_periods: f64,
+    /// Number of parts of the initial step. A pull to five times the elastic range of a `dahl` joint
+    /// then has an error of 1e-7; in one part it has 5 %.
+    initial_parts: usize,
 }
 
 impl Default for RateSettings {
     fn default() -> Self {
-        RateSettings { iterations: 60, largest_change: 2.0, tolerance: 1e-9, initial_step_share: 0.25 }
+        RateSettings { iterations: 60, largest_change: 2.0, tolerance: 1e-9, initial_periods: 1e6, initial_parts: 64 }
     }
 }
 
@@ -408,10 +411,9 @@ impl StepSequence for RateStepper<'_> {
         let stage = at * Complex64::cis(-FIRST_STAGE_REMAINDER * angle * h as f64);
         [stage, stage * turn, at, at * turn]
     }
+    /// The initial step gives its derivatives by the displacement at its end alone.
     fn initial_input_factors(&self, _h: usize) -> [Complex64; 4] {
-        let settings = RateSettings::default();
-        let rate = self.omega / (TAU * settings.initial_step_share);
-        [1.0 - FIRST_STAGE_REMAINDER, rate, 1.0, rate].map(|x| Complex64::new(x, 0.0))
+        [0.0, 0.0, 1.0, 0.0].map(|x| Complex64::new(x, 0.0))
     }
     fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], mut rows: Option<&mut [f64]>) -> bool {
         let (n, m, d) = (self.samples[0][0].len(), z.len(), self.axes);
@@ -440,18 +442,55 @@ impl StepSequence for RateStepper<'_> {
         }
         true
     }
-    fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
+    fn initial_step(
+        &mut self,
+        after: &mut [f64],
+        force: &mut [f64; MAX_DIRECTIONS],
+        mut rows: Option<&mut [f64]>,
+    ) -> bool {
         let settings = RateSettings::default();
-        let duration = TAU * settings.initial_step_share / self.omega;
-        let to: [f64; MAX_DIRECTIONS] =
-            std::array::from_fn(|a| if a < self.axes { self.samples[0][a][0] } else { 0.0 });
-        let velocity = std::array::from_fn(|a| (to[a] - self.rest[a]) / duration);
-        let third =
-            std::array::from_fn(|a| FIRST_STAGE_REMAINDER * self.rest[a] + (1.0 - FIRST_STAGE_REMAINDER) * to[a]);
-        let motions = [third, to].map(|displacement| RelativeMotion { displacement, velocity });
-        let before = std::mem::take(&mut self.at_rest);
-        let found = self.advance((duration, motions), &before, after, force, rows);
-        self.at_rest = before;
-        found
+        let (m, d) = (after.len(), self.axes);
+        let parts = if m == 0 { 1 } else { settings.initial_parts };
+        let duration = TAU * settings.initial_periods / self.omega;
+        let (rest, ends) = (self.rest, self.samples[0]);
+        let to: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| if a < d { ends[a][0] } else { 0.0 });
+        let velocity = std::array::from_fn(|a| (to[a] - rest[a]) / duration);
+        let width = 4 * d + m + usize::from(self.frequency);
+        // derivatives of states and forces by `to`, by the states at rest and by ω
+        let mut derivative =
+            DMatrix::from_fn(m + d, width - 3 * d, |row, column| f64::from(u8::from(column == d + row)));
+        let mut before = self.at_rest.clone();
+        for part in 0..parts {
+            let shares = [1.0 - FIRST_STAGE_REMAINDER, 1.0].map(|stage| (part as f64 + stage) / parts as f64);
+            let motions = shares.map(|share| RelativeMotion {
+                displacement: std::array::from_fn(|a| rest[a] + share * (to[a] - rest[a])),
+                velocity,
+            });
+            if !self.advance((duration / parts as f64, motions), &before, after, force, rows.as_deref_mut()) {
+                return false;
+            }
+            before.copy_from_slice(after);
+            let Some(rows) = rows.as_deref() else { continue };
+            let by = [shares[0], 1.0 / duration, shares[1], 1.0 / duration];
+            derivative = DMatrix::from_fn(m + d, width - 3 * d, |row, column| {
+                let row = &rows[row * width..(row + 1) * width];
+                let through: f64 = (0..m).map(|s| row[4 * d + s] * derivative[(s, column)]).sum();
+                let direct = match column {
+                    _ if column < d => (0..4).map(|kind| row[kind * d + column] * by[kind]).sum(),
+                    _ if column >= d + m => row[width - 1],
+                    _ => 0.0,
+                };
+                through + direct
+            });
+        }
+        if let Some(rows) = rows {
+            rows.fill(0.0);
+            for (row, values) in rows.chunks_exact_mut(width).enumerate() {
+                for (column, value) in derivative.row(row).iter().enumerate() {
+                    values[if column < d { 2 * d + column } else { 3 * d + column }] = *value;
+                }
+            }
+        }
+        true
     }
 }
