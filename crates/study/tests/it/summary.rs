@@ -585,7 +585,7 @@ fn stuck_contacts_count_as_closed() {
 #[test]
 fn faces_without_friction_are_free() {
     let found = summary(&pressed("40 N", "0 N").replace("friction = 0.3", "friction = 0"));
-    assert!(found.to_string().contains("face.t         free: no force in static equilibrium"), "{found}");
+    assert!(found.to_string().contains("face.x         free: no force in static equilibrium"), "{found}");
 }
 
 /// A light body that only a joint holds has its mode far above the resonance of the blade, whose

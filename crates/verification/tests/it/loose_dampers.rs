@@ -9,6 +9,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::time::Instant;
 use stickslip::method::Method;
 use stickslip::method::auto::Auto;
 use stickslip::method::harmonic_balance::HarmonicBalance;
@@ -50,6 +51,15 @@ struct Counts {
     inaccurate: usize,
     /// Orbits by the algorithm that found them.
     found_by: BTreeMap<&'static str, usize>,
+    /// Time of every point without an initial guess or from the last one, s.
+    times: Vec<f64>,
+}
+
+/// Median, 95 % and longest of the times.
+fn print_times(times: &mut [f64]) {
+    times.sort_by(f64::total_cmp);
+    let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+    println!("a point takes {:.3} s (median), {:.3} s (95 %), {:.3} s (longest)", at(0.5), at(0.95), at(1.0));
 }
 
 /// Returns the largest difference of the blades' amplitudes from the reference, relative to the
@@ -83,7 +93,9 @@ fn judge(damper: &LooseDamper, name: &str, counts: &mut Counts) {
     let system = damper.system();
     let mut solver = Auto.solver(&system).unwrap();
     for &omega in &damper.frequencies {
+        let begun = Instant::now();
         let found = solver.orbit(omega);
+        counts.times.push(begun.elapsed().as_secs_f64());
         let hertz = omega / TAU;
         let orbit = match found {
             Ok(orbit) => orbit,
@@ -128,6 +140,7 @@ fn random_loose_dampers_vibrate_as_they_do_in_time() {
         let damper = loose_damper(seed);
         judge(&damper, &format!("{} {seed}", damper.kind), &mut counts);
     }
+    print_times(&mut std::mem::take(&mut counts.times));
     println!("{counts:?}");
     let found = counts.agree + counts.within_histories + counts.differ + counts.unjudged + counts.unstable;
     assert_eq!(counts.differ, 0, "{counts:?}");
