@@ -119,23 +119,12 @@ function search(kind, title, letters) {
   });
   place.addEventListener("redraw", () => show());
 
-  /** The present value of the parameter of an axis, in the unit of the axis. @param {"x" | "y"} letter */
+  /** The present value of the parameter of an axis; axes have the units of the file. @param {"x" | "y"} letter */
   function presentValue(letter) {
     const quantity = plainOf(result.ranges[letters.indexOf(letter)].name);
     const text = quantity && currentText(quantity);
     const axis = result.plot.axes[0][letter];
-    const scale = unitFactor(quantity, axis);
-    return text ? Number.parseFloat(text) * scale / 10 ** axis.power : NaN;
-  }
-
-  /** Values per unit of the quantity on an axis. The axis of a curve is in SI, that of a map in the unit of the file. @param {any} quantity @param {any} axis */
-  function unitFactor(quantity, axis) {
-    if (!quantity || axis.unit === quantity.unit || kind === "map") { return 1; }
-    const columns = result.tables.performance ?? [];
-    const column = columns.find((/** @type {any} */ one) => one.name.startsWith(`${quantity.name}_`) || one.name === quantity.name);
-    const range = result.ranges[0];
-    const first = column?.values?.[0];
-    return first ? first / Number.parseFloat(range.from) : 1;
+    return text ? Number.parseFloat(text) / 10 ** axis.power : NaN;
   }
 
   function upright() {
@@ -167,7 +156,7 @@ function search(kind, title, letters) {
     const list = letters.flatMap((letter) => {
       const quantity = plainOf(result.ranges[letters.indexOf(letter)].name);
       const axis = result.plot.axes[at.panel][letter];
-      const number = at[letter] * 10 ** axis.power / unitFactor(quantity, axis);
+      const number = at[letter] * 10 ** axis.power;
       return setQuantity(quantity, quantityText(quantity, number));
     });
     change(list);

@@ -186,6 +186,13 @@ impl VariedValue {
         }
     }
 
+    /// Returns the factor from the values of the column to those in the unit of the file.
+    pub fn file_unit_factor(&self) -> f64 {
+        let Some(unit) = self.unit.as_deref().and_then(units::parse) else { return 1.0 };
+        let one = VariedValue { si: unit.si_value("1"), ..self.clone() };
+        1.0 / one.column().1
+    }
+
     /// Returns the value and the unit for the axis of a figure, as in [`VariedValue::column`].
     pub fn in_axis_unit(&self) -> (f64, String) {
         let unit = self.dimension.and_then(table_unit).map_or(String::new(), |(_, unit)| unit);

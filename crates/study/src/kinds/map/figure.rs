@@ -58,9 +58,8 @@ impl Map<'_> {
         let [first, second] = &self.rows.varied[self.rows.varied.len() - 2..] else { return None };
         let values = |parameter: &VariedValue| {
             let all = numbers(self.table, &parameter.column().0, self.rows.rows.clone());
-            let (value, in_table) = (parameter.in_file_unit().0, parameter.column().1);
-            let unit = if in_table == 0.0 { 1.0 } else { value / in_table };
-            all.into_iter().map(|value| rounded(value * unit)).collect::<Vec<f64>>()
+            let factor = parameter.file_unit_factor();
+            all.into_iter().map(|value| rounded(value * factor)).collect::<Vec<f64>>()
         };
         let peaks = numbers(self.table, AMPLITUDE, self.rows.rows.clone());
         let x: Vec<f64> = values(first).into_iter().step_by(self.columns).collect();

@@ -18,7 +18,10 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(inner) = cases.first().and_then(|case_rows| case_rows.varied.last()) else { return Figure::default() };
     let (y_axis, factor) = drawing.axis(1, "resonance peak", largest(table, [AMPLITUDE.to_owned()]), "m");
     let column = inner.column().0;
-    let parameter = |table: &crate::results::dataset::Table, rows| numbers(table, &column, rows);
+    let unit = inner.file_unit_factor();
+    let parameter = |table: &crate::results::dataset::Table, rows| {
+        numbers(table, &column, rows).into_iter().map(|value| value * unit).collect::<Vec<f64>>()
+    };
     let height = |table, rows| numbers(table, AMPLITUDE, rows).iter().map(|y| y * factor).collect::<Vec<f64>>();
     // several outer parameters have no common colour scale
     let varied = if outer == 1 { drawing.varied_axis(&cases, 0) } else { None };
@@ -27,7 +30,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         parameter.map(|parameter| parameter.in_file_unit().0)
     };
     let spacing = drawing.study.value_counts().last().and_then(|(_, scale)| *scale);
-    let x = Axis::new(&inner.name, inner.in_axis_unit().1);
+    let x = Axis::new(&inner.name, inner.in_file_unit().1);
     let x = if spacing == Some(RangeScale::Log) { x.log() } else { x };
     let panel = |title: String, series| Panel { title, x: x.clone(), y: y_axis.clone(), series, ..Panel::default() };
     if drawing.study.draws().is_some() {

@@ -27,10 +27,8 @@
 //! Others:
 //! - `grouping`: from joints to ports
 //! - `workspace`: scratch memory of laws with memory
-//! - `conformance`: tests of every kind of port
+//! - `tests`: tests of every kind of port
 
-#[cfg(test)]
-mod conformance;
 mod events;
 mod frequency_time;
 mod grouping;
@@ -42,6 +40,8 @@ mod rate;
 mod series;
 mod sliders;
 mod step;
+#[cfg(test)]
+mod tests;
 mod workspace;
 
 pub(super) use frequency_time::{FrequencyTime, InitialState};
