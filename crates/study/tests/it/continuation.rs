@@ -418,6 +418,25 @@ vary = { F0 = ["1 N", "2 N"], Ft = ["0.2 N", "0.4 N", "0.6 N"] }"#;
     assert_eq!(curves.map(|series| series.value).collect::<Vec<_>>(), [Some(1.0), Some(2.0)]);
 }
 
+/// Peaks of a series that is too short for its tolerance have triangles.
+#[test]
+fn inexact_peaks_are_marked() {
+    let law = r#"{ kind = "coulomb", limit = "Ft" }"#;
+    let study = r#"kind = "performance"
+frequency = { from = "0.6 rad/s", to = "1.4 rad/s", points = 9 }
+vary = { Ft = ["200 mN", "400 mN"] }
+[method]
+kind = "harmonic-balance"
+harmonics = 3
+tolerance = 1e-9"#;
+    let text = oscillating("0.1 kg/s", law, study).replace("[parameters]", "[parameters]\nFt = \"1 N\"");
+    let figure = dataset(&text).figure;
+    assert_eq!(figure.panels[0].x.unit, "mN");
+    let series = &figure.panels[0].series;
+    let marked = series.iter().find(|series| series.style == Style::Warning).expect("triangles");
+    assert_eq!((marked.label.as_str(), &marked.x[..]), ("points: 2 less exact than requested", &[200.0, 400.0][..]));
+}
+
 /// Invalid options that depend on the model are reported at their place in the file.
 #[test]
 fn harmonics_below_the_excitation_are_refused_in_their_place() {

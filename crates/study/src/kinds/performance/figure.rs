@@ -3,6 +3,7 @@
 use super::tables;
 use crate::case::study::varied_text;
 use crate::compile::compiled::RangeScale;
+use crate::kinds::shared::points_to_doubt::PointsToDoubt;
 use crate::results::columns::AMPLITUDE;
 use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::drawing::{CaseRows, FigureInput, largest, numbers};
@@ -52,7 +53,9 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let mut series = Vec::new();
     let failed =
         cases.iter().flat_map(|case_rows| height(table, case_rows.rows.clone())).filter(|y| y.is_nan()).count();
+    let to_doubt = PointsToDoubt::of(table);
     for (colour, case_rows) in cases.iter().enumerate() {
+        let doubtful: Vec<usize> = case_rows.rows.clone().filter(|row| to_doubt.rows.contains(row)).collect();
         let label = varied_text(&case_rows.varied[..outer]);
         let label = if label.is_empty() { "peak".to_owned() } else { label };
         let (x, y) = (parameter(table, case_rows.rows.clone()), height(table, case_rows.rows.clone()));
@@ -66,9 +69,15 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
                 points.insert(index, best);
             }
         }
+        let at = |of: &dyn Fn(usize) -> Vec<f64>| doubtful.iter().flat_map(|row| of(*row)).collect::<Vec<f64>>();
+        let (doubtful_x, doubtful_y) =
+            (at(&|row| parameter(table, row..row + 1)), at(&|row| height(table, row..row + 1)));
         let without: Vec<f64> = points.iter().filter(|point| point.1.is_nan()).map(|point| point.0).collect();
         let (x, y) = points.into_iter().unzip();
         series.push(Series { value: value(colour), ..Series::line(label, x, y, colour) });
+        if doubtful_y.iter().any(|y| y.is_finite()) {
+            series.push(Series::warning(to_doubt.label.clone(), doubtful_x, doubtful_y, colour));
+        }
         if !without.is_empty() {
             let label = format!("{failed} point{} without a peak", plural_suffix(failed));
             series.push(Series::missing(label, without, colour + 1, colour));

@@ -1,8 +1,9 @@
 //! The figure of a response.
 
-use super::figure_data::{CasePeak, FigureData, PointsToDoubt, force};
+use super::figure_data::{CasePeak, FigureData, force};
 use super::{amplification, tables};
 use crate::kinds::shared::contact_states;
+use crate::kinds::shared::points_to_doubt::PointsToDoubt;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END, FREQUENCY as DRIVE, REVERSE_SWEEP, amplitude_of};
 use crate::results::dataset::{Axis, Figure, Panel, Sharing, Table};
 use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, PanelLayout, join_title, largest, numbers, words};

@@ -2,13 +2,13 @@
 
 use crate::kinds::shared::contact_states::{self, ContactState};
 use crate::kinds::shared::disk_shape::{self, place_and_sector};
+use crate::kinds::shared::points_to_doubt::PointsToDoubt;
 use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
 use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
 use crate::results::drawing::{CaseRows, FigureInput, join_title, numbers};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use stickslip::model::System;
-use stickslip::orbit::Accuracy;
 use stickslip_numerics::tie_break::{RELATIVE_TIE, first_largest};
 
 /// Largest number of places drawn one by one. For more places, the largest amplitude is drawn,
@@ -27,34 +27,6 @@ pub(super) struct CasePeak {
     pub(super) at: (f64, f64),
     /// True if only the reverse sweep has the peak.
     pub(super) reverse_sweep: bool,
-}
-
-/// Points that are unstable or less exact than requested.
-#[derive(Debug, Clone)]
-pub(super) struct PointsToDoubt {
-    /// Rows of the curve table.
-    rows: BTreeSet<usize>,
-    /// Legend entry.
-    label: String,
-}
-
-impl PointsToDoubt {
-    /// Reads the columns `stable` and `status` of a curve table.
-    pub(super) fn of(curve: &Table) -> PointsToDoubt {
-        let truncated = Accuracy::Truncated.status();
-        let unstable: BTreeSet<usize> = match curve.flags("stable") {
-            Some(stable) => (0..curve.rows()).filter(|row| stable[*row] == Some(false)).collect(),
-            None => BTreeSet::new(),
-        };
-        let inexact: BTreeSet<usize> = match curve.texts("status") {
-            Some(status) => (0..curve.rows()).filter(|row| status[*row] == truncated).collect(),
-            None => BTreeSet::new(),
-        };
-        let counts = [(unstable.len(), "unstable"), (inexact.len(), "less exact than requested")];
-        let counts = counts.iter().filter(|(count, _)| *count > 0).map(|(count, text)| format!("{count} {text}"));
-        let label = format!("points: {}", counts.collect::<Vec<_>>().join(", "));
-        PointsToDoubt { rows: unstable.union(&inexact).copied().collect(), label }
-    }
 }
 
 /// The data of the figure.

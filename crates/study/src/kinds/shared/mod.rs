@@ -3,6 +3,7 @@
 //! - `keys`: keys of `[study]`, and checks of their values;
 //! - `peak_of`: the key `peak_of`;
 //! - `peak_search`: the resonance peak of a case, and its row in a table;
+//! - `points_to_doubt`: points that are unstable or less exact than requested;
 //! - `orbit_sweep`: the orbits of a unit, their instants, and failures;
 //! - `contact_states`: panels of contact states;
 //! - `disk_shape`: pictures of a disk.
@@ -13,3 +14,4 @@ pub(super) mod keys;
 pub(super) mod orbit_sweep;
 pub(super) mod peak_of;
 pub(super) mod peak_search;
+pub(super) mod points_to_doubt;
