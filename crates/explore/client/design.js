@@ -80,7 +80,7 @@ function search(kind, title, letters) {
       // the value of a searched parameter does not matter, but its removal from `vary` does
       const event = await run(kind, { study: state.study, changes: changeList(), tables: true, view, wait: !asked }, (event) => {
         if (event.event === "begin") { all = event.points; }
-        if (event.event === "progress" && all) { words.textContent = `${Math.round(100 * event.done / all)} % computed`; }
+        if (event.event === "progress" && all) { words.textContent = event.done < all ? `${Math.round(100 * event.done / all)} % computed` : "refining …"; }
       });
       if (own !== turn) { return; }
       if (event === null) { words.textContent = "Stopped."; return; }

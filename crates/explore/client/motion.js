@@ -145,7 +145,7 @@ function vector(one, direction) {
 function moved(orbit, one, gain) {
   let [x, y] = [one.x, one.y];
   for (const direction of ["", "x", "y", "z", "r", "t", "n"]) {
-    const column = direction === "" ? `${one.name}_displacement_m` : `${one.name}.${direction}_displacement_m`;
+    const column = direction === "" ? `${one.name}_displacement_m` : `${one.name}_${direction}_displacement_m`;
     const value = at(orbit, column);
     if (value === null) { continue; }
     const along = vector(one, direction);

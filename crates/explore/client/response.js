@@ -160,6 +160,7 @@ function take(event, { moving, reduced }, seconds) {
   }
   if (event.event === "error") {
     tell("failed", event);
+    place.classList.toggle("stale", state.result !== null);
     status.textContent = "not computed";
     if (!state.result) { explain(event.message, null); }
     return;

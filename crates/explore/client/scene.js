@@ -2,7 +2,7 @@
 //
 // A point mass has no position. Masses are placed from left to right as springs and joints connect
 // them. A ring is a wheel: parts that springs connect to the shaft stand outside in this order, and
-// parts that only joints hold, such as dampers, stand inside.
+// parts that only joints hold, such as dampers, stand inside, between the parts that they touch.
 
 /**
  * @typedef {{name: string, x: number, y: number, radius: number, along: [number, number], out: [number, number]}} Mass
@@ -12,7 +12,8 @@
  */
 export function sceneOf(model) {
   const wheel = Boolean(model.ring);
-  const names = [...model.masses.map((/** @type {any} */ one) => one.name), ...(model.bodies ?? []).map((/** @type {any} */ one) => one.name), ...model.places.filter((/** @type {any} */ one) => !one.of).map((/** @type {any} */ one) => one.name)];
+  const lists = [model.masses, model.bodies ?? [], model.places.filter((/** @type {any} */ one) => !one.of)].map((list) => list.map((/** @type {any} */ one) => one.name));
+  const names = wheel ? bySector(lists, model.ring.sectors) : lists.flat();
   const owner = (/** @type {string} */ place) => names.find((name) => place === name || place.startsWith(`${name}.`)) ?? viewOf(model, place) ?? place;
   const moved = [...new Set(model.motions.map((/** @type {any} */ one) => owner(one.on)))].filter((name) => !names.includes(name));
   const all = [...names, ...moved];
@@ -50,6 +51,12 @@ export function sceneOf(model) {
   return /** @type {any} */ ({ masses: list, links, ground, forces, wheel });
 }
 
+/** The names of lists, each of them sector by sector, as one list sector by sector. @param {string[][]} lists @param {number} sectors */
+function bySector(lists, sectors) {
+  const part = (/** @type {string[]} */ list, /** @type {number} */ sector) => list.slice(sector * list.length / sectors, (sector + 1) * list.length / sectors);
+  return Array.from({ length: sectors }, (_, sector) => lists.flatMap((list) => part(list, sector))).flat();
+}
+
 /** The mass of which a place is a view. @param {any} model @param {string} place */
 const viewOf = (model, place) => model.places.find((/** @type {any} */ one) => place === one.name || place.startsWith(`${one.name}.`))?.of;
 
@@ -58,10 +65,13 @@ function onWheel(names, sectors, pairs) {
   const each = Math.max(1, Math.round(names.length / sectors));
   const levels = names.slice(0, each).map((name) => ({ name, level: springsToGround(name, pairs) }));
   const order = [...new Set(levels.map((one) => one.level))].sort((a, b) => a - b);
+  // a part without springs, such as a damper, stands halfway to the neighbour that it touches
+  const touches = (/** @type {string} */ name, /** @type {number} */ sector) => pairs.some(({ between }) => between.includes(name) && between.some((/** @type {string} */ end) => names.indexOf(end) >= sector * each && names.indexOf(end) < (sector + 1) * each));
+  const shifts = levels.map(({ name, level }) => (level > 0 || sectors < 3 ? 0 : touches(name, 1) ? 0.5 : touches(name, sectors - 1) ? -0.5 : 0));
   return new Map(names.map((name, index) => {
     const sector = Math.floor(index / each);
     const ring = order.indexOf(levels[index % each].level);
-    const angle = 2 * Math.PI * sector / sectors - Math.PI / 2;
+    const angle = 2 * Math.PI * (sector + shifts[index % each]) / sectors - Math.PI / 2;
     const distance = sectors * 0.42 * (1 - 0.3 * (order.length - 1 - ring) / Math.max(2, order.length)) + 0.8;
     const [x, y] = [Math.cos(angle), Math.sin(angle)];
     return [name, { x: distance * x, y: distance * y, along: [-y, x], out: [x, y] }];

@@ -9,6 +9,11 @@ export function start() {
   on("opened", () => byId("trust").replaceChildren());
   on("gallery", () => byId("trust").replaceChildren());
   on("result", show);
+  // the strip keeps the last result and says that it is not that of the present values
+  on("failed", () => {
+    const strip = byId("trust");
+    if (strip.childElementCount > 0 && !strip.querySelector(".old")) { strip.prepend(make("span", { class: "bad old", text: "the present values have no result; before:" })); }
+  });
 }
 
 /** @param {any} result */

@@ -156,6 +156,57 @@ fn pins_are_compared() {
     browser.check_clean();
 }
 
+/// A wheel of blades with dampers between them: 24 parts, each damper at equal distances from its
+/// two blades.
+#[test]
+fn dampers_stand_between_their_blades() {
+    let Some((_server, mut browser)) = open(Start::Template("under-platform-wedge".into())) else { return };
+    let scene =
+        "(await import('./assets/scene.js')).sceneOf((await import('./assets/store.js')).state.description.model)";
+    browser.wait("document.querySelectorAll('.row').length > 5");
+    let distances = format!(
+        "const scene = {scene}; const of = (name) => scene.masses.find((one) => one.name === name); \
+         const apart = (a, b) => Math.hypot(of(a).x - of(b).x, of(a).y - of(b).y); \
+         [scene.masses.length, apart('wedge_0', 'blade_0') / apart('wedge_0', 'blade_1'), \
+          apart('wedge_11', 'blade_11') / apart('wedge_11', 'blade_0'), apart('wedge_0', 'blade_0') / apart('blade_0', 'blade_1')]"
+    );
+    let found = browser.evaluate(&distances);
+    let found: Vec<f64> = found.as_array().unwrap().iter().filter_map(|one| one.as_f64()).collect();
+    assert_eq!(found[0], 24.0);
+    assert!((found[1] - 1.0).abs() < 1e-9 && (found[2] - 1.0).abs() < 1e-9 && found[3] < 1.0, "{found:?}");
+}
+
+/// Masses with two directions move in the picture. The force and its arrow are in the left half, and
+/// nothing but the other mass changes the right half.
+#[test]
+fn masses_with_directions_move() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pair.toml");
+    std::fs::write(
+        &file,
+        "schema = 1\n[[mass]]\nname = \"a\"\nmass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[mass]]\nname = \"b\"\n\
+         mass = \"1 kg\"\ndirections = [\"x\", \"z\"]\n[[spring]]\nbetween = [\"a.x\", \"ground\"]\nstiffness = \"1 N/mm\"\n\
+         damping = \"2 kg/s\"\n[[spring]]\nbetween = [\"a.z\", \"ground\"]\nstiffness = \"1 N/mm\"\n[[spring]]\n\
+         between = [\"a.x\", \"b.x\"]\nstiffness = \"1 N/mm\"\n[[spring]]\nbetween = [\"b.z\", \"ground\"]\nstiffness = \"1 N/mm\"\n\
+         [[force]]\non = \"a.x\"\namplitude = \"1 N\"\n[study]\nkind = \"response\"\nfrequency = { from = \"2 Hz\", to = \"4 Hz\", points = 5 }\n",
+    )
+    .unwrap();
+    let Some((_server, mut browser)) = open(Start::File(file)) else { return };
+    browser.wait(CURVE);
+    browser.evaluate("document.getElementById('tab-motion').click()");
+    browser.wait("document.querySelector('canvas[aria-label=\"The structure in motion\"]').width > 300");
+    let half = |phase: &str| {
+        format!(
+            "(() => {{ const time = document.querySelector('[aria-label=\"Time in the period\"]'); time.value = '{phase}'; \
+             time.dispatchEvent(new Event('input')); const canvas = document.querySelector('canvas[aria-label=\"The structure in motion\"]'); \
+             return canvas.getContext('2d').getImageData(Math.round(0.55 * canvas.width), 0, Math.round(0.45 * canvas.width), canvas.height).data.join(); }})()"
+        )
+    };
+    let differ = format!("{} !== {}", half("0.05"), half("0.55"));
+    browser.wait(&differ);
+    browser.check_clean();
+}
+
 /// A pinned curve stays in the plot when the study has another number of panels.
 #[test]
 fn a_pin_survives_other_panels() {
