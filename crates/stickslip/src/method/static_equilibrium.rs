@@ -8,8 +8,8 @@
 //! vibration then begins from there. A slider that the vibration does not move stays where the
 //! ramp left it; another slider moves only as far as necessary.
 //!
-//! The force of rigid friction depends on velocities alone. During the ramp, a stiff spring with its
-//! slip limit takes its place.
+//! The force of rigid friction depends on velocities alone. During the ramp, a stiff spring with
+//! its slip limit takes its place.
 
 use super::flow::average_acceleration::law_step;
 use super::harmonic_balance;
@@ -102,8 +102,8 @@ impl StaticEquilibrium {
         let largest = held.iter().fold(0.0f64, |largest, (_, value)| largest.max(value.abs()));
         let axis_stiffnesses: Vec<f64> = held.iter().map(|(axis, _)| stiffness_along(system, axis)).collect();
         let mut targets: Vec<f64> = held.iter().map(|(_, value)| *value).collect();
-        // stiffness of the springs relative to that of the structure; each pass leaves less than its
-        // inverse of the distances
+        // stiffness of the springs relative to that of the structure; each pass leaves less than
+        // its inverse of the distances
         let mut factor = 100.0;
         let mut left = f64::INFINITY;
         for _ in 0..20 {

@@ -39,8 +39,9 @@ pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     let (ports, ring_ports) = Ports::for_sector(system).ok()?;
     let system = Arc::new(system.clone());
     let rate = characteristic_rate(&system);
-    // springs that regularize rigid-body motions are proportional to the square of the rate: the
-    // lower one is exact to rounding, the higher one finds such motions beside that rounding
+    // springs that regularize rigid-body motions are proportional to the square of the rate: with
+    // the lower one the result is exact to rounding, with the higher one such motions are found
+    // also in matrices whose rounding holds them
     [1e-3 * rate, rate].into_iter().find_map(|rate| {
         let dynamics = LinearDynamics::new(&system, &ports);
         let found = static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics, rate)?;
@@ -56,9 +57,9 @@ pub(super) struct SolvedEquilibrium {
     pub states: Vec<StaticState>,
 }
 
-/// Returns the static equilibrium, with a rate (1/s) of which a small share regularizes motions that
-/// nothing holds. Returns `None` if the iteration finds none, for example if
-/// no joint and no spring carries a constant load.
+/// Returns the static equilibrium. Springs that belong to a small share of the rate `omega` (1/s)
+/// regularize motions that nothing holds. Returns `None` if the iteration finds none, for example
+/// if no joint and no spring carries a constant load.
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, ring_ports): (&Ports, Option<&Ports>),
@@ -100,8 +101,8 @@ pub(super) fn static_equilibrium(
     Some(SolvedEquilibrium { orbit, states })
 }
 
-/// Newton's method from `solution` and from stuck joints, then the homotopy in the slip limits, then
-/// the proximal point method if only contacts support a body.
+/// Newton's method from `solution` and from stuck joints, then the homotopy in the slip limits,
+/// then the proximal point method if only contacts support a body.
 ///
 /// Each proximal point is the equilibrium of the structure on springs that tie it to the
 /// previous point. The springs become softer after each success. A body may so slide far along

@@ -109,8 +109,8 @@ impl OrbitRows {
                     let seed = own.or(before.as_ref());
                     let request = Request::at(row.omega).without_estimate();
                     let found = solver.solve(&request.near(seed), &mut Budget::default());
-                    // an orbit of other parameters may be no good initial guess; only a search with an
-                    // error estimate takes the second method of `auto`
+                    // an orbit of other parameters may be no good initial guess; only a search
+                    // with an error estimate takes the second method of `auto`
                     let found = match (found, seed) {
                         (Err(_), Some(_)) => solver.solve(&request, &mut Budget::default()),
                         (found, _) => found,

@@ -31,8 +31,8 @@ struct RateSettings {
     /// Duration of the initial step from static equilibrium to the beginning of the period, in
     /// periods. It is so long that velocities have no part in the force.
     initial_periods: f64,
-    /// Number of parts of the initial step. A pull to five times the elastic range of a `dahl` joint
-    /// then has an error of 1e-7; in one part it has 5 %.
+    /// Number of parts of the initial step. A pull to four times the elastic range of a `dahl`
+    /// joint then has an error of 3e-7; in one part it has 5 %.
     initial_parts: usize,
 }
 
