@@ -1,33 +1,42 @@
 //! Modes of a small structure: its response at every frequency is a sum over them.
 
+use super::factored::FactoredDynamics;
+use super::harmonic_dynamics::{Directions, HarmonicDynamics, diagonal, rate};
+use super::uncoupled_modes::UndampedResonance;
 use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::model::System;
-use nalgebra::DMatrix;
+use crate::structure::Structure;
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use stickslip_numerics::quadratic_modes::QuadraticModes;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Modes, and their components along the axes.
+/// Modes `(λ, φ)` of `M x'' + C x' + K x`, and their components along the axes.
+///
+/// The response to `Re(F e^{st})` is the sum of `φ (ψᵀF) / (s - λ)`. A frequency costs the number
+/// of modes times the square of the number of axes, and no matrix is factored.
 #[derive(Debug, Clone)]
-pub(crate) struct ComplexModes {
-    pub lambda: Vec<Complex64>,
+pub(super) struct ComplexModes {
+    lambda: Vec<Complex64>,
     /// Right modes, n × modes, and left modes, modes × n.
-    pub shape: DMatrix<Complex64>,
-    pub left: DMatrix<Complex64>,
+    shape: DMatrix<Complex64>,
+    left: DMatrix<Complex64>,
     /// Their components along the axes: q × modes, and modes × q.
-    pub shape_along: DMatrix<Complex64>,
-    pub left_along: DMatrix<Complex64>,
+    shape_along: DMatrix<Complex64>,
+    left_along: DMatrix<Complex64>,
     /// Free directions, n × r, and their components along the axes, r × q.
-    pub free: DMatrix<f64>,
-    pub free_along: DMatrix<f64>,
+    free: DMatrix<f64>,
+    free_along: DMatrix<f64>,
+    structure: Structure,
+    directions: Directions,
 }
 
 impl ComplexModes {
     /// Computes the modes in the structure's coordinates. `None` if the mass matrix is not
     /// positive definite, nearly singular, or if modes coincide. The equations are then solved
     /// at every frequency.
-    pub fn new(system: &System, direction: &DMatrix<f64>) -> Option<Self> {
+    pub fn new(system: &System, direction: &DMatrix<f64>, directions: &Directions) -> Option<Self> {
         let n = system.dofs();
         // M = L Lᵀ; in q = Lᵀ x the mass matrix is the identity
         let mass = system.structure().mass();
@@ -58,19 +67,93 @@ impl ComplexModes {
             shape,
             left,
             free,
+            structure: system.structure().clone(),
+            directions: directions.clone(),
         })
+    }
+
+    fn receptance_at(&self, s: Complex64, omega: f64) -> DMatrix<Complex64> {
+        let q = self.directions.len();
+        let mut sum = DMatrix::from_element(q, q, ZERO);
+        for (m, &lambda) in self.lambda.iter().enumerate() {
+            let (up, down) = partial_fractions(s, lambda, omega);
+            for b in 0..q {
+                for a in 0..q {
+                    let product = self.shape_along[(a, m)] * self.left_along[(m, b)];
+                    sum[(a, b)] += (product * up + product.conj() * down) * 0.5;
+                }
+            }
+        }
+        let free = rigid_body_fraction(s, omega);
+        for r in 0..self.free_along.nrows() {
+            for b in 0..q {
+                for a in 0..q {
+                    sum[(a, b)] += self.free_along[(r, a)] * self.free_along[(r, b)] * free;
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl HarmonicDynamics for ComplexModes {
+    fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
+        Ok(self.receptance_at(rate(harmonic, omega), omega))
+    }
+
+    fn respond(
+        &self,
+        harmonic: usize,
+        omega: f64,
+        force: &DVector<Complex64>,
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
+        let (s, n) = (rate(harmonic, omega), force.len());
+        let mut x = DVector::from_element(n, ZERO);
+        for (m, &lambda) in self.lambda.iter().enumerate() {
+            let (up, down) = partial_fractions(s, lambda, omega);
+            let (mut one, mut two) = (ZERO, ZERO);
+            for i in 0..n {
+                one += self.left[(m, i)] * force[i];
+                two += self.left[(m, i)].conj() * force[i];
+            }
+            let (one, two) = (one * up * 0.5, two * down * 0.5);
+            for i in 0..n {
+                x[i] += self.shape[(i, m)] * one + self.shape[(i, m)].conj() * two;
+            }
+        }
+        let free = rigid_body_fraction(s, omega);
+        for r in 0..self.free.ncols() {
+            let push: Complex64 = (0..n).map(|i| force[i] * self.free[(i, r)]).sum::<Complex64>() * free;
+            for i in 0..n {
+                x[i] += push * self.free[(i, r)];
+            }
+        }
+        Ok(x)
+    }
+
+    /// Not from modes: for damped free motions, their rounding acts as a stiffness.
+    fn static_receptances(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+        FactoredDynamics::new(&self.structure, &self.directions).static_receptances(omega)
+    }
+
+    fn direct_receptances(&self, rate: f64, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+        Ok(diagonal(&self.receptance_at(Complex64::new(rate, 0.0), omega)))
+    }
+
+    fn natural_frequencies(&self) -> Vec<f64> {
+        self.lambda.iter().map(|lambda| lambda.im.abs()).collect()
     }
 }
 
 /// Returns `1/(s - λ)` and `1/(s - λ*)`, limited near a pole.
-pub(crate) fn partial_fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
+fn partial_fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64, Complex64) {
     let hold = REGULARIZING_FREQUENCY * REGULARIZING_FREQUENCY * omega;
     let one = |d: Complex64| if d.norm() < hold { Complex64::new(1.0 / hold, 0.0) } else { 1.0 / d };
     (one(s - lambda), one(s - lambda.conj()))
 }
 
 /// Returns `1/s²`; at rest, the value with the soft spring.
-pub(crate) fn rigid_body_fraction(s: Complex64, omega: f64) -> Complex64 {
+pub(super) fn rigid_body_fraction(s: Complex64, omega: f64) -> Complex64 {
     if s == ZERO { Complex64::new((REGULARIZING_FREQUENCY * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
 }
 
@@ -80,7 +163,7 @@ mod tests {
     use crate::method::{Method, harmonic_balance::HarmonicBalance};
     use crate::model::{Axis, System};
     use crate::structure::Structure;
-    use nalgebra::{DVector, dmatrix, dvector};
+    use nalgebra::{dmatrix, dvector};
 
     /// A combination of three places has almost no mass, as after a rigid link with rounding.
     /// The response is that of the dynamic stiffness. By the modal sum it was up to 14 times as

@@ -1,9 +1,11 @@
 //! Dynamic stiffness of a tuned ring in travelling waves, from one sector.
 
+use super::factored::FactoredStiffness;
+use super::harmonic_dynamics::{Directions, HarmonicDynamics, diagonal, rate};
 use super::uncoupled_modes::UndampedResonance;
 use crate::method::harmonic_balance::equations::regularization::regularizing_stiffness;
 use crate::model::CyclicSymmetry;
-use crate::structure::{DynamicStiffness, RingSector, Structure, WaveStiffness, unit_root};
+use crate::structure::{RingSector, Structure, WaveStiffness, unit_root};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -11,27 +13,19 @@ use std::sync::Arc;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Factored dynamic stiffness at a complex rate (1/s), for an excitation frequency (rad/s). It
-/// is singular at a resonance without damping.
-#[derive(Debug, Clone)]
-pub(crate) struct FactoredStiffness<F = DynamicStiffness> {
-    pub rate: Complex64,
-    pub omega: f64,
-    pub factor: Result<Arc<F>, UndampedResonance>,
-}
-
 /// Waves on a ring, with the factors of the present excitation frequency.
 #[derive(Debug, Clone)]
-pub(crate) struct TravellingWaves {
+pub(super) struct TravellingWaves {
     pub cyclic: CyclicSymmetry,
     pub sector: Arc<RingSector>,
+    directions: Directions,
     factors: RefCell<Vec<(usize, FactoredStiffness<WaveStiffness>)>>,
 }
 
 impl TravellingWaves {
-    pub fn new(structure: &Structure, cyclic: CyclicSymmetry) -> Option<Self> {
+    pub fn new(structure: &Structure, cyclic: CyclicSymmetry, directions: &Directions) -> Option<Self> {
         let sector = structure.ring_sector(cyclic.sectors)?;
-        Some(TravellingWaves { cyclic, sector, factors: RefCell::default() })
+        Some(TravellingWaves { cyclic, sector, directions: directions.clone(), factors: RefCell::default() })
     }
 
     /// Replaces complex forces on the first sector by its displacements in a wave, column by
@@ -63,10 +57,10 @@ impl TravellingWaves {
 
     /// Returns `Wᴴ` in a wave, n × q: the forces on the first sector under unit forces along
     /// the axes of its joints. Rows of neighbouring sectors enter with their phase.
-    fn columns(&self, diameter: usize, directions: &[Vec<(usize, f64)>]) -> DMatrix<Complex64> {
+    fn columns(&self, diameter: usize) -> DMatrix<Complex64> {
         let n = self.sector.dofs();
-        let mut columns = DMatrix::from_element(n, directions.len(), ZERO);
-        for (q, rows) in directions.iter().enumerate() {
+        let mut columns = DMatrix::from_element(n, self.directions.len(), ZERO);
+        for (q, rows) in self.directions.iter().enumerate() {
             rows.iter().for_each(|&(i, w)| columns[(i % n, q)] += self.phase(diameter, i / n).conj() * w);
         }
         columns
@@ -78,47 +72,47 @@ impl TravellingWaves {
     }
 
     /// Returns the receptance of the axes in a wave, q × q.
-    pub fn receptance(
-        &self,
-        diameter: usize,
-        at: (Complex64, f64),
-        directions: &[Vec<(usize, f64)>],
-    ) -> Result<DMatrix<Complex64>, UndampedResonance> {
-        let columns = self.columns(diameter, directions);
+    fn wave_receptance(&self, diameter: usize, at: (Complex64, f64)) -> Result<DMatrix<Complex64>, UndampedResonance> {
+        let columns = self.columns(diameter);
         let mut moved = columns.clone();
         self.solve(diameter, at, moved.as_mut_slice())?;
         Ok(columns.adjoint() * moved)
     }
+}
 
-    /// Returns the displacement along each axis under a unit force along that axis alone,
-    /// without forces on the other sectors, at a real rate. It is the mean over all waves.
-    pub fn diagonal_receptance(
+impl HarmonicDynamics for TravellingWaves {
+    fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
+        self.wave_receptance(self.cyclic.diameter(harmonic), (rate(harmonic, omega), omega))
+    }
+
+    fn respond(
         &self,
-        (rate, omega): (f64, f64),
-        directions: &[Vec<(usize, f64)>],
-    ) -> Result<Vec<f64>, UndampedResonance> {
+        harmonic: usize,
+        omega: f64,
+        force: &DVector<Complex64>,
+    ) -> Result<DVector<Complex64>, UndampedResonance> {
+        let (n, diameter) = (self.sector.dofs(), self.cyclic.diameter(harmonic));
+        let mut one = force.as_slice()[..n].to_vec();
+        self.solve(diameter, (rate(harmonic, omega), omega), &mut one)?;
+        let phases: Vec<Complex64> = (0..self.cyclic.sectors).map(|k| self.phase(diameter, k)).collect();
+        Ok(DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n]))
+    }
+
+    /// With the same force on all sectors.
+    fn static_receptances(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+        Ok(diagonal(&self.wave_receptance(0, (ZERO, omega))?))
+    }
+
+    /// Without forces on the other sectors: the mean over all waves.
+    fn direct_receptances(&self, rate: f64, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
         let sectors = self.cyclic.sectors;
-        let mut own = vec![0.0; directions.len()];
+        let mut own = vec![0.0; self.directions.len()];
         for diameter in 0..=sectors / 2 {
             // a wave and its reverse have the same stiffness
             let both = if (2 * diameter).is_multiple_of(sectors) { 1.0 } else { 2.0 };
-            let receptance = self.receptance(diameter, (Complex64::new(rate, 0.0), omega), directions)?;
+            let receptance = self.wave_receptance(diameter, (Complex64::new(rate, 0.0), omega))?;
             own.iter_mut().enumerate().for_each(|(q, own)| *own += both * receptance[(q, q)].re / sectors as f64);
         }
         Ok(own)
-    }
-
-    /// Returns the displacements of the ring under forces that travel around it.
-    pub fn respond(
-        &self,
-        diameter: usize,
-        at: (Complex64, f64),
-        force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, UndampedResonance> {
-        let n = self.sector.dofs();
-        let mut one = force.as_slice()[..n].to_vec();
-        self.solve(diameter, at, &mut one)?;
-        let phases: Vec<Complex64> = (0..self.cyclic.sectors).map(|k| self.phase(diameter, k)).collect();
-        Ok(DVector::from_fn(force.len(), |i, _| one[i % n] * phases[i / n]))
     }
 }

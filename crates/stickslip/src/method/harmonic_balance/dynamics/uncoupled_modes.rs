@@ -5,6 +5,7 @@
 //! keeps. Φ is real and the same at all frequencies, and no matrix is factored at any
 //! frequency.
 
+use super::harmonic_dynamics::{HarmonicDynamics, diagonal, rate};
 use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::structure::{Structure, UncoupledModes};
 use nalgebra::{DMatrix, DVector};
@@ -75,7 +76,7 @@ impl UncoupledDynamics {
     }
 
     /// Returns the receptance of the axes, p × p.
-    pub fn receptance(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
+    fn receptance_at(&self, s: Complex64, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         let (p, n) = (self.axes, self.modal_coefficients().len());
         let gains = self.modal_receptances(s, omega)?;
         let part = |read: fn(&Complex64) -> f64| {
@@ -115,15 +116,20 @@ impl UncoupledDynamics {
     pub fn physical_displacements(&self, modal: &DVector<f64>) -> DVector<f64> {
         self.modes.shapes.as_ref().map_or_else(|| modal.clone(), |shapes| shapes * modal)
     }
+}
 
-    /// Returns the displacements of all places under the forces `force` on them.
-    pub fn respond(
+impl HarmonicDynamics for UncoupledDynamics {
+    fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
+        self.receptance_at(rate(harmonic, omega), omega)
+    }
+
+    fn respond(
         &self,
-        s: Complex64,
+        harmonic: usize,
         omega: f64,
         force: &DVector<Complex64>,
     ) -> Result<DVector<Complex64>, UndampedResonance> {
-        let gains = self.modal_receptances(s, omega)?;
+        let gains = self.modal_receptances(rate(harmonic, omega), omega)?;
         let Some(shapes) = &self.modes.shapes else {
             return Ok(DVector::from_iterator(force.len(), force.iter().zip(&gains).map(|(f, g)| f * g)));
         };
@@ -133,6 +139,23 @@ impl UncoupledDynamics {
             gains.iter().zip(re.iter().zip(im.iter())).map(|(g, (re, im))| g * Complex64::new(*re, *im)).collect();
         let part = |read: fn(&Complex64) -> f64| shapes * DVector::from_iterator(moved.len(), moved.iter().map(read));
         Ok(part(|z| z.re).zip_map(&part(|z| z.im), Complex64::new))
+    }
+
+    fn static_receptances(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+        let own = self.diagonal_receptance(&self.modal_receptances(ZERO, omega)?);
+        Ok(own.iter().map(|r| r.norm()).collect())
+    }
+
+    fn direct_receptances(&self, rate: f64, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
+        Ok(diagonal(&self.receptance_at(Complex64::new(rate, 0.0), omega)?))
+    }
+
+    fn natural_frequencies(&self) -> Vec<f64> {
+        let frequency = |[mass, damping, stiffness]: &[f64; 3]| {
+            let decay = 0.5 * damping / mass;
+            (stiffness / mass - decay * decay).max(0.0).sqrt()
+        };
+        self.modal_coefficients().iter().filter(|[mass, ..]| *mass > 0.0).map(frequency).collect()
     }
 }
 
@@ -165,16 +188,16 @@ mod tests {
         let modes = UncoupledDynamics::new(&structure, &directions).unwrap();
         // later callers get the same modes
         assert!(Arc::ptr_eq(&modes.modes, structure.clone().uncoupled().unwrap()));
-        for (s, omega) in
-            [(Complex64::new(0.0, 0.8), 0.8), (Complex64::new(0.0, 2.4), 0.8), (Complex64::new(1.5, 0.0), 0.8)]
-        {
-            let receptance = modes.receptance(s, omega).unwrap();
+        let omega = 0.8;
+        for harmonic in [1, 3] {
+            let s = rate(harmonic, omega);
+            let receptance = modes.receptance(harmonic, omega).unwrap();
             let gains = modes.modal_receptances(s, omega).unwrap();
             let own = modes.diagonal_receptance(&gains);
             for (b, direction) in directions.iter().enumerate() {
                 let mut x = DVector::from_element(n, ZERO);
                 direction.iter().for_each(|&(i, w)| x[i] += Complex64::new(w, 0.0));
-                let answer = modes.respond(s, omega, &x).unwrap();
+                let answer = modes.respond(harmonic, omega, &x).unwrap();
                 structure.dynamic_stiffness(s).unwrap().solve(x.as_mut_slice());
                 let size = x.iter().map(|x| x.norm()).fold(0.0, f64::max);
                 assert!(x.iter().zip(answer.iter()).all(|(x, a)| (x - a).norm() < 1e-9 * size), "{s}: {x} {answer}");
