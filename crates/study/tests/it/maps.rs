@@ -119,6 +119,22 @@ fn figures_show_values_without_a_peak() {
     assert!(data.figure.panels[0].title.contains("2 empty tiles without a peak"), "{}", data.figure.panels[0].title);
 }
 
+/// Cells of a series that is too short for its tolerance have triangles.
+#[test]
+fn inexact_cells_have_triangles() {
+    let method = "[method]\nkind = \"harmonic-balance\"\nharmonics = 3\ntolerance = 1e-9";
+    let study = format!(
+        "kind = \"map\"\n{RANGE}\nover = {{ Ft = {{ from = \"0.2 N\", to = \"20 N\", points = 2 }}, \
+         kt = {{ from = \"0.5 N/m\", to = \"1 N/m\", points = 2 }} }}\n{method}"
+    );
+    let figure = dataset(&study).figure;
+    let marked: Vec<_> = figure.panels[0].series.iter().filter(|series| series.style == Style::Warning).collect();
+    let [triangles] = &marked[..] else { panic!("{marked:?}") };
+    // the joint of 20 N sticks, and one harmonic is exact
+    assert_eq!((&triangles.x[..], &triangles.y[..]), (&[0.2, 0.2][..], &[0.5, 1.0][..]));
+    assert_eq!(triangles.label, "points: 2 less exact than requested");
+}
+
 /// A range of `vary` may have equal ratios. The peaks are those of the same list.
 #[test]
 fn varied_ranges_may_be_logarithmic() {

@@ -74,6 +74,46 @@ references = true
     );
 }
 
+/// A damper that only its joint holds has no reference with free joints, and a note says why.
+#[test]
+fn a_missing_reference_is_explained() {
+    let text = r#"
+schema = 1
+[[mass]]
+name = "blade"
+mass = "1 kg"
+[[mass]]
+name = "damper"
+mass = "0.1 kg"
+[[spring]]
+between = ["blade", "ground"]
+stiffness = "100 N/mm"
+damping = "5 kg/s"
+[[joint]]
+name = "face"
+between = ["damper", "blade"]
+law = { kind = "jenkins", stiffness = "50 N/mm", limit = "1 N" }
+[[force]]
+on = "damper"
+amplitude = "0.3 N"
+harmonic = 0
+[[force]]
+on = "blade"
+amplitude = "10 mN"
+[study]
+kind = "response"
+frequency = { from = "40 Hz", to = "60 Hz", points = 5 }
+[figure]
+references = true
+"#;
+    let found = run(&read_study("damper.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
+    let expected =
+        "there is no reference curve with all joints free: its joints alone hold some motion of the structure";
+    assert!(found.notes.iter().any(|note| note == expected), "{:?}", found.notes);
+    assert!(numbers(&found, "references", "blade_free_amplitude_m").iter().all(|value| value.is_nan()));
+    assert!(numbers(&found, "references", "blade_stuck_amplitude_m").iter().all(|value| *value > 0.0));
+}
+
 /// Three forces have three pairs of linear references, each in the colour of its case; three
 /// limits have one pair.
 #[test]

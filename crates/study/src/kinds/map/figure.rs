@@ -4,6 +4,7 @@ use super::MAP;
 use super::contours::{Grid, levels};
 use crate::case::study::VariedValue;
 use crate::compile::compiled::RangeScale;
+use crate::kinds::shared::points_to_doubt::PointsToDoubt;
 use crate::results::columns::{AMPLITUDE, AT_RANGE_END};
 use crate::results::dataset::{Axis, Emphasis, Figure, Panel, Scale, Series, Table};
 use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, evenly_chosen, join_title, largest, numbers};
@@ -30,7 +31,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
             let axis = axis.with_range(points[0], points[points.len() - 1]);
             if axes[which].1 == Some(RangeScale::Log) { axis.log() } else { axis }
         };
-        Some(panel(&grid, map.lowest(&grid), [axis(0, &grid.x), axis(1, &grid.y)], label, &peak.unit))
+        Some(panel(&grid, map.marks(&grid), [axis(0, &grid.x), axis(1, &grid.y)], label, &peak.unit))
     });
     let mut panels: Vec<Panel> = panels.collect();
     if maps.len() > panels.len()
@@ -70,6 +71,20 @@ impl Map<'_> {
         (x.len() > 1 && y.len() > 1).then_some(Grid { x, y, values })
     }
 
+    /// Returns triangles at peaks to doubt, and a mark at the lowest peak.
+    fn marks(&self, grid: &Grid) -> Vec<Series> {
+        let to_doubt = PointsToDoubt::of(self.table);
+        let rows = to_doubt.rows.range(self.rows.rows.clone()).map(|row| row - self.rows.rows.start);
+        let cells = rows.map(|row| (row / self.columns, row % self.columns));
+        let (x, y): (Vec<f64>, Vec<f64>) = cells
+            .filter(|(column, row)| grid.values[*row][*column].is_finite())
+            .map(|(column, row)| (grid.x[column], grid.y[row]))
+            .unzip();
+        let doubtful = (!x.is_empty()).then(|| Series::warning(to_doubt.label, x, y, 1));
+        let lowest = self.lowest(grid).map(|[x, y]| Series::marks("lowest peak of the grid", vec![x], vec![y], 1));
+        doubtful.into_iter().chain(lowest).collect()
+    }
+
     /// Returns the values of both parameters at the lowest peak. Largest amplitudes at an end of
     /// the frequency range may not be peaks and do not count.
     fn lowest(&self, grid: &Grid) -> Option<[f64; 2]> {
@@ -90,7 +105,7 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.12e}").parse().unwrap_or(value)
 }
 
-fn panel(grid: &Grid, lowest: Option<[f64; 2]>, [x, y]: [Axis; 2], label: String, unit: &str) -> Panel {
+fn panel(grid: &Grid, marks: Vec<Series>, [x, y]: [Axis; 2], label: String, unit: &str) -> Panel {
     let edges = edges(&grid.y, y.scale);
     let mut series: Vec<Series> = grid
         .values
@@ -110,9 +125,7 @@ fn panel(grid: &Grid, lowest: Option<[f64; 2]>, [x, y]: [Axis; 2], label: String
     if failed > 0 {
         title = join_title([title, format!("{failed} empty tile{} without a peak", plural_suffix(failed))]);
     }
-    if let Some([x, y]) = lowest {
-        series.push(Series::marks("lowest peak of the grid", vec![x], vec![y], 1));
-    }
+    series.extend(marks);
     Panel { title, x, y, series, ..Panel::default() }
 }
 

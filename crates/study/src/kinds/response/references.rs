@@ -71,9 +71,17 @@ pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, 
         let model = reference.model(&prepared.case.model).ok()?;
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
-            Ok(omegas.iter().map(|omega| solver.orbit(*omega).ok().map(amplitudes)).collect())
+            Ok(omegas.iter().map(|omega| solver.orbit(*omega).map(amplitudes)).collect::<Vec<_>>())
         });
-        found.map_err(|why| absent.push(format!("{WARNING}{}", reference.no_reference(&why)))).ok()
+        let orbits = found.map_err(|why| absent.push(format!("{WARNING}{}", reference.no_reference(&why)))).ok()?;
+        if let (true, Some(Err(error))) = (orbits.iter().all(Result::is_err), orbits.first()) {
+            absent.push(match reference {
+                // a linear structure that no spring holds; usual for a damper
+                LinearReference::Free => reference.no_reference("its joints alone hold some motion of the structure"),
+                LinearReference::Stuck => format!("{WARNING}{}", reference.no_reference(&error.to_string())),
+            });
+        }
+        Some(orbits.into_iter().map(Result::ok).collect())
     };
     let curves = LinearReference::ALL.map(|reference| (reference.name(), follow(reference)));
     let mut rows = TableBuilder::for_linear_motions();

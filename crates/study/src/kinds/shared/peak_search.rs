@@ -17,6 +17,9 @@ use stickslip::orbit::Accuracy;
 /// Name of the column with the number of orbits on the frequency grid that were not found.
 pub(in crate::kinds) const FAILED: &str = "failed_orbits";
 
+/// Status of a peak for which orbits on the frequency grid are missing.
+pub(in crate::kinds) const SOME_FAILED: &str = "some-failed";
+
 /// Smallest number of parameter values, and of frequencies, that form a curve.
 pub(in crate::kinds) const FEWEST_VALUES: usize = 3;
 
@@ -77,7 +80,7 @@ pub(in crate::kinds) fn write(prepared: &PreparedCase, row: &PerformanceRow, row
 /// Returns the status of the orbits that support a peak.
 pub(in crate::kinds) fn status(row: &PerformanceRow) -> &'static str {
     match (row.failed > 0 || row.peak.is_none(), row.inaccurate) {
-        (true, _) => "some-failed",
+        (true, _) => SOME_FAILED,
         (false, 0) => CONVERGED,
         (false, _) => Accuracy::Truncated.status(),
     }
