@@ -183,7 +183,7 @@ async function start() {
     const answer = await api.catalog();
     entries = answer.entries;
     const wanted = decodeURIComponent(location.hash.slice(1)) || answer.first;
-    if (wanted) { await choose(wanted); restore(); } else { gallery.show(entries); }
+    if (wanted) { await choose(wanted); restore(); tell("restore"); } else { gallery.show(entries); }
   } catch (error) {
     offline(error);
   }

@@ -8,7 +8,7 @@ import { colour, drawOwn } from "./plot.js";
 import { changeList, on, state, tell } from "./store.js";
 
 let tile, menu, deviation, disks, button, words, place;
-/** Amplification of each disk, and its largest blade. @type {{values: number[], blades: string[], all: number} | null} */
+/** Amplification of each disk, its largest blade, and whether a peak may be outside the range. @type {{values: number[], blades: string[], ends: boolean[], all: number} | null} */
 let found = null;
 const PURPOSE = "No two blades are equal. How much higher is the largest peak of a disk than that of the tuned disk?";
 /** The changes to which the result belongs. */
@@ -28,7 +28,11 @@ export function start(body) {
   body.append(tile);
   on("opened", () => { stop("mistuning"); found = null; words.textContent = PURPOSE; place.hidden = true; menu.replaceChildren(); });
   on("theme", show);
-  on("changed", () => { place.classList.toggle("stale", found !== null && basis !== JSON.stringify(changeList())); });
+  on("changed", () => {
+    const old = found !== null && basis !== JSON.stringify(changeList());
+    place.classList.toggle("stale", old);
+    if (!running && found) { words.textContent = `${old ? "Computed for former values: " : ""}${sentence()}`; }
+  });
 }
 
 /** Shows the fields for a disk. */
@@ -74,7 +78,7 @@ async function compute() {
 /** @param {any} event @param {number} all */
 function take(event, all) {
   const column = (/** @type {string} */ name) => event.tables.amplification?.find((/** @type {any} */ one) => one.name === name)?.values ?? [];
-  found = { values: column("amplification"), blades: column("mass"), all };
+  found = { values: column("amplification"), blades: column("mass"), ends: column("at_range_end"), all };
   if (event.event === "partial") { words.textContent = `${found.values.length} of ${all} disks. ${sentence()}`; }
   show();
 }
@@ -82,10 +86,12 @@ function take(event, all) {
 /** The worst disk and the spread, in words. */
 function sentence() {
   if (!found || found.values.length === 0) { return ""; }
-  const { values, blades } = found;
+  const { values, blades, ends } = found;
   const worst = values.indexOf(Math.max(...values));
   const sorted = [...values].sort((a, b) => a - b);
-  return `Worst of ${values.length} disks: seed ${worst + 1}, where ${blades[worst]} has ${digits(values[worst], 4)} times the peak of the tuned disk. Half of the disks are above ${digits(sorted[Math.floor(sorted.length / 2)], 4)}.`;
+  const outside = ends.filter((end) => end).length;
+  const range = outside > 0 ? ` In ${outside} of them the largest amplitude is at an end of the frequency range, so that these ratios are not those of peaks: widen the range.` : "";
+  return `Worst of ${values.length} disks: seed ${worst + 1}, where ${blades[worst]} has ${digits(values[worst], 4)} times the peak of the tuned disk. Half of the disks are above ${digits(sorted[Math.floor(sorted.length / 2)], 4)}.${range}`;
 }
 
 function show() {

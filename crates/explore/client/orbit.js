@@ -15,6 +15,8 @@ const plots = {};
 let orbit = null;
 let visible = false;
 let wanted = "";
+/** Largest number of places, and of joint directions, in the plots. */
+const MOST = 8;
 /** True once the structure of this study was shown in motion: then an orbit has the displacements of all nodes. */
 let inMotion = false;
 
@@ -38,7 +40,7 @@ export function start(place) {
     plots[name] = name === "words" ? make("ul", { id: "orbit-words" }) : make("div", { class: "plot", id: `orbit-${name}` });
     grid.append(make("section", { class: `tile ${size}`, "aria-label": title }, make("h2", { text: title }), plots[name],
       name === "time" ? make("p", { class: "hint", text: "Shading: a joint sticks (blue) or is open (pink); it slips where there is none. Several joints have one strip each." }) : null,
-      name === "time" ? make("p", { class: "hint", id: "first-sector", hidden: true, text: "The plots show the first sector of the tuned disk; the others do the same, one after the other." }) : null));
+      name === "time" ? make("p", { class: "hint", id: "left-out", hidden: true }) : null));
   }
   on("opened", () => { orbit = null; wanted = ""; inMotion = false; grid.hidden = true; status.textContent = ""; });
   on("marker", () => { follow(); });
@@ -164,8 +166,15 @@ function read(event) {
   // the sectors of a tuned disk move alike, one after the other: the plots have the first one
   const tuned = state.description.model?.ring?.equal === true;
   const inFirst = (/** @type {string} */ name) => !tuned || !/_\d+(\.|$)/.test(name) || /_0(\.|$)/.test(name);
+  const range = (/** @type {string} */ column) => columns.get(column).reduce((/** @type {number[]} */ [low, high], /** @type {number} */ value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+  const most = (/** @type {string[]} */ names, /** @type {string} */ end) => {
+    const size = new Map(names.map((name) => { const [low, high] = range(name + end); return [name, high - low]; }));
+    const least = [...size.values()].sort((a, b) => b - a)[MOST - 1] ?? 0;
+    return names.filter((name) => /** @type {number} */ (size.get(name)) >= least).slice(0, MOST);
+  };
+  const shown = { joints: joints.filter(inFirst), labels: most(labels.filter(inFirst), "_force_N"), places: most(places.filter(inFirst), "_displacement_m") };
   return {
-    event, columns, first, joints, labels, places, tuned, shown: { joints: joints.filter(inFirst), labels: labels.filter(inFirst), places: places.filter(inFirst) }, time: columns.get("time_s"),
+    event, columns, first, joints, labels, places, tuned, shown, time: columns.get("time_s"),
     multipliers: event.tables.multipliers ?? null,
   };
 }
@@ -177,9 +186,18 @@ function show() {
   spectrum();
   energy();
   multipliers();
-  const note = grid.querySelector("#first-sector");
-  note.hidden = !orbit.tuned;
+  const note = grid.querySelector("#left-out");
+  note.hidden = orbit.shown.places.length === orbit.places.length && orbit.shown.labels.length === orbit.labels.length;
+  note.textContent = leftOut();
   plots.words.replaceChildren(...words().map((text) => make("li", { text })));
+}
+
+/** The places and joints that the plots leave out, in words. */
+function leftOut() {
+  if (orbit.tuned) { return "The plots show the first sector of the tuned disk; the others do the same, one after the other."; }
+  const counts = [[orbit.shown.places, orbit.places, "places that move most"], [orbit.shown.labels, orbit.labels, "joint directions with the largest change of force"]];
+  const less = counts.filter(([shown, all]) => shown.length < all.length).map(([shown, all, text]) => `the ${shown.length} of ${all.length} ${text}`);
+  return `The plots show ${less.join(" and ")}.`;
 }
 
 /** Values with one prefix for all. @param {string[]} names @param {string} end @param {string} unit */

@@ -3,10 +3,10 @@
 
 import { describe, run } from "./api.js";
 import { byId, download, make, message } from "./dom.js";
-import { peaks } from "./pins.js";
+import { height, nameOf, peaks } from "./pins.js";
 import { picture } from "./plot.js";
 import { pinned } from "./response.js";
-import { digits, si } from "./format.js";
+import { digits } from "./format.js";
 import { changeList, state, tell } from "./store.js";
 
 export function start() {
@@ -20,6 +20,9 @@ export function start() {
     byId("save").open = false;
     try { await action(); } catch (error) { tell("offline", error); }
   } })));
+  byId("save").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    if (event.key === "Escape") { byId("save").open = false; byId("save").querySelector("summary").focus(); }
+  });
   document.addEventListener("click", (event) => { if (!byId("save").contains(/** @type {Node} */ (event.target))) { byId("save").open = false; } });
 }
 
@@ -75,9 +78,9 @@ async function saveReport() {
   const figures = pins.map((/** @type {any} */ pin) => ({ data: pin.result.plot.data.map((/** @type {any} */ trace) => ({ ...trace, type: trace.type === "scattergl" ? "scatter" : trace.type })), layout: { ...pin.result.plot.wide, showlegend: true, legend: { orientation: "h" } } }));
   const data = JSON.stringify(figures).replaceAll("<", "\\u003c").replaceAll("\u2028", "\\u2028").replaceAll("\u2029", "\\u2029");
   const sections = pins.map((/** @type {any} */ pin, /** @type {number} */ i) => {
-    const rows = peaks(pin.result).map((/** @type {any} */ peak) => `<tr><td>${escape(peak.case)}</td><td>${escape(peak.mass)}</td><td>${digits(peak.frequency, 6)}</td><td>${si(peak.amplitude, "m")}</td></tr>`).join("");
+    const rows = peaks(pin.result).map((/** @type {any} */ peak) => `<tr><td>${escape(peak.case)}</td><td>${escape(peak.mass)}</td><td>${digits(peak.frequency, 6)}</td><td>${escape(height(peak))}</td></tr>`).join("");
     const notes = pin.result.notes.map((/** @type {string} */ note) => `<li>${escape(note)}</li>`).join("");
-    return `<section><h2>${escape(pin.name)}</h2><div id="figure-${i}"></div><table><tr><th>case</th><th>place</th><th>Hz</th><th>peak</th></tr>${rows}</table><ul>${notes}</ul></section>`;
+    return `<section><h2>${escape(pin.name)}</h2><p>Changed values: ${escape(pin.changes.length > 0 ? nameOf(pin.changes) : "none")}</p><div id="figure-${i}"></div><table><tr><th>case</th><th>place</th><th>Hz</th><th>peak</th></tr>${rows}</table><ul>${notes}</ul></section>`;
   }).join("\n");
   const study = escape(await studyText());
   const page = `<!doctype html><html lang="en"><head><meta charset="utf-8"><title>${escape(state.description.title)}</title>

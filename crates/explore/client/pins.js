@@ -16,8 +16,23 @@ export function start(place) {
   on("pin", pin);
   on("opened", show);
   on("pins", show);
+  on("pins", keep);
+  on("restore", restore);
   on("result", () => { if (visible) { show(); } });
   on("tab", (/** @type {string} */ name) => { visible = name === "compare"; if (visible) { show(); } });
+}
+
+const storageKey = () => `pins:${state.study}`;
+
+/** Keeps the pins for a reload of this tab, if they fit in its storage. */
+function keep() {
+  try { sessionStorage.setItem(storageKey(), JSON.stringify(state.pins)); } catch { sessionStorage.removeItem(storageKey()); }
+}
+
+/** Takes the pins of this tab before its reload. */
+function restore() {
+  const kept = sessionStorage.getItem(storageKey());
+  if (kept) { state.pins = JSON.parse(kept); tell("pins"); }
 }
 
 /** The key of changes, whatever their order. @param {any[]} changes */
@@ -40,8 +55,8 @@ function pin() {
   tell("pins");
 }
 
-/** @param {any[]} changes */
-const nameOf = (changes) => changes.map(words).filter((text) => text !== "").join(", ") || "as in the file";
+/** Changes in words. @param {any[]} changes */
+export const nameOf = (changes) => changes.map(words).filter((text) => text !== "").join(", ") || "as in the file";
 
 /** @param {any} change */
 function words(change) {
@@ -62,11 +77,11 @@ export function peaks(result) {
   const table = result.tables.peaks ?? result.tables.optimum;
   if (!table) { return []; }
   const column = (/** @type {string} */ name) => table.find((/** @type {any} */ one) => one.name === name)?.values;
-  const [frequency, amplitude, mass] = [column("frequency_Hz"), column("amplitude_m"), column("mass") ?? column("place")];
+  const [frequency, amplitude, mass, status] = [column("frequency_Hz"), column("amplitude_m"), column("mass") ?? column("place"), column("status")];
   const end = table.findIndex((/** @type {any} */ one) => ["mass", "place", "frequency_Hz"].includes(one.name));
   return (amplitude ?? []).map((/** @type {number} */ value, /** @type {number} */ row) => ({
     case: table.slice(0, Math.max(0, end)).map((/** @type {any} */ one) => `${one.name.replace(/_[^_]*$/, "")} = ${digits(one.values[row], 4)} ${one.unit ?? ""}`.trim()).join(", "),
-    mass: mass?.[row] ?? "", frequency: frequency?.[row] ?? null, amplitude: value,
+    mass: mass?.[row] ?? "", frequency: frequency?.[row] ?? null, amplitude: value, doubt: ["converged", undefined].includes(status?.[row]) ? "" : status[row],
   }));
 }
 
@@ -94,9 +109,12 @@ function summary(all, isCase) {
   return make("div", { class: "scroll" }, make("table", { id: "pin-summary" }, make("caption", { text: "Highest peak of each pin" }),
     make("thead", {}, header(["Pin", ...numbers, "Place", isCase && "Case"], numbers)),
     make("tbody", {}, ...all.map((one, row) => make("tr", {}, make("th", { scope: "row", text: one.name }),
-      make("td", { class: "number", text: best[row] ? si(best[row].amplitude, "m", 4) : "–" }), make("td", { class: "number", text: change(best[row]) }),
+      make("td", { class: "number", text: best[row] ? height(best[row]) : "–" }), make("td", { class: "number", text: change(best[row]) }),
       make("td", { class: "number", text: best[row]?.frequency ? digits(best[row].frequency, 6) : "" }), make("td", { text: best[row]?.mass ?? "" }), isCase ? make("td", { text: best[row]?.case ?? "" }) : null)))));
 }
+
+/** A peak in words, with its status if that is not `converged`. @param {any} peak */
+export const height = (peak) => `${si(peak.amplitude, "m", 4)}${peak.doubt ? ` (${peak.doubt})` : ""}`;
 
 /** The highest peak of every place in every case. @param {any[]} list */
 function highest(list) {
@@ -121,5 +139,5 @@ function rows(one, isCase) {
   return shown.slice(0, MOST).map((/** @type {any} */ peak, /** @type {number} */ row) => make("tr", {},
     make("td", {}, row === 0 ? name : ""), isCase ? make("td", { text: peak.case }) : null,
     make("td", { text: peak.mass }), make("td", { class: "number", text: peak.frequency === null ? "" : digits(peak.frequency, 6) }),
-    make("td", { class: "number", text: peak.amplitude === null ? "" : si(peak.amplitude, "m", 4) }), make("td", {}, row === 0 ? action : "")));
+    make("td", { class: "number", text: peak.amplitude === null ? "" : height(peak) }), make("td", {}, row === 0 ? action : "")));
 }

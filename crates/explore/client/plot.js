@@ -94,7 +94,7 @@ function figure(plot, { behind, wide, dark }) {
     const lines = tinted(other.plot.data, other.plot.dark, dark).filter((/** @type {any} */ trace) => trace.mode === "lines" && !REFERENCE.test(trace.legendgroup ?? ""));
     return lines.flatMap((/** @type {any} */ trace) => panelsFor(other.plot, plot, panelOf(trace)).map((/** @type {number} */ panel) => {
       const title = other.plot.axes[panelOf(trace)].title;
-      const owner = [other.name, title].filter((part) => part).join(", ");
+      const owner = escaped([other.name, title].filter((part) => part).join(", "));
       const name = other.name && trace.hovertemplate ? { hovertemplate: trace.hovertemplate.replace("<extra>", `<extra>${owner}: `) } : { hoverinfo: "skip", hovertemplate: null };
       const line = { ...trace.line, ...(other.dash ? { dash: other.dash } : {}) };
       return { ...plain(moved(trace, other.plot, plot, panel)), ...name, line, opacity: other.opacity, legendgroup: "", owner: other.name, pale: !other.name };
@@ -183,6 +183,9 @@ export function legend(place, plot, target, pins = []) {
   }), ...pins.map(({ name, dash }) => make("span", { class: "pin" }, sample({ mode: "lines", line: { dash } }), name)));
 }
 
+/** A name for plotly.js, which reads marks in it. @param {string} name */
+const escaped = (name) => name.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
+
 /** The text of a name, in which the server has escaped marks. @param {string} name */
 function text(name) {
   return name.replaceAll("&lt;", "<").replaceAll("&gt;", ">").replaceAll("&amp;", "&").replaceAll("\u200b", "");
@@ -202,9 +205,10 @@ function sample(trace) {
   svg.setAttribute("height", "12");
   svg.setAttribute("aria-hidden", "true");
   const marks = trace.mode === "markers";
-  const shape = document.createElementNS(space, marks ? "circle" : trace.fill ? "rect" : "path");
+  const triangle = marks && trace.marker?.symbol === "triangle-up";
+  const shape = document.createElementNS(space, triangle ? "path" : marks ? "circle" : trace.fill ? "rect" : "path");
   const colour = (marks ? trace.marker?.line?.color ?? trace.marker?.color : trace.line?.color) ?? trace.marker?.color ?? "currentColor";
-  const set = marks ? { cx: 13, cy: 6, r: 4, fill: "none", stroke: colour, "stroke-width": 2 }
+  const set = triangle ? { d: "M13 1L18 10H8Z", fill: trace.marker.color ?? "none", stroke: colour, "stroke-width": 1.5 } : marks ? { cx: 13, cy: 6, r: 4, fill: "none", stroke: colour, "stroke-width": 2 }
     : trace.fill ? { x: 2, y: 1, width: 22, height: 10, fill: trace.fillcolor ?? colour }
       : { d: "M0 6H26", stroke: colour, "stroke-width": 2, "stroke-dasharray": dashes(trace.line?.dash) };
   for (const [name, value] of Object.entries(set)) { shape.setAttribute(name, String(value)); }
@@ -254,7 +258,7 @@ export async function picture(plot, behind, format, filename) {
   }
   behind.forEach((other) => {
     const first = data.find((/** @type {any} */ trace) => trace.owner === other.name);
-    if (other.name && first) { Object.assign(first, { showlegend: true, name: other.name }); }
+    if (other.name && first) { Object.assign(first, { showlegend: true, name: escaped(other.name) }); }
   });
   await loaded;
   const height = Math.max(layout.height ?? 0, 520) + 60;

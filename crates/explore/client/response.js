@@ -14,6 +14,8 @@ const LIVE = 0.06;
 const REST = 160;
 
 let place, status, button, legendPlace, hint, quantity, panels, logarithmic, empty, fitted;
+/** Scale of the vertical axis, or null as in the file. @type {string | null} */
+let axisScale = null;
 /** Time of the last full run, s, and its number of points. */
 let cost = { seconds: 0, points: 0 };
 /** Points of a curve that take the time of a live answer, as learned from those that moved. */
@@ -37,7 +39,7 @@ export function start(panel) {
     quantity.append(make("option", { value, text }));
   }
   panels = make("select", { id: "panels-of", onchange: () => compute(false) }, ...[["", "as in the file"], ["cases", "per case"], ["masses", "per place"]].map(([value, text]) => make("option", { value, text })));
-  logarithmic = make("input", { type: "checkbox", id: "log", onchange: () => compute(false) });
+  logarithmic = make("input", { type: "checkbox", id: "log", onchange: () => { axisScale = logarithmic.checked ? "log" : "linear"; compute(false); } });
   status = make("span", { class: "state", role: "status" });
   legendPlace = make("div", { class: "legend" });
   place = make("div", { class: "plot", id: "response-plot" });
@@ -57,7 +59,7 @@ export function start(panel) {
     tell("show", "orbit");
   });
   draggable(place, near, perFrame((at, last) => moveMarker(at, last)));
-  on("opened", () => { previous = partial = null; long = false; cost = { seconds: 0, points: 0 }; live = Infinity; quantity.value = panels.value = ""; logarithmic.checked = false; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); place.removeAttribute("aria-busy"); explain("Computing …", null); opened(); compute(false); });
+  on("opened", () => { previous = partial = null; long = false; cost = { seconds: 0, points: 0 }; live = Infinity; quantity.value = panels.value = ""; axisScale = null; place.dataset.revision = state.study; legendPlace.replaceChildren(); fitted.replaceChildren(); place.removeAttribute("aria-busy"); explain("Computing …", null); opened(); compute(false); });
   on("moving", () => compute(true));
   on("changed", () => compute(false));
   on("theme", () => show());
@@ -99,11 +101,12 @@ async function compute(moving, asked = false) {
   const begun = performance.now();
   newest += 1;
   const own = newest;
+  if (asked) { button.hidden = true; }
   movingRun = moving ? own : 0;
   again = false;
   const request = {
     study: state.study, changes: changeList(), wait, quantity: quantity.value || null,
-    view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" && logarithmic.checked ? "log" : null, panels: panels.value || null },
+    view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" ? axisScale : null, panels: panels.value || null },
   };
   let points_done = 0;
   try {
@@ -168,6 +171,7 @@ function take(event, { moving, reduced }, seconds) {
   message();
   empty.hidden = true;
   place.hidden = false;
+  if (axisScale === null) { logarithmic.checked = event.plot.wide.yaxis?.type === "log"; }
   if (!reduced) { cost = { seconds, points: state.description.points }; }
   // the pale curve is the last one at rest
   if (state.result && !state.result.moving) { previous = state.result; }

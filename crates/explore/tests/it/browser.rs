@@ -153,6 +153,35 @@ fn pins_are_compared() {
     browser.evaluate("document.getElementById('pin').click()");
     browser.wait("document.querySelectorAll('#pin-summary tbody tr').length === 1");
     browser.wait("![...document.querySelectorAll('#panel-compare th')].some((title) => title.textContent === 'Case')");
+    // a reload keeps the pins of this tab
+    browser.evaluate("window.before = true; setTimeout(() => location.reload(), 0)");
+    browser.wait("window.before === undefined && document.querySelectorAll('#pin-summary tbody tr').length >= 1");
+    assert!(browser.text("document.querySelector('#pin-summary tbody').textContent").contains("Ft = 6"));
+    browser.check_clean();
+}
+
+/// The checkbox shows the scale of the file, and changes it.
+#[test]
+fn the_scale_of_the_file_can_be_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("log.toml");
+    std::fs::write(
+        &file,
+        "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"1 N/mm\"\n\
+         damping = \"2 kg/s\"\n[[force]]\non = \"m\"\namplitude = \"1 N\"\n[study]\nkind = \"response\"\n\
+         frequency = { from = \"2 Hz\", to = \"8 Hz\", points = 13 }\n[figure]\ny = \"log\"\n",
+    )
+    .unwrap();
+    let Some((_server, mut browser)) = open(Start::File(file)) else { return };
+    let scale = |browser: &mut Browser, name: &str| {
+        browser.wait(&format!("document.querySelector('#response-plot')?.layout?.yaxis?.type === '{name}'"));
+    };
+    browser.wait("document.getElementById('log')?.checked");
+    scale(&mut browser, "log");
+    browser.evaluate("document.getElementById('log').click()");
+    scale(&mut browser, "linear");
+    browser.evaluate("document.getElementById('log').click()");
+    scale(&mut browser, "log");
     browser.check_clean();
 }
 

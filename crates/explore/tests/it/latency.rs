@@ -79,14 +79,14 @@ fn latency_of_a_ring_of_24_blades() {
 }
 
 #[test]
-#[ignore = "takes three minutes"]
+#[ignore = "takes ten minutes"]
 fn latency_memory_while_a_slider_moves() {
     let Some((_server, mut browser)) = open(Start::Template("blade-couple".into())) else { return };
     browser.wait(CURVE);
     let drag = "const moving = document.getElementById('q-parameters-kt-slider'); const end = performance.now() + 30000; let i = 0; \
                 while (performance.now() < end) { i += 1; moving.value = 500 + 300 * Math.sin(i / 40); moving.dispatchEvent(new Event('input')); await new Promise((next) => setTimeout(next, 16)); } \
                 moving.dispatchEvent(new Event('change')); i";
-    for half_minute in 1..=6 {
+    for half_minute in 1..=20 {
         let moves = browser.evaluate(drag);
         eprintln!(
             "after {} s and {moves} more moves: page {:.1} MB, server {} MB",
