@@ -30,7 +30,8 @@ let timer = 0;
 let long = false;
 /** Number of the newest run, and of the one for a moving slider if it has not ended. */
 let newest = 0, movingRun = 0;
-let again = false;
+/** Runs to begin when the one for a moving slider has ended: another one, and the full curve. */
+let again = false, rest = false;
 
 /** @param {any} panel */
 export function start(panel) {
@@ -89,7 +90,8 @@ async function compute(moving, asked = false) {
   // the server expects the time from a few points; nothing is known of a study that never ran
   const wait = !asked && (!moving || cost.points === 0);
   if (moving) {
-    timer = setTimeout(() => compute(false), REST);
+    // the run for the moving slider ends first: its curve comes sooner than the full one
+    timer = setTimeout(() => { if (movingRun) { rest = true; } else { compute(false); } }, REST);
     // one run at a time while the slider moves: the next one takes the newest values
     if (movingRun) { again = true; return; }
   }
@@ -103,7 +105,7 @@ async function compute(moving, asked = false) {
   const own = newest;
   if (asked) { button.hidden = true; }
   movingRun = moving ? own : 0;
-  again = false;
+  again = rest = false;
   const request = {
     study: state.study, changes: changeList(), wait, quantity: quantity.value || null,
     view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" ? axisScale : null, panels: panels.value || null },
@@ -139,7 +141,7 @@ async function compute(moving, asked = false) {
   } finally {
     if (own === newest) {
       movingRun = 0;
-      if (again) { compute(true); }
+      if (again) { compute(true); } else if (rest) { compute(false); }
     }
   }
 }
