@@ -94,6 +94,7 @@ fn latency_memory_while_a_slider_moves() {
                 moving.dispatchEvent(new Event('change')); i";
     for half_minute in 1..=20 {
         let moves = browser.evaluate(drag);
+        browser.forget_events();
         eprintln!(
             "after {} s and {moves} more moves: page {:.1} MB, server {} MB",
             30 * half_minute,

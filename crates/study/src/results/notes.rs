@@ -120,6 +120,9 @@ impl Note {
     /// A sentence about one case or one of its points. `case` is empty if there is only one.
     /// The text begins with [`WARNING`] if it is a warning.
     pub(crate) fn for_case(case: &str, text: impl Into<String>) -> Note {
+        if case.is_empty() {
+            return Note::Sentence(text.into());
+        }
         Note::Cases { cases: 1, named: vec![case.to_owned()], text: text.into() }
     }
 
@@ -423,6 +426,15 @@ fn is_curved(joint: &Joint, motion: &JointMotion) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A note of the only case has no name, and is stated once.
+    #[test]
+    fn equal_notes_of_the_only_case_are_one_sentence() {
+        let mut notes = Vec::new();
+        (0..2).for_each(|_| Note::for_case("", format!("{WARNING}it is so.")).merge_into(&mut notes));
+        let texts: Vec<String> = notes.iter().filter_map(Note::text).collect();
+        assert_eq!(texts, ["warning: it is so."]);
+    }
 
     #[test]
     fn notes_of_one_kind_are_merged() {

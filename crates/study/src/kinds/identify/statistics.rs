@@ -466,24 +466,21 @@ impl Undetermined {
             [one] => format!("the data do not determine {}: the residuals do not depend on it.", name(one)),
             several => {
                 let names: Vec<String> = several.iter().map(name).collect();
-                // relative changes: a step of a logarithmically scaled parameter is a ratio
-                let relative = |k: usize| {
-                    let range = &problem.ranges[k];
-                    if range.is_log { direction[k] * (range.to / range.from).ln() } else { direction[k] }
-                };
                 let all_log = several.iter().all(|k| problem.ranges[*k].is_log);
-                let first = relative(several[0]);
-                let changes: Vec<String> = several
-                    .iter()
-                    .map(|k| {
-                        let change = relative(*k) / first;
-                        let (word, unit) = (
-                            if change > 0.0 { "raised" } else { "lowered" },
-                            if all_log { "%" } else { "% of its range" },
-                        );
-                        format!("{} {word} by {:.2} {unit}", name(k), change.abs())
-                    })
-                    .collect();
+                // relative changes: a step of a logarithmically scaled parameter is a ratio
+                let change = |k: &usize| {
+                    let range = &problem.ranges[*k];
+                    if all_log { direction[*k] * (range.to / range.from).ln() } else { direction[*k] }
+                };
+                let unit = if all_log { "%" } else { "% of its range" };
+                let largest = several.iter().map(change).fold(0.0, |largest, change| change.abs().max(largest));
+                let unity = largest.copysign(change(&several[0]));
+                let said = |k: &usize| {
+                    let percent = change(k) / unity;
+                    let word = if percent > 0.0 { "raised" } else { "lowered" };
+                    format!("{} {word} by {:.2} {unit}", name(k), percent.abs())
+                };
+                let changes: Vec<String> = several.iter().map(said).collect();
                 format!(
                     "the data do not determine {} separately: {} changes no residual noticeably. Fix one of them, or add data.",
                     names.join(" and "),
