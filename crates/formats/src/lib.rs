@@ -204,8 +204,11 @@ fn find_format(bytes: &[u8], name: Option<&str>) -> Result<&'static Format, Erro
                 "save it again: save('matrices.mat', 'K', 'M', '-v7'), or scipy.io.savemat with format='5'".into(),
             );
         }
+        let line = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii).find(|line| !line.is_empty());
+        let is_text = |line: &&[u8]| line.iter().all(|byte| *byte >= b' ' || *byte == b'\t');
+        let begins = line.filter(is_text).map(|line| format!(", which begins with {}", text::quoted(line)));
         fault(
-            "no known format matches the content of the file".into(),
+            format!("no known format matches the content of the file{}", begins.unwrap_or_default()),
             format!(
                 "state the format if it is one of {}; otherwise export the matrix in one of these formats",
                 names()

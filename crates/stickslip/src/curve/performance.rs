@@ -52,6 +52,8 @@ pub struct PerformanceRow {
     /// Number of grid orbits whose series is too short for the tolerance, or whose error was not
     /// estimated.
     pub inaccurate: usize,
+    /// Number of grid orbits that are known to be unstable.
+    pub unstable: usize,
 }
 
 /// A performance curve.
@@ -117,7 +119,7 @@ impl<E: Send> Performance<'_, E> {
         let last = self.points.max(3) - 1;
         let omegas: Vec<f64> =
             (0..=last).map(|i| self.range.0 + (self.range.1 - self.range.0) * i as f64 / last as f64).collect();
-        let (mut failed, mut inaccurate) = (0, 0);
+        let (mut failed, mut inaccurate, mut unstable) = (0, 0, 0);
         let mut points: Vec<CurvePoint> = Vec::with_capacity(omegas.len());
         let mut bidirectional = BidirectionalSweep::for_system(&system);
         solve_sequence(&mut *solver, &mut omegas.into_iter(), watch, &mut |omega, outcome| {
@@ -126,6 +128,7 @@ impl<E: Send> Performance<'_, E> {
             points.push(match outcome {
                 Ok(orbit) => {
                     inaccurate += usize::from(orbit.evidence.accuracy != Accuracy::Converged);
+                    unstable += usize::from(orbit.is_stable() == Some(false));
                     CurvePoint::new(orbit, self.quantities)
                 }
                 Err(_) => {
@@ -136,7 +139,7 @@ impl<E: Send> Performance<'_, E> {
             drop_unused_series(&mut points);
         });
         if watch.stop.load(Ordering::Relaxed) {
-            return Ok(PerformanceRow { value, peak: None, reverse_sweep_only: false, failed, inaccurate });
+            return Ok(PerformanceRow { value, peak: None, reverse_sweep_only: false, failed, inaccurate, unstable });
         }
         let wanted = points.iter().map(|point| point.values.len()).max().unwrap_or(0);
         let mut peak = highest_peak(&mut *solver, &points, wanted, self.quantities);
@@ -155,7 +158,7 @@ impl<E: Send> Performance<'_, E> {
         }
         // an unresolved peak counts as not found
         failed += usize::from(peak.is_some_and(|peak| peak.unresolved.is_some()));
-        Ok(PerformanceRow { value, peak, reverse_sweep_only, failed, inaccurate })
+        Ok(PerformanceRow { value, peak, reverse_sweep_only, failed, inaccurate, unstable })
     }
 
     /// Computes the curve over `values` (in increasing order) and its optimum.

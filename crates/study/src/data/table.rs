@@ -83,6 +83,14 @@ impl DataTable {
     /// There is no such column, or it has another dimension.
     pub fn values(&self, role: &str, dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
         let found = self.find(role).ok_or_else(|| self.missing(role))?;
+        if found.has_two_units() {
+            let (name, stated, own) = (excerpt(&found.column.name), found.unit, excerpt(&found.column.unit));
+            let message = format!(
+                "`columns` states the unit `{stated}` for `{name}` of `{}`, but the file states `{own}`",
+                self.name
+            );
+            return Err(ColumnError { message, help: format!("write \"{name} [{own}]\", or correct the file") });
+        }
         let factor = factor(&found, dimension).map_err(|unit| {
             let message = format!(
                 "the column `{}` of `{}` has the unit {unit}, but {} is expected",
@@ -135,6 +143,20 @@ impl DataTable {
     }
 }
 
+impl FoundColumn<'_> {
+    /// Returns true if the study file states another unit than the data file.
+    fn has_two_units(&self) -> bool {
+        let own = self.column.unit.as_str();
+        if self.unit.is_empty() || own.is_empty() || self.unit == own {
+            return false;
+        }
+        match (parse_title(self.unit), parse_title(own)) {
+            (Some(stated), Some(own)) => stated.dimension != own.dimension || stated.si_value("1") != own.si_value("1"),
+            _ => true,
+        }
+    }
+}
+
 /// Returns the factor from the column to SI of this dimension. The error is the unit of the
 /// column in words.
 fn factor(found: &FoundColumn<'_>, dimension: Dimension) -> Result<f64, String> {
@@ -169,7 +191,7 @@ mod tests {
 
     #[test]
     fn columns_are_found_by_use_and_converted_to_si() {
-        let data = table(&[("force", "F"), ("response", "x [mm]")]);
+        let data = table(&[("force", "F"), ("response", "x [mm]"), ("static", "F [N]")]);
         let value = |role: &str, dimension| data.values(role, dimension).map(|values| values[1]);
         assert_eq!(value("frequency", Dimension::FREQUENCY), Ok(20.0 * std::f64::consts::TAU));
         assert_eq!(value("force", Dimension::FORCE), Ok(4000.0));
@@ -178,6 +200,7 @@ mod tests {
         assert_eq!(value("x", Dimension::FORCE), Ok(6.0));
         for (role, dimension, part) in [
             ("force", Dimension::LENGTH, "has the unit `kN`"),
+            ("static", Dimension::FORCE, "states the unit `N` for `F` of `sweep`, but the file states `kN`"),
             ("x", Dimension::FREQUENCY, "Hz or rad/s"),
             ("frequence", Dimension::FREQUENCY, "no column `frequence`"),
         ] {

@@ -819,3 +819,28 @@ fn bouc_wen_has_one_limit_and_both_references() {
         assert!((column("body_stuck_amplitude_m")[i] / linear(25e3, *f) - 1.0).abs() < 1e-9);
     }
 }
+
+/// A block with a preload of 20 N carries a constant load of 15 N: its slip limit is 0.3 times the
+/// load. On a face of 35 degrees, friction of 0.25 does not hold a block, and its force at rest is
+/// unknown.
+#[test]
+fn slip_limits_are_those_at_rest() {
+    let block = |normal: &str, friction: f64, load: &str| {
+        let text = format!(
+            "schema = 1\n[[mass]]\nname = \"b\"\nmass = \"0.2 kg\"\ndirections = [\"x\", \"z\"]\n[[place]]\nname = \"face\"\n\
+             of = \"b\"\nnormal = {normal}\n[[spring]]\nbetween = [\"b.x\", \"ground\"]\nstiffness = \"1 N/mm\"\n\
+             damping = \"1 kg/s\"\n[[joint]]\nname = \"foot\"\nbetween = [\"face\", \"ground\"]\nlaw = {{ kind = \"friction-contact\", \
+             tangential = \"50 N/mm\", normal = \"50 N/mm\", friction = {friction}, preload = \"20 N\" }}\n{load}[[force]]\n\
+             on = \"b.x\"\namplitude = \"0.05 N\"\n[study]\nkind = \"orbit\"\nfrequency = \"5 Hz\"\n"
+        );
+        ModelSummary::new(&read_study("block.toml", &text, &[]).unwrap()).unwrap()
+    };
+    let load = "[[force]]\non = \"b.z\"\namplitude = \"15 N\"\nharmonic = 0\n";
+    let pressed = block("[0, 0, 1]", 0.3, load);
+    let normal = pressed.joints.iter().find_map(|joint| joint.normal_force_at_rest).unwrap();
+    assert!((normal - 15.0).abs() < 1e-6, "{normal}");
+    let limit = pressed.joints.iter().find(|joint| joint.normal_force.is_none()).unwrap().limit;
+    assert!((limit - 4.5).abs() < 1e-6, "{limit}");
+    let inclined = block("[\"-sin(35 deg)\", 0, \"cos(35 deg)\"]", 0.25, "");
+    assert!(inclined.joints.iter().all(|joint| joint.normal_force_at_rest.is_none()), "{inclined}");
+}

@@ -124,14 +124,18 @@ impl Model {
             let found = pressed(index, joint);
             StuckAxis::of_joint(index, joint, found.as_ref().map_or(&**joint.law(), |(_, law)| &**law))
         };
-        let joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
+        let mut joints: Vec<StuckAxis> = system.joints().iter().enumerate().flat_map(of_joint).collect();
         let loose = self.loose(system, &joints);
         let mut at_rest = preload::equilibrium_forces(system, &joints);
         for (stuck, carried) in joints.iter().zip(&mut at_rest).filter(|(stuck, _)| stuck.pressed.is_some()) {
-            if let Some((force, _)) = pressed(stuck.joint, &system.joints()[stuck.joint]) {
-                *carried = Some(force);
+            let force = forces.as_ref().and_then(|forces| Some(forces.get(stuck.joint)?[stuck.axis]));
+            let is_pressed = stuck.pressed.is_some_and(|preload| preload > 0.0);
+            if let Some(force) = force.filter(|_| is_pressed) {
+                // a negative force, as if the faces could not separate, says that they are open
+                *carried = if force > 0.0 { Some(force) } else { carried.filter(|force| *force <= 0.0).or(Some(0.0)) };
             }
         }
+        preload::set_limits_at_rest(&mut joints, &at_rest);
         let unpressed = if loose.is_empty() { None } else { preload::unpressed(system, &joints, &at_rest) };
         if system.dofs() > MAX_DOFS {
             let unresolved = system.dofs();

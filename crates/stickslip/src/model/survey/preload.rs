@@ -1,4 +1,5 @@
-//! Contact forces of preloaded contacts in static equilibrium.
+//! Contact forces of preloaded contacts in static equilibrium, and the slip limits that they
+//! leave.
 //!
 //! `(K + W k Wᵀ) x = F - W f₀`, with the springs `k` of closed stuck contacts and their forces
 //! `f₀`.
@@ -8,6 +9,7 @@ use super::UnloadedContacts;
 use super::linear_modes::MAX_DOFS;
 use super::stuck_joint::{StuckAxis, StuckState};
 use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
 
 /// Returns the sum of the constant forces on each row, N.
 pub(super) fn constant_forces(system: &System) -> DVector<f64> {
@@ -22,8 +24,8 @@ pub(super) fn constant_forces(system: &System) -> DVector<f64> {
 /// closed and stuck.
 ///
 /// A negative force means that the contact opens. Entries are `None` for other joints, and for
-/// all joints without any preload or beyond [`MAX_DOFS`]. Rigid friction is not included,
-/// because its share is undetermined.
+/// all joints without any preload, beyond [`MAX_DOFS`], or if a joint would slip under these
+/// forces. Rigid friction is not included, because its share is undetermined.
 pub(super) fn equilibrium_forces(system: &System, joints: &[StuckAxis]) -> Vec<Option<f64>> {
     let n = system.dofs();
     let unknown = || vec![None; joints.len()];
@@ -60,7 +62,41 @@ pub(super) fn equilibrium_forces(system: &System, joints: &[StuckAxis]) -> Vec<O
         // nothing holds, it is rounding.
         Some(if force.abs() <= 1e-6 * preload { 0.0 } else { force })
     };
-    joints.iter().map(carried).collect()
+    let carried: Vec<Option<f64>> = joints.iter().map(carried).collect();
+    let along = |joint: &StuckAxis| springs(joint) * joint.at.iter().map(|&(row, w)| w * x[row]).sum::<f64>();
+    let shares = shares_at_rest(joints, &carried);
+    let slips = |axes: &[StuckAxis]| {
+        let tangents = || axes.iter().filter(|axis| axis.pressed.is_none() && !axis.gradual);
+        let force = tangents().map(|axis| along(axis).powi(2)).sum::<f64>().sqrt();
+        let share = shares.get(&axes[0].joint).copied().unwrap_or(1.0);
+        // a limit that is exceeded by rounding counts as reached
+        let exceeds = |axis: &StuckAxis| matches!(axis.state, StuckState::Spring { limit, .. } if force > (1.0 + 1e-6) * share * limit);
+        tangents().any(exceeds)
+    };
+    if joints.chunk_by(|a, b| a.joint == b.joint).any(slips) { unknown() } else { carried }
+}
+
+/// Returns the normal force at rest over the preload, by joint; without the joints whose force is
+/// unknown.
+fn shares_at_rest(joints: &[StuckAxis], carried: &[Option<f64>]) -> BTreeMap<usize, f64> {
+    let share = |(normal, force): (&StuckAxis, &Option<f64>)| {
+        let preload = normal.pressed.filter(|preload| *preload > 0.0)?;
+        Some((normal.joint, force.as_ref()?.max(0.0) / preload))
+    };
+    joints.iter().zip(carried).filter_map(share).collect()
+}
+
+/// Replaces the slip limits under the preloads by those under the normal forces at rest.
+pub(super) fn set_limits_at_rest(joints: &mut [StuckAxis], carried: &[Option<f64>]) {
+    let shares = shares_at_rest(joints, carried);
+    for joint in joints.iter_mut().filter(|joint| joint.pressed.is_none()) {
+        if let (StuckState::Spring { limit, displacement, .. }, Some(share)) =
+            (&mut joint.state, shares.get(&joint.joint))
+        {
+            *limit *= share;
+            *displacement *= share;
+        }
+    }
 }
 
 /// Returns the preloaded contacts that carry no force; `None` if each carries some.

@@ -81,7 +81,12 @@ impl Map<'_> {
             .map(|(column, row)| (grid.x[column], grid.y[row]))
             .unzip();
         let doubtful = (!x.is_empty()).then(|| Series::warning(to_doubt.label, x, y, 1));
-        let lowest = self.lowest(grid).map(|[x, y]| Series::marks("lowest peak of the grid", vec![x], vec![y], 1));
+        let lowest = self.lowest(grid).map(|[x, y]| {
+            let ends = |values: &[f64]| [values.first().copied(), values.last().copied()];
+            let at_edge = ends(&grid.x).contains(&Some(x)) || ends(&grid.y).contains(&Some(y));
+            let place = if at_edge { " (at its edge: extend the range)" } else { "" };
+            Series::marks(format!("lowest peak of the grid{place}"), vec![x], vec![y], 1)
+        });
         doubtful.into_iter().chain(lowest).collect()
     }
 

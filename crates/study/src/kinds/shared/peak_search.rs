@@ -50,9 +50,17 @@ pub(in crate::kinds) fn count(prepared: &PreparedCase, row: &PerformanceRow, par
     part.count(|| prepared.case.label(), status(row), failed.then(reason));
     if row.inaccurate > 0 {
         let text = format!(
-            "at {} frequencies of the grid the series is too short: its truncation error exceeds the `tolerance` of \
-             the method; examine one of them with kind = \"response\".",
-            row.inaccurate
+            "at {} of the grid the series is too short: its truncation error exceeds the `tolerance` of the method; \
+             examine one of them with kind = \"response\".",
+            frequencies(row.inaccurate)
+        );
+        Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
+    }
+    if row.unstable > 0 {
+        let text = format!(
+            "{WARNING}at {} of the grid the orbit is unstable: the real motion leaves it and may be larger than the \
+             peak; examine it with kind = \"response\" or \"transient\".",
+            frequencies(row.unstable)
         );
         Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
     }
@@ -60,6 +68,11 @@ pub(in crate::kinds) fn count(prepared: &PreparedCase, row: &PerformanceRow, par
         let text = "the largest amplitude is at an end of `frequency`, so the peak may lie outside; widen the range.";
         Note::for_case(&prepared.case.label(), format!("{WARNING}{text}")).merge_into(&mut part.notes);
     }
+}
+
+/// Returns a number of frequencies in words.
+fn frequencies(count: usize) -> String {
+    format!("{count} {}", if count == 1 { "frequency" } else { "frequencies" })
 }
 
 /// Writes the row of a case: its varied parameters, the peak and its status.

@@ -20,6 +20,7 @@ use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::describe_location;
 use crate::run::work::{CONVERGED, Computed, NOT_CONVERGED, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
+use crate::syntax::format::format_significant;
 use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optional, required};
 use further_tables::History;
 use record::Records;
@@ -402,10 +403,12 @@ fn write_decay(
     let (mass, cycles) = most.map(|most| (&prepared.system.places()[most], decays[most].cycles()))?;
     // Samples per cycle that turning points need. With 20 the damping ratio has an error of 1e-3
     // of the decrement of a cycle; with 3 it is meaningless.
-    if cycles.iter().any(|cycle| cycle.frequency * step * 20.0 > 1.0) {
+    let highest = cycles.iter().map(|cycle| cycle.frequency).fold(0.0, f64::max);
+    if highest * step * 20.0 > 1.0 {
         return Some(format!(
-            "{WARNING}the samples are too far apart to compute damping from the decay: use a `time_step` below a \
-             twentieth of the period"
+            "{WARNING}the samples are too far apart to compute damping from the decay: use a `time_step` of at most \
+             {} ms, a twentieth of the shortest cycle",
+            format_significant(1e3 / (20.0 * highest), 2)
         ));
     }
     for cycle in &cycles {
