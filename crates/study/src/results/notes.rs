@@ -303,7 +303,6 @@ impl Note {
                 let (warning, said) = text.strip_prefix(WARNING).map_or(("", text.as_str()), |said| (WARNING, said));
                 let first = named.join("; ");
                 Some(match cases - named.len() {
-                    0 if first.is_empty() => text.clone(),
                     0 => format!("{warning}{first}: {said}"),
                     more => format!("{warning}{cases} cases ({first} and {more} more): {said}"),
                 })

@@ -21,6 +21,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     }
     let (peak, factor) = drawing.axis(1, "resonance peak", largest(table, [AMPLITUDE.to_owned()]), "m");
     let maps = drawing.case_rows_by(table, outer);
+    let to_doubt = PointsToDoubt::of(table);
     let panels = evenly_chosen(&maps, MAX_PANELS).into_iter().filter_map(|rows| {
         let map = Map { table, rows, columns: axes[1].0, factor };
         let grid = map.grid()?;
@@ -31,7 +32,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
             let axis = axis.with_range(points[0], points[points.len() - 1]);
             if axes[which].1 == Some(RangeScale::Log) { axis.log() } else { axis }
         };
-        Some(panel(&grid, map.marks(&grid), [axis(0, &grid.x), axis(1, &grid.y)], label, &peak.unit))
+        Some(panel(&grid, map.marks(&grid, &to_doubt), [axis(0, &grid.x), axis(1, &grid.y)], label, &peak.unit))
     });
     let mut panels: Vec<Panel> = panels.collect();
     if maps.len() > panels.len()
@@ -72,15 +73,14 @@ impl Map<'_> {
     }
 
     /// Returns triangles at peaks to doubt, and a mark at the lowest peak.
-    fn marks(&self, grid: &Grid) -> Vec<Series> {
-        let to_doubt = PointsToDoubt::of(self.table);
+    fn marks(&self, grid: &Grid, to_doubt: &PointsToDoubt) -> Vec<Series> {
         let rows = to_doubt.rows.range(self.rows.rows.clone()).map(|row| row - self.rows.rows.start);
         let cells = rows.map(|row| (row / self.columns, row % self.columns));
         let (x, y): (Vec<f64>, Vec<f64>) = cells
             .filter(|(column, row)| grid.values[*row][*column].is_finite())
             .map(|(column, row)| (grid.x[column], grid.y[row]))
             .unzip();
-        let doubtful = (!x.is_empty()).then(|| Series::warning(to_doubt.label, x, y, 1));
+        let doubtful = (!x.is_empty()).then(|| Series::warning(to_doubt.label.clone(), x, y, 1));
         let lowest = self.lowest(grid).map(|[x, y]| {
             let ends = |values: &[f64]| [values.first().copied(), values.last().copied()];
             let at_edge = ends(&grid.x).contains(&Some(x)) || ends(&grid.y).contains(&Some(y));

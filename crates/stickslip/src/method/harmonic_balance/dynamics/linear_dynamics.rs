@@ -12,7 +12,7 @@
 
 use super::closed_contacts;
 use super::factored::{FactoredDynamics, SmallDynamics};
-use super::harmonic_dynamics::{Directions, HarmonicDynamics, columns};
+use super::harmonic_dynamics::{Directions, HarmonicDynamics};
 use super::modal_sum::{ComplexModes, rigid_body_fraction};
 use super::travelling_wave::TravellingWaves;
 use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
@@ -86,7 +86,7 @@ impl Form {
         if is_factored {
             return Form::Factored(FactoredDynamics::new(structure, directions));
         }
-        match ComplexModes::new(system, &columns(system.dofs(), directions), directions) {
+        match ComplexModes::new(system, directions) {
             Some(modes) => Form::Modes(Box::new(modes)),
             None => Form::Small(SmallDynamics::new(structure, directions)),
         }

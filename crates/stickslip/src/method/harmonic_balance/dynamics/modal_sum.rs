@@ -1,7 +1,7 @@
 //! Modes of a small structure: its response at every frequency is a sum over them.
 
 use super::factored::FactoredDynamics;
-use super::harmonic_dynamics::{Directions, HarmonicDynamics, diagonal, rate};
+use super::harmonic_dynamics::{Directions, HarmonicDynamics, columns, diagonal, rate};
 use super::uncoupled_modes::UndampedResonance;
 use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::model::System;
@@ -36,8 +36,9 @@ impl ComplexModes {
     /// Computes the modes in the structure's coordinates. `None` if the mass matrix is not
     /// positive definite, nearly singular, or if modes coincide. The equations are then solved
     /// at every frequency.
-    pub fn new(system: &System, direction: &DMatrix<f64>, directions: &Directions) -> Option<Self> {
+    pub fn new(system: &System, directions: &Directions) -> Option<Self> {
         let n = system.dofs();
+        let direction = &columns(n, directions);
         // M = L Lᵀ; in q = Lᵀ x the mass matrix is the identity
         let mass = system.structure().mass();
         let lower = mass.clone().cholesky()?.l();
