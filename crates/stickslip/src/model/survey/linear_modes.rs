@@ -71,8 +71,9 @@ impl ModalStructure {
         // For matrix structures: eigenvalues below this fraction of the median are free motions.
         // This suits matrices with ten digits.
         let free = squares.partition_point(|value| *value < 1e-10 * usual);
-        let shapes = shapes.columns(0, squares.len()).into_owned();
+        let mut shapes = shapes.columns(0, squares.len()).into_owned();
         let r = shapes.nrows();
+        separate_by_damping(&squares, &mut shapes, |x| x.dot(&(&damping * x)));
         let moved = multi_vector::combine(r, damping.as_slice(), &shapes);
         let damping = multi_vector::inner_products(r, shapes.as_slice(), &moved);
         let shapes = if rigid.is_empty() { shapes } else { turn * shapes };
@@ -291,11 +292,11 @@ fn reduced(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> 
     let Some(eigen) = eigen::symmetric(standard) else { return unknown() };
     let mut rising: Vec<usize> = (0..heavy).collect();
     rising.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let modal = inverse.transpose() * eigen.eigenvectors;
-    let (mut frequencies, mut damping, mut vectors) = (Vec::new(), Vec::new(), DMatrix::zeros(n, heavy));
-    for (column, &mode) in rising.iter().enumerate() {
-        let shape = modal.column(mode);
-        frequencies.push(eigen.eigenvalues[mode]);
+    let frequencies: Vec<f64> = rising.iter().map(|&mode| eigen.eigenvalues[mode]).collect();
+    let mut modal = inverse.transpose() * eigen.eigenvectors.select_columns(&rising);
+    separate_by_damping(&frequencies, &mut modal, |x| x.dot(&(&c * x)));
+    let (mut damping, mut vectors) = (Vec::new(), DMatrix::zeros(n, heavy));
+    for (column, shape) in modal.column_iter().enumerate() {
         damping.push(shape.dot(&(&c * shape)));
         // back substitution for the places without mass
         let mut y = DVector::zeros(r);
@@ -308,6 +309,38 @@ fn reduced(mass: &[f64], links: &[&SpringDamper], rigid: &[&[(usize, f64)]]) -> 
         }
     }
     CondensedModes { frequencies, damping, vectors }
+}
+
+/// Relative difference of squared frequencies below which modes count as equal: the rounding of
+/// an eigenvalue solver.
+const EQUAL_FREQUENCIES: f64 = 1e-9;
+
+/// Turns the shapes of equal frequencies so that damping does not couple them.
+///
+/// An eigenvalue solver returns any basis of their plane, and each of its shapes would mix the
+/// damping ratios. `power` returns `xᵀCx`; `squares` are in ascending order.
+pub(super) fn separate_by_damping(squares: &[f64], shapes: &mut DMatrix<f64>, power: impl Fn(&DVector<f64>) -> f64) {
+    let mut first = 0;
+    while first < squares.len() {
+        let count =
+            squares[first..].partition_point(|value| *value - squares[first] <= EQUAL_FREQUENCIES * value.abs());
+        let count = count.max(1);
+        let equal = shapes.columns(first, count).into_owned();
+        let coupling = DMatrix::from_fn(count, count, |i, j| match i == j {
+            true => power(&equal.column(i).into_owned()),
+            false => 0.25 * (power(&(equal.column(i) + equal.column(j))) - power(&(equal.column(i) - equal.column(j)))),
+        });
+        let coupled = coupling.iter().enumerate().any(|(k, value)| {
+            let (i, j) = (k % count, k / count);
+            i != j && value.abs() > EQUAL_FREQUENCIES * coupling[(i, i)].abs().max(coupling[(j, j)].abs())
+        });
+        if coupled && let Some(axes) = eigen::symmetric(coupling) {
+            let mut rising: Vec<usize> = (0..count).collect();
+            rising.sort_by(|&a, &b| axes.eigenvalues[a].total_cmp(&axes.eigenvalues[b]));
+            shapes.columns_mut(first, count).copy_from(&(equal * axes.eigenvectors.select_columns(&rising)));
+        }
+        first += count;
+    }
 }
 
 /// Computes `matrix += value · row rowᵀ`.
@@ -460,5 +493,27 @@ mod tests {
         // two unit springs at an angle of 1.4: 1 ± cos 1.4
         let squares: Vec<f64> = elastic.elastic.iter().map(|mode| mode.omega * mode.omega).collect();
         assert!((squares[0] - 1.0 + 1.4f64.cos()).abs() < 1e-12 && (squares[1] - 1.0 - 1.4f64.cos()).abs() < 1e-12);
+    }
+
+    /// A mass in a plane with the same stiffness in all directions and a damper along each of
+    /// two inclined axes: each damper damps its own mode.
+    #[test]
+    fn equal_frequencies_keep_their_own_damping() {
+        let along = |angle: f64, stiffness: f64, damping: f64| SpringDamper {
+            at: vec![(0, angle.cos()), (1, angle.sin())],
+            stiffness,
+            damping,
+        };
+        let (weak, strong) = (along(0.6, 4.0, 0.08), along(0.6 + std::f64::consts::FRAC_PI_2, 4.0, 0.4));
+        let ratios = |modes: &LinearModes| modes.elastic.iter().map(|mode| mode.damping).collect::<Vec<_>>();
+        let zero = DMatrix::zeros(2, 2);
+        let masses = Matrices { mass: DMatrix::identity(2, 2), damping: zero.clone(), stiffness: zero };
+        let links = [&weak, &strong];
+        for structure in
+            [LinearStructure::new(&[1.0, 1.0], &links, &[]), LinearStructure::of_matrices(&masses, &links, &[])]
+        {
+            let ratios = ratios(&structure.modes);
+            assert!((ratios[0] - 0.02).abs() < 1e-12 && (ratios[1] - 0.1).abs() < 1e-12, "{ratios:?}");
+        }
     }
 }

@@ -6,7 +6,7 @@
 //! sectors becomes two springs: one along the real part and one along the imaginary part of its
 //! elongation. The modes then occur in pairs, one for each direction of travel.
 
-use super::linear_modes::{LinearStructure, MAX_DOFS, SpringDamper};
+use super::linear_modes::{LinearStructure, MAX_DOFS, SpringDamper, separate_by_damping};
 use super::stuck_joint::{StuckAxis, StuckState};
 use super::{LinearModes, Model, ModelError, NaturalMode, System};
 use crate::model::{Body, Mass, Place};
@@ -368,14 +368,18 @@ fn of_large(
     let wanted = ModeSelection::Lowest((count.saturating_add(12)).min(n));
     let found = NaturalModes::new(&SymbolicAnalysis::new(&[&stiffness, &mass]), &stiffness, &mass, wanted).ok()?;
     let free = found.rigid_body_count();
-    let mode = |k: usize| {
-        let (omega, shape) = (found.values[k].max(0.0).sqrt(), found.shape(k));
-        let power: f64 = damping.multiply(shape).iter().zip(shape).map(|(c, x)| c * x).sum();
-        let power = power + structure.damped_modes().map_or(0.0, |modes| modes.power(shape));
-        NaturalMode { omega, damping: power / (2.0 * omega) }
+    let power = |shape: &DVector<f64>| {
+        let power = damping.multiply(shape.as_slice()).iter().zip(shape).map(|(c, x)| c * x).sum::<f64>();
+        power + structure.damped_modes().map_or(0.0, |modes| modes.power(shape.as_slice()))
     };
-    let shapes = DMatrix::from_fn(n, found.count() - free, |row, k| found.shape(free + k)[row]);
-    let modes = LinearModes { elastic: (free..found.count()).map(mode).collect(), rigid: free, unresolved: 0 };
+    let squares = &found.values[free..found.count()];
+    let mut shapes = DMatrix::from_fn(n, squares.len(), |row, k| found.shape(free + k)[row]);
+    separate_by_damping(squares, &mut shapes, power);
+    let mode = |(k, square): (usize, &f64)| {
+        let omega = square.max(0.0).sqrt();
+        NaturalMode { omega, damping: power(&shapes.column(k).into_owned()) / (2.0 * omega) }
+    };
+    let modes = LinearModes { elastic: squares.iter().enumerate().map(mode).collect(), rigid: free, unresolved: 0 };
     Some((mass, modes, shapes))
 }
 
