@@ -138,9 +138,13 @@ impl StaticEquilibrium {
     /// Computes the static equilibrium; returns `None` also if no constant force, imposed
     /// displacement or preload acts.
     pub fn under_load(system: &System) -> Option<Self> {
+        if StaticEquilibrium::has_load(system) { StaticEquilibrium::of(system) } else { None }
+    }
+
+    /// Returns true if a constant force, imposed displacement or preload acts.
+    pub fn has_load(system: &System) -> bool {
         let constant = system.harmonics_of_excitation(|z| z != Complex64::ZERO).contains(&0);
-        let loaded = constant || system.joints().iter().any(|joint| is_preloaded(&**joint.law()));
-        if loaded { StaticEquilibrium::of(system) } else { None }
+        constant || system.joints().iter().any(|joint| is_preloaded(&**joint.law()))
     }
 
     /// Returns the displacements of all degrees of freedom, m.

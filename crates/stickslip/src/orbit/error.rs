@@ -386,21 +386,21 @@ impl std::fmt::Display for ObservedMotion {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
             ObservedMotion::Drifts { place, periods, speed, spring, joint, open_fraction } => {
-                write!(
-                    f,
-                    "drifts: `{place}` moves at {:.3} mm/s over {periods} periods{}; hold it by a weak spring along \
-                     this direction ({spring:.1e} N/m hardly changes the vibration), increase the normal loads, or add \
-                     damping",
-                    1e3 * speed,
-                    apart(joint, *open_fraction)
-                )?;
-                if *open_fraction < 1.0 {
-                    return Ok(());
+                let speed = speed_text(*speed);
+                write!(f, "drifts: `{place}` moves at {speed} over {periods} periods")?;
+                if *open_fraction >= 1.0 {
+                    return write!(
+                        f,
+                        ", and `{joint}` is separated for all of the last: if a force or a preload should close it, \
+                         exchange the two places of its `between`, or reverse the force; otherwise increase the \
+                         normal loads"
+                    );
                 }
                 write!(
                     f,
-                    "; if a constant force should close `{joint}`, exchange the two places of its `between`, or \
-                     reverse the force"
+                    "{}; hold it by a weak spring along this direction ({spring:.1e} N/m hardly changes the \
+                     vibration), increase the normal loads, or add damping",
+                    apart(joint, *open_fraction)
                 )
             }
             ObservedMotion::Irregular { periods, joint, open_fraction } => write!(
@@ -411,6 +411,11 @@ impl std::fmt::Display for ObservedMotion {
             ),
         }
     }
+}
+
+/// Writes a speed (m/s) in mm/s or, from 1 m/s, in m/s.
+fn speed_text(speed: f64) -> String {
+    if speed.abs() < 1.0 { format!("{:.3} mm/s", 1e3 * speed) } else { format!("{speed:.3} m/s") }
 }
 
 /// Describes a motion that does not settle, and gives advice.

@@ -2,6 +2,7 @@
 
 use crate::case::study::{Case, Study};
 use crate::syntax::error::StudyError;
+use std::cell::Cell;
 use stickslip::method::StaticEquilibrium;
 use stickslip::model::{Survey, System};
 
@@ -10,6 +11,9 @@ use stickslip::model::{Survey, System};
 pub struct SurveyedCase {
     pub(crate) case: Case,
     pub(crate) survey: Survey,
+    /// Constant loads act on a structure that can move freely, and no static equilibrium was
+    /// found.
+    pub(crate) lacks_equilibrium: bool,
 }
 
 impl SurveyedCase {
@@ -17,11 +21,17 @@ impl SurveyedCase {
     pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
         let case = study.case(index)?;
         // contacts that a constant load closes count as closed
-        let forces = |system: &System| Some(StaticEquilibrium::under_load(system)?.forces());
+        let searched_and_found = Cell::new((false, false));
+        let forces = |system: &System| {
+            let found = StaticEquilibrium::under_load(system).map(|equilibrium| equilibrium.forces());
+            searched_and_found.set((StaticEquilibrium::has_load(system), found.is_some()));
+            found
+        };
         let system = study.assembled.system(&case.model);
         let system = system.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
         let survey = case.model.survey_of(&system, &forces);
-        Ok(SurveyedCase { case, survey })
+        let lacks_equilibrium = searched_and_found.get() == (true, false) && survey.free().rigid > 0;
+        Ok(SurveyedCase { case, survey, lacks_equilibrium })
     }
 }
 

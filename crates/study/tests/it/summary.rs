@@ -564,6 +564,73 @@ fn preload_at_rest() {
     }
 }
 
+/// A contact with exchanged places opens under the load that should close it, and the damper is
+/// free. Held by a spring, the same contact is only open.
+#[test]
+fn a_contact_with_exchanged_places() {
+    let exchanged = r#"
+schema = 1
+[[mass]]
+name = "blade"
+mass = "400 g"
+directions = ["x", "z"]
+[[spring]]
+between = ["blade.x", "ground"]
+stiffness = "300 N/mm"
+damping_ratio = "0.1 %"
+[[spring]]
+between = ["blade.z", "ground"]
+stiffness = "20 kN/mm"
+damping_ratio = "0.1 %"
+[[mass]]
+name = "wedge"
+mass = "8 g"
+directions = ["x", "z"]
+[[spring]]
+between = ["wedge.x", "ground"]
+stiffness = "30 N/mm"
+damping_ratio = "0.1 %"
+[[place]]
+name = "top"
+of = "wedge"
+normal = [0, 0, 1]
+[[place]]
+name = "platform"
+of = "blade"
+normal = [0, 0, 1]
+[[joint]]
+name = "face"
+between = ["platform", "top"]
+law = { kind = "friction-contact", tangential = "30 N/mm", normal = "60 N/mm", friction = 0.3, preload = "20 N" }
+[[force]]
+on = "wedge.z"
+amplitude = "20 N"
+harmonic = 0
+[[force]]
+on = "blade.x"
+amplitude = "6 N"
+[study]
+kind = "response"
+frequency = ["145 Hz"]
+"#;
+    let warned = |text: &str| summary(text).warnings.join("\n");
+    let held = exchanged.replace(
+        "between = [\"wedge.x\"",
+        "between = [\"wedge.z\", \"ground\"]\nstiffness = \"1 N/mm\"\n[[spring]]\nbetween = [\"wedge.x\"",
+    );
+    let right = exchanged.replace("[\"platform\", \"top\"]", "[\"top\", \"platform\"]");
+    assert!(warned(exchanged).contains("exchange the two places"), "{}", warned(exchanged));
+    for text in [&held, &right] {
+        assert!(!warned(text).contains("exchange"), "{}", warned(text));
+    }
+    // a rotation that a spring holds does not hold the whole body
+    let cylinder = include_str!("../../templates/under-platform-cylinder.toml");
+    let turned = cylinder.replace("[\"cylinder1\", \"platform1\"]", "[\"platform1\", \"cylinder1\"]");
+    assert_ne!(turned, cylinder);
+    assert!(!warned(cylinder).contains("exchange"), "{}", warned(cylinder));
+    assert!(warned(&turned).contains("exchange the two places"), "{}", warned(&turned));
+}
+
 /// Contacts that are open at rest count as closed in the modes with all joints stuck, as in the
 /// reference curve of a figure.
 #[test]

@@ -80,28 +80,40 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
             them = pronoun(bodies.len()),
         )
     });
-    let open = open_under_load(&cases[0]).or(open);
+    let unbalanced = unbalanced_preload(cases);
+    let open = match (&unbalanced, open_under_load(&cases[0])) {
+        (None, Some(found)) => Some(found),
+        _ => open.or_else(|| cases[0].lacks_equilibrium.then(|| NO_EQUILIBRIUM.to_owned())),
+    };
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
     let others = others.filter(|one| !between(one) && !one.held_in_motion);
-    others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced_preload(cases)).collect()
+    others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced).collect()
 }
 
-/// Warns of open contacts of a structure that can move freely, if the constant forces move their
-/// faces apart: these forces may have been meant to press the contacts.
+const NO_EQUILIBRIUM: &str = "no static equilibrium was found under the constant forces and preloads, and a part of the \
+    structure can move freely; increase the normal loads, or hold this part by a spring; if one of these loads should \
+    close a contact that it opens, exchange the two places of its `between`, or reverse the load";
+
+/// Warns of open contacts of a structure that can move freely, if the constant forces or the
+/// preloads move their faces apart: these may have been meant to press the contacts.
 fn open_under_load(one: &SurveyedCase) -> Option<String> {
     let slips = one.survey.first_slip();
-    let mut open: Vec<String> = slips
-        .iter()
-        .filter(|slip| slip.preload == Some(0.0) && slip.constant_force < 0.0)
-        .map(|slip| joint_of_direction(&slip.joint).to_owned())
-        .collect();
+    let opens = |slip: &&FirstSlip| match slip.preload {
+        Some(preload) if preload > 0.0 => slip.equilibrium_force.is_some_and(|force| force <= 0.0),
+        Some(_) => slip.constant_force < 0.0,
+        None => false,
+    };
+    let found = || slips.iter().filter(opens);
+    let preloaded = found().any(|slip| slip.preload > Some(0.0));
+    let mut open: Vec<String> = found().map(|slip| joint_of_direction(&slip.joint).to_owned()).collect();
     open.dedup();
     if open.is_empty() || one.survey.is_too_large() || one.survey.free().rigid == 0 {
         return None;
     }
     let (verb, each) = if open.len() == 1 { ("is", "its") } else { ("are", "their") };
+    let forces = if preloaded { "the constant forces and preloads" } else { "the constant forces" };
     Some(format!(
-        "{} {verb} open in static equilibrium, and a part of the structure can move freely: the constant forces move \
+        "{} {verb} open in static equilibrium, and a part of the structure can move freely: {forces} move \
          {each} faces apart; if they should press them together, exchange the two places of {each} `between` (a contact \
          closes where its first place moves along the normal towards the second), or reverse the forces",
         list_names(&open)
