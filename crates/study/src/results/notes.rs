@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::law::IdealElement;
-use stickslip::model::{Joint, Model};
-use stickslip::orbit::{Accuracy, JointMotion, Orbit};
+use stickslip::model::{Body, Joint, Model, ROTATIONS};
+use stickslip::orbit::{Accuracy, JointMotion, Orbit, PlaceMotion};
 use stickslip::structure::Reduction;
 
 /// Prefix of a note that is a warning.
@@ -45,6 +45,15 @@ pub enum Note {
     /// Number of points whose amplitudes depend on the history of a stuck joint, and the
     /// largest relative change.
     HistorySpread(usize, f64),
+    /// Rotations of rigid bodies that are not small.
+    LargeRotation {
+        /// Number of points.
+        points: usize,
+        /// The rotation with the largest value.
+        place: String,
+        /// This value, rad.
+        largest: f64,
+    },
     /// Like `Truncated`, on a branch: its harmonics are given, and it has no other method.
     TruncatedOnBranch(usize, f64),
     /// Number of points whose series was not compared with a longer one.
@@ -151,8 +160,25 @@ impl Note {
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
         said.chain(Note::stuck_offset_note(model, orbit))
             .chain(range)
+            .chain(Note::large_rotation(model, orbit))
             .chain(Note::slipping_note(model, orbit))
             .collect()
+    }
+
+    /// Returns a note if a body rotates so far that its displacements are no longer linear in
+    /// the rotation.
+    fn large_rotation(model: &Model, orbit: &Orbit) -> Option<Note> {
+        // a sector of a disk appends its number to the name of the body
+        let is_rotation = |name: &str| {
+            let of_body = |body: &Body| name.strip_prefix(&*body.name).is_some_and(|rest| rest.starts_with(['.', '_']));
+            name.rsplit_once('.').is_some_and(|(_, along)| ROTATIONS.contains(&along))
+                && model.bodies.iter().any(of_body)
+        };
+        let rotations = orbit.places.iter().filter(|place| is_rotation(&place.name));
+        let angle = |place: &PlaceMotion| place.maximum.abs().max(place.minimum.abs());
+        let (place, largest) = rotations.map(|place| (place, angle(place))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        // Rotation (rad) from which displacements have an error of 0.5 %, `θ²/2`.
+        (largest > 0.1).then(|| Note::LargeRotation { points: 1, place: place.name.clone(), largest })
     }
 
     /// Returns a note if friction produces harmonics above the frequency range of the reduced
@@ -257,6 +283,17 @@ impl Note {
                     *largest = largest.max(*other);
                     return;
                 }
+                (
+                    Note::LargeRotation { points, place, largest },
+                    Note::LargeRotation { points: more, place: other, largest: value },
+                ) => {
+                    *points += more;
+                    // the order of the points does not matter: of equal values the first name counts
+                    if *value > *largest || (value == largest && other < place) {
+                        (*place, *largest) = (other.clone(), *value);
+                    }
+                    return;
+                }
                 (Note::UnknownError(points), Note::UnknownError(more))
                 | (Note::StuckOffset(points), Note::StuckOffset(more))
                 | (Note::UnknownStability(points), Note::UnknownStability(more))
@@ -318,6 +355,13 @@ impl Note {
                  `tolerance` of the method. Remove or raise `harmonics`, raise `tolerance` if this error is \
                  acceptable, or use `event-driven` if the laws are exact.",
                 points(*count)
+            )),
+            Note::LargeRotation { points: count, place, largest } => Some(format!(
+                "{WARNING}at {} `{place}` reaches {} deg: the model takes rotations of bodies as small, and its \
+                 displacements have an error of about {} % at this angle.",
+                points(*count),
+                format_significant(largest.to_degrees(), 2),
+                format_significant(50.0 * largest * largest, 1)
             )),
             Note::TruncatedOnBranch(count, largest) => Some(format!(
                 "At {} of the branch the series is too short: its estimated error is up to {largest:.1e} and exceeds \

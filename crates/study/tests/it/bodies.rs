@@ -60,6 +60,19 @@ fn dataset(text: &str) -> Dataset {
     found
 }
 
+/// A constant moment turns the bar beyond the range of small rotations.
+#[test]
+fn large_rotations_are_reported() {
+    let load = |moment: &str| format!("[[force]]\non = \"bar.ry\"\namplitude = \"{moment}\"\nharmonic = 0\n[study]");
+    let notes = |moment: &str| dataset(&BAR.replace("[study]", &load(moment))).notes.join("\n");
+    assert!(!notes("100 N m").contains("rotations of bodies"), "{}", notes("100 N m"));
+    let far = dataset(&BAR.replace("[study]", &load("2 kN m")));
+    let column = |name: &str| far.tables[0].numbers(name).expect("a column")[0].abs();
+    let degrees = (column("bar.ry_mean_rad") + column("bar.ry_amplitude_rad")).to_degrees();
+    let said = far.notes.join("\n");
+    assert!(said.contains(&format!("at 1 point `bar.ry` reaches {degrees:.0} deg")), "{degrees}: {said}");
+}
+
 fn numbers<'a>(found: &'a Dataset, table: &str, column: &str) -> &'a [f64] {
     let table = found.tables.iter().find(|found| found.name == table).unwrap();
     table.numbers(column).unwrap_or_else(|| panic!("no column {column}"))
