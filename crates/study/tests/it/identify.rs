@@ -221,6 +221,23 @@ fn a_response_with_the_force_of_each_row() {
     }
 }
 
+/// Values in µm of a column without unit are read in m.
+#[test]
+fn a_wrong_unit_is_named() {
+    let (m, k, c): (f64, f64, f64) = (2.0, 2e4, 3.0);
+    let rows = (0..40).map(|i| {
+        let omega = TAU * (10.0 + 0.3 * f64::from(i));
+        vec![omega / TAU, 1.0, 1e6 / (k - omega * omega * m).hypot(omega * c)]
+    });
+    let targets = "fit.k = { from = \"1e4 N/m\", to = \"1e5 N/m\" }\nfit.c = { from = \"1 kg/s\", to = \"10 kg/s\" }\n\
+                   targets = [{ data = \"test\", is = \"response\", at = \"m\" }]";
+    let data = csv("frequency_Hz,force_N,response", rows);
+    let dataset = identify(&data, &oscillator(targets, FORCE));
+    let said = dataset.notes.iter().cloned().chain(dataset.failures.iter().map(|failure| failure.reason.clone()));
+    let said: Vec<String> = said.collect();
+    assert!(said.iter().any(|text| text.contains("times the computed ones: check the unit")), "{said:?}");
+}
+
 #[test]
 fn a_ring_down_with_an_unknown_start() {
     let (m, k, c, x0): (f64, f64, f64, f64) = (2.0, 2e4, 3.0, 2.5e-3);
@@ -445,11 +462,16 @@ fn wrong_targets_are_refused_before_the_run() {
         ("from = \"0.02 N\"", "from = \"0.02 m\"", "force", ""),
         ("is = \"loop\"", "is = \"loop\", weight = \"1 mm\"", "`weight` must be", "relative"),
         ("name = \"rig\"", "name = \"rig\"\ncolumns = { force = \"F\" }", "no column `F`", "force_N"),
+        ("is = \"loop\"", "is = \"loop\", groups = [0, 7]", "no row of `rig` is in group 7", "all rows are in group 0"),
     ] {
         let error = refused(&study.replacen(from, to, 1));
         let said = format!("{error} {}", error.help_text().unwrap_or_default());
         assert!(said.contains(part) && said.contains(help), "{to}: {said}");
     }
+    write("displacement_m,force_N,group\n0,0,1\n1,1,2\n0.5,0,4\n");
+    let error = refused(&study.replacen("is = \"loop\"", "is = \"loop\", groups = [1, 3]", 1));
+    assert!(error.to_string().contains("group 3"), "{error}");
+    assert_eq!(error.help_text(), Some("the column `group` contains `1`, `2` or `4`"));
     write("displacement_m,force_N\n0,0\n1,1\n0.5,\n");
     let said = refused(&study).to_string();
     assert!(said.contains("row 3 of `rig` has no number"), "{said}");

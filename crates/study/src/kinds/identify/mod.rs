@@ -277,7 +277,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let found = search(&problem, &settings)?;
         let mut statistics = statistics::Statistics::new(&problem, &found, settings.loss);
         if let Some(reason) = statistics.failure(&problem) {
-            return Err(reason);
+            let differences = problem.fitted(&found.x).map(|fitted| problem.scale_differences(&fitted));
+            return Err([vec![reason], differences.unwrap_or_default()].concat().join("; "));
         }
         statistics.check_intervals(&problem, &settings, &found);
         let is_profiled = case.values.flag("profile") == Some(true);
@@ -290,7 +291,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     match found {
         _ if work.context.stopped() => part.count(|| case.label(), NOT_REACHED, None),
         Ok(Identification { found, statistics, fitted, profiles, problem }) => {
-            let warnings = statistics.warnings(&problem);
+            let mut warnings = problem.scale_differences(&fitted);
+            warnings.extend(statistics.warnings(&problem));
             part.notes
                 .extend(warnings.into_iter().map(|text| Note::for_case(&case.label(), format!("{WARNING}{text}"))));
             part.notes.extend(

@@ -141,6 +141,29 @@ impl FitProblem {
             .collect()
     }
 
+    /// Returns a sentence for each quantity whose measured values differ from the computed ones by
+    /// orders of magnitude, as they do in another unit.
+    pub fn scale_differences(&self, fitted: &[Fitted]) -> Vec<String> {
+        let mut sentences = Vec::new();
+        for (target, fitted) in self.targets.iter().zip(fitted).filter(|(target, _)| !target.is_predicted()) {
+            let names = target.quantities();
+            for (k, name) in names.iter().enumerate() {
+                let measured = target.measured().iter().map(|measured| measured.value).skip(k).step_by(names.len());
+                let computed = fitted.values.iter().copied().skip(k).step_by(names.len());
+                let ratio = (sum_of_squares(measured) / sum_of_squares(computed)).sqrt();
+                // Ratio that a poor model hardly reaches, and that most pairs of units exceed.
+                if ratio.is_finite() && ratio > 0.0 && !(0.01..=100.0).contains(&ratio) {
+                    sentences.push(format!(
+                        "the measured values of `{name}` in `{}` are about {ratio:.0e} times the computed ones: check \
+                         the unit of their column.",
+                        target.data()
+                    ));
+                }
+            }
+        }
+        sentences
+    }
+
     /// Returns the number of residuals.
     pub fn count(&self) -> usize {
         self.targets.iter().filter(|target| !target.is_predicted()).map(|target| target.measured().len()).sum()
@@ -254,4 +277,8 @@ impl FitRange {
     pub(super) fn slope(&self, x: f64) -> f64 {
         if self.is_log { self.at(x) * (self.to / self.from).ln() } else { self.to - self.from }
     }
+}
+
+fn sum_of_squares(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|value| value * value).sum()
 }

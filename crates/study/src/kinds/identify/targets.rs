@@ -254,6 +254,9 @@ pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, 
     Ok(targets)
 }
 
+/// Largest number of groups that an error lists.
+const MAX_GROUPS: usize = 8;
+
 fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Target>, ColumnError> {
     let name = values.text("data").unwrap_or_default();
     let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
@@ -268,9 +271,22 @@ fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Targ
     let wanted = values.quantities("groups");
     let rows: Vec<usize> =
         (0..all.len()).filter(|row| wanted.is_none_or(|wanted| wanted.contains(&all[*row]))).collect();
-    if rows.is_empty() {
-        let message = format!("no row of `{name}` is in `groups`");
-        return Err(ColumnError { message, help: "state values of the column `group`".to_owned() });
+    if let Some(absent) = wanted.and_then(|wanted| wanted.iter().find(|group| !all.contains(group))) {
+        let message = format!("no row of `{name}` is in group {absent} of `groups`");
+        let mut known = all;
+        known.sort_by(f64::total_cmp);
+        known.dedup();
+        let help = match data.has("group") {
+            true if known.len() > MAX_GROUPS => {
+                format!("the column `group` contains values from {} to {}", known[0], known[known.len() - 1])
+            }
+            true => {
+                let known: Vec<String> = known.iter().map(f64::to_string).collect();
+                format!("the column `group` contains {}", alternatives(known.iter().map(String::as_str)))
+            }
+            false => "without a column `group`, all rows are in group 0".to_owned(),
+        };
+        return Err(ColumnError { message, help });
     }
     let quantity = Quantity::of(values, "quantity").unwrap_or(QUANTITIES[0]);
     let input = TargetInput {
