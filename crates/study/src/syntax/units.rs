@@ -154,9 +154,13 @@ pub(crate) fn parse(text: &str) -> Option<Unit> {
     read(text, 0, &names).ok().filter(|(_, end)| *end == text.len()).map(|(unit, _)| unit)
 }
 
-/// Suggests a unit for `name`: one that differs by case or a typing error, or two joined units
-/// (`Nm`).
+/// Suggests a unit for `name`: one that differs by case or a typing error, two joined units
+/// (`Nm`), or a power (`mm2`).
 pub(crate) fn suggest_unit(name: &str) -> Option<String> {
+    let base = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    if base.len() < name.len() && find(base).is_some() {
+        return Some(format!("{base}^{}", &name[base.len()..]));
+    }
     let cut = name.char_indices().skip(1).map(|(i, _)| name.split_at(i));
     if let Some((a, b)) = cut.take(8).find(|(a, b)| find(a).is_some() && find(b).is_some()) {
         return Some(format!("{a} {b}"));
@@ -597,6 +601,7 @@ mod tests {
         refuse("10 N/", "after `/` a unit is missing");
         refuse("10 N*", "after `*` a unit is missing");
         refuse("10 Nm", "did you mean `N m`?");
+        refuse("10 mm2", "did you mean `mm^2`?");
         refuse("10 hz", "did you mean `Hz`?");
         refuse("2 lbs", "write `lb` for a mass, `lbf` for a force");
         refuse("2 Pounds", "write `lb` for a mass, `lbf` for a force");
