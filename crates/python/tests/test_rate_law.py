@@ -54,8 +54,9 @@ def test_a_law_gets_whole_arrays_of_instants():
         return LIMIT * z[0], K / LIMIT * (v - abs(v) * z)
 
     couple(counted).orbit(118.0, method="harmonic-balance", harmonics=9)
-    # the initial guess by describing functions, and one period by integration, are part of the orbit
-    assert sum(size >= 256 for size in sizes) > 20 and len(sizes) < 1000
+    # single instants remain in the checks of the law (241), in the way from static equilibrium to the first sample
+    # (320 for each of a few evaluations), and in one period by integration
+    assert sum(size >= 256 for size in sizes) > 20 and len(sizes) < 2000
     # without states, a call has all instants of a period
     sizes.clear()
     couple(stickslip.rate_law(lambda u, v, z: sizes.append(len(u)) or 1e9 * u**3, odd=True)).orbit(118.0, method="harmonic-balance")

@@ -9,7 +9,9 @@
 //! - `wav`: sampled sound;
 //! - `parquet`: tables of Parquet, described by values of `thrift`;
 //! - `matlab`, `hdf5`, `numpy`: arrays of MATLAB, HDF5 and NumPy;
-//! - `arrays`: from an array to columns.
+//! - `arrays`: from an array to columns;
+//! - `abaqus_report`, `calculix_print`, `calculix_results`: results of finite-element programs at
+//!   nodes, as `blocks`.
 //!
 //! ```
 //! use stickslip_formats::data::read_bytes;
@@ -20,7 +22,11 @@
 //! # Ok::<(), stickslip_formats::Error>(())
 //! ```
 
+mod abaqus_report;
 mod arrays;
+mod blocks;
+mod calculix_print;
+mod calculix_results;
 mod column;
 mod delimited;
 mod hdf5;
@@ -77,6 +83,9 @@ pub const TABLE: &[DataFormat] = &[
     matlab::FORMAT,
     numpy::NPY,
     numpy::NPZ,
+    calculix_results::FORMAT,
+    calculix_print::FORMAT,
+    abaqus_report::FORMAT,
     // Any text may be a table, so this format comes last.
     delimited::FORMAT,
 ];

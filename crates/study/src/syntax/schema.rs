@@ -522,11 +522,42 @@ const CONTACT: &[Key] = &[
     ),
     TANGENT,
     optional(
+        "preload",
+        ValueType::Table(PRELOAD),
+        "preload of each node from a static step, instead of `preload` in the law",
+        "{ data = \"static\", total = \"2 kN\" }",
+    ),
+    optional(
         "distance",
         ValueType::Quantity(Dimension::LENGTH, Bounds::Positive),
         "largest distance of a node from the second face; absent: a tenth of the square root of the mean area of its \
          faces",
         "\"0.5 mm\"",
+    ),
+];
+
+/// The keys of `preload` in `[[contact]]`.
+const PRELOAD: &[Key] = &[
+    required(
+        "data",
+        ValueType::Text,
+        "name of the [[data]] with the columns `node`, and `pressure` or `force`; positive values press the faces \
+         together, and nodes without a row have no preload",
+        "\"static\"",
+    ),
+    default(
+        "scale",
+        ValueType::Quantity(Dimension::NONE, Bounds::AtLeastZero),
+        "1",
+        "factor of all values, for studies over the preload",
+        "\"load/2\"",
+    ),
+    optional(
+        "total",
+        ValueType::Quantity(Dimension::FORCE, Bounds::Positive),
+        "normal force of the whole contact in the static step; the forces of the joints before `scale` must sum to it \
+         within 2 %",
+        "\"2 kN\"",
     ),
 ];
 

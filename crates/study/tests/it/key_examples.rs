@@ -114,6 +114,8 @@ method = { kind = "harmonic-balance" }
 /// These matrices with their mesh, and a contact on it.
 const MESH: &str = r#"
 schema = 1
+parameters = { load = 2 }
+data = [{ name = "static", file = "static.csv" }]
 structure = { stiffness = "blade.sti", mass = "blade.mas", dofs = "blade.dof", units = "mm-t-s", mesh = "blade.inp" }
 place = [{ name = "tip", dof = "1353.y" }]
 contact = [{ name = "pad", between = ["PADS", "ground"], law = { kind = "friction-contact", tangential = "20 N/mm^3", normal = "30 N/mm^3", friction = 0.3 } }]
@@ -150,7 +152,7 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
         ("body", _) => (BODY, "", &[]),
         ("place", "dofs" | "nodes" | "sum") => (MATRICES, "", &["dof"]),
         ("place", "set") => (MESH, "", &["dof"]),
-        ("contact", _) => (MESH, "", &[]),
+        ("contact" | "contact.preload", _) => (MESH, "", &[]),
         ("place", "directions" | "normal") => (MATRICES, "nodes = [\"188\"]", &["dof"]),
         ("place", "tangent") => (MATRICES, "nodes = [\"188\"]\nnormal = [0, 0, 1]", &["dof"]),
         ("place", "repeat") => (MATRICES, "name = \"tip{i}\"", &[]),
@@ -192,6 +194,7 @@ fn write_files(folder: &Path) {
     };
     write("sweep.csv", b"frequency_Hz,F,response\n118,1,2e-3\n119,1,3e-3\n121,1,1e-3\n");
     write("record.csv", b"time_s,force_N,displacement_m,a\n0,0,0,0\n1,1,1e-3,2\n");
+    write("static.csv", b"node,force_N\n188,700\n189,700\n1353,600\n");
     write("blade.sti", lines(&mut entries(1e3)).as_bytes());
     write("blade_6000.sti", lines(&mut entries(1.1e3)).as_bytes());
     write("blade.mas", lines(&mut (0..9).map(|i| (i, i, 1e-6))).as_bytes());

@@ -130,15 +130,18 @@ fn area(at: [f64; 3]) -> f64 {
 
 /// Returns the joint of a node by hand: the rows of its counterpart, and the law times its area.
 fn by_hand(number: i64, at: [f64; 3], rows: &str) -> String {
+    by_hand_with_preload(number, at, rows, 10.0 * area(at))
+}
+
+fn by_hand_with_preload(number: i64, at: [f64; 3], rows: &str, newtons: f64) -> String {
     let area = area(at);
     format!(
         "[[place]]\nname = \"pad_{number}_a\"\nnodes = [\"{number}\"]\nnormal = [0, 0, 1]\ntangent = [1, 1, 0]\n\
          [[place]]\nname = \"pad_{number}_b\"\n{rows}\nnormal = [0, 0, 1]\ntangent = [1, 1, 0]\n\
          [[joint]]\nname = \"pad_{number}\"\nbetween = [\"pad_{number}_a\", \"pad_{number}_b\"]\n\
-         law = {{ kind = \"friction-contact\", tangential = \"{} N/mm\", normal = \"{} N/mm\", friction = 0.3, preload = \"{} N\" }}\n",
+         law = {{ kind = \"friction-contact\", tangential = \"{} N/mm\", normal = \"{} N/mm\", friction = 0.3, preload = \"{newtons} N\" }}\n",
         200.0 * area,
         300.0 * area,
-        10.0 * area
     )
 }
 
@@ -198,6 +201,106 @@ fn check_lists_contacts_with_gaps_and_nodes_without_counterpart() {
     // the foot is 1 mm below the lid's upper neighbour: all of its nodes look away from it
     let error = read(folder.path(), &[HEAD, STUDY, &CONTACT.replace("PADS", "FOOT")]).unwrap_err().to_string();
     assert!(error.contains("no node of FOOT"), "{error}");
+}
+
+/// Returns the file of a static step, in which node 18 has no row, and a contact that uses it.
+fn preloaded(columns: &str, value: impl Fn(i64, [f64; 3]) -> f64, preload: &str) -> [String; 2] {
+    let rows: String = nodes(0.01, true)
+        .into_iter()
+        .filter(|(number, at)| (*number < 18 && at[2] == 1.0) || *number == 118)
+        .map(|(number, at)| format!("{number},{}\n", value(number, at)))
+        .collect();
+    let contact = CONTACT.replace(", preload = \"10 MPa\"", "");
+    [
+        format!("node,{columns}\n{rows}"),
+        format!("[[data]]\nname = \"static\"\nfile = \"static.csv\"\n{contact}preload = {{ {preload} }}\n"),
+    ]
+}
+
+fn read_preloaded(folder: &Path, [file, contact]: &[String; 2]) -> Result<Study, StudyError> {
+    std::fs::write(folder.join("static.csv"), file).unwrap();
+    read(folder, &[HEAD, STUDY, contact])
+}
+
+/// Pressures or forces of a static step give each joint its own preload.
+#[test]
+fn preloads_of_a_static_step_are_those_of_the_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let pressure = |number: i64| if number == 18 { 0.0 } else { 6.0 + (number % 4) as f64 };
+    let pads = || nodes(0.01, true).into_iter().filter(|(number, at)| *number < 101 && at[2] == 1.0);
+    let joint = |factor: f64, (number, at): Node| {
+        let rows = format!("nodes = [\"{}\"]", number + 91);
+        let newtons = factor * pressure(number) * area(at);
+        let balance = |side: &str, force: f64| {
+            format!("[[force]]\non = \"pad_{number}_{side}.n\"\namplitude = \"{force} N\"\nharmonic = 0\n")
+        };
+        by_hand_with_preload(number, at, &rows, newtons) + &balance("a", newtons) + &balance("b", -newtons)
+    };
+    let head = HEAD.replace("kt = \"200 N/mm^3\"\n", "");
+    let expected = |factor: f64| {
+        let joints: String = pads().map(|node| joint(factor, node)).collect();
+        dataset(folder.path(), &[&head, STUDY, &joints])
+    };
+    let total: f64 = pads().map(|(number, at)| pressure(number) * area(at)).sum();
+    let whole = format!("data = \"static\", total = \"{} N\"", 1.01 * total);
+    let computed = |files: &[String; 2]| {
+        let study = read_preloaded(folder.path(), files).unwrap_or_else(|error| panic!("{error}"));
+        (run(&study, &Context::without_progress(1)).unwrap(), ModelSummary::new(&study).unwrap())
+    };
+    let (found, summary) = computed(&preloaded("pressure_MPa", |number, _| pressure(number), &whole));
+    check_equal(&found, &expected(1.0), 1e-12);
+    let preload = summary.contacts[0].preload.clone().unwrap();
+    assert!((preload.total / total - 1.0).abs() < 1e-12, "{preload:?} {total}");
+    assert_eq!((preload.joints_without_row, preload.rows_without_joint), (1, 1));
+    // the structure is already deformed, so that each joint has its whole preload at rest
+    for joint in summary.joints.iter().filter(|joint| joint.name.ends_with(".n")) {
+        let at_rest = joint.normal_force_at_rest;
+        assert!(
+            joint.normal_force == Some(0.0) || (at_rest.unwrap() / joint.normal_force.unwrap() - 1.0).abs() < 1e-9,
+            "{joint:?}"
+        );
+    }
+    let words = format!("preload {total} N in total, 0 to 9 MPa, none at 1 node");
+    assert!(summary.to_string().contains(&words), "{words}: {summary}");
+    // half of the forces, by a parameter
+    let half = "data = \"static\", scale = \"mu/0.6\"";
+    let (found, _) = computed(&preloaded("force_N", |number, at| pressure(number) * area(at), half));
+    check_equal(&found, &expected(0.5), 1e-12);
+}
+
+#[test]
+fn wrong_preloads_of_a_static_step_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let good = "data = \"static\"";
+    let text = |columns: &str, preload: &str| preloaded(columns, |_, _| 5.0, preload);
+    let changed = |from: &str, to: &str| {
+        let [file, contact] = text("pressure_MPa", good);
+        assert!(contact.contains(from), "{contact}");
+        [file, contact.replace(from, to)]
+    };
+    let spring = "tangential = \"kt\", normal = \"300 N/mm^3\", friction = \"mu\"";
+    for (files, words) in [
+        (text("pressure_MPa", "data = \"statik\""), &["no [[data]] `statik`", "`static`"][..]),
+        (text("stress_MPa", good), &["no column `pressure`", "stress_MPa"]),
+        (text("pressure_N", good), &["`pressure_N`", "has the unit"]),
+        (
+            text("pressure_MPa", "data = \"static\", total = \"2 kN\""),
+            &["sum to 18.75 N", "`total` is 2000 N", "1 rows"],
+        ),
+        (text("pressure_MPa", "data = \"static\", total = \"mu*1 N\""), &["no parameter can change"]),
+        (changed(spring, &format!("{spring}, preload = \"1 MPa\"")), &["both state a preload"]),
+        (
+            changed(&format!("friction-contact\", {spring}"), "jenkins\", stiffness = \"kt\", limit = \"1 MPa\""),
+            &["`jenkins` has no preload"],
+        ),
+        (preloaded("pressure_MPa", |number, _| 12.0 - number as f64, good), &["row 4", "-1", "zero or more"]),
+    ] {
+        let error = read_preloaded(folder.path(), &files).expect_err(&files[1]);
+        let said = format!("{error} {}", error.help_text().unwrap_or_default());
+        assert!(words.iter().all(|words| said.contains(words)), "{words:?}: {said}");
+    }
 }
 
 #[test]

@@ -7,10 +7,13 @@
 //! dampings per area; the joint has them times the area of the node
 //! ([`stickslip_formats::mesh::Face`] tells how areas are shared).
 
+use super::preload::{NodalPreload, PreloadSummary};
 use super::{MeshSource, entry, node_entry, set_problem, table_of_node};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledEntry, CompiledTable, CompiledValue, Environment, Expected, LawCoordinate};
+use crate::data::DataTable;
 use crate::syntax::error::{Location, Problem};
+use crate::syntax::expression::quantity_text;
 use crate::syntax::format::{format_significant, plural_suffix};
 use crate::syntax::key::Bounds;
 use serde_json::{Value as Json, json};
@@ -38,12 +41,16 @@ pub struct ContactSummary {
     pub angle: f64,
     /// Nodes of the first face that no face opposes within the distance.
     pub unpaired: Vec<i64>,
+    /// The preload from a static step, if it is stated.
+    pub preload: Option<PreloadSummary>,
 }
 
 /// The places and joints of a contact.
 pub(crate) struct ExpandedContact {
     pub places: Vec<CompiledTable>,
     pub joints: Vec<CompiledTable>,
+    /// Constant forces that balance the preloads of a static step.
+    pub forces: Vec<CompiledTable>,
     /// Area of each joint, by name, m².
     pub areas: Vec<(String, f64)>,
     pub summary: ContactSummary,
@@ -84,18 +91,21 @@ impl SectorRotation {
 }
 
 /// The environment of values that no parameter may change.
-const NO_PARAMETERS: Environment<'static> = Environment { names: &[], parameters: &[], values: Vec::new() };
+pub(super) const NO_PARAMETERS: Environment<'static> = Environment { names: &[], parameters: &[], values: Vec::new() };
 
 /// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
 /// Returns the places and joints that an entry of `[[contact]]` states. `rotation` is that of the
-/// sectors of a disk, if it is known.
+/// sectors of a disk, if it is known; `data` are the tables of the study, if they could be
+/// read.
 pub(crate) fn expand(
     contact: &CompiledTable,
     source: &MeshSource,
     rotation: Option<SectorRotation>,
+    data: Option<&Vec<DataTable>>,
 ) -> Result<ExpandedContact, Problem> {
+    let preload = data.map(|data| NodalPreload::new(contact, data)).transpose()?.flatten();
     let (sets, location) = between(contact)?;
     let patch = |set: &str| source.mesh.patch(set).map_err(|error| set_problem(error, "between", location));
     let first = patch(&sets[0])?;
@@ -137,9 +147,11 @@ pub(crate) fn expand(
     let mut expanded = ExpandedContact {
         places: Vec::new(),
         joints: Vec::new(),
+        forces: Vec::new(),
         areas: Vec::new(),
         summary: summary(contact, source, &first, &pairs, unpaired),
     };
+    let mut areas = Vec::with_capacity(pairs.len());
     for pair in &pairs {
         let number = source.number(pair.node.node);
         let area = pair.node.area * source.length * source.length;
@@ -158,9 +170,19 @@ pub(crate) fn expand(
         if let Some(opposite) = &pair.opposite {
             side("b", opposite_rows(opposite, source, location), frames[1]);
         }
-        expanded.joints.push(joint(contact, number, &sets[1], area));
+        let mut joint = joint(contact, number, &sets[1], area);
+        if let Some(preload) = &preload {
+            let pressure = preload.pressure(number, area);
+            set_preload(&mut joint, preload, pressure)?;
+            let sides = ["a", "b"].into_iter().take(1 + usize::from(pair.opposite.is_some()));
+            let places: Vec<String> = sides.map(|side| format!("{}_{side}", name_of_node(contact, number))).collect();
+            expanded.forces.extend(preload.balance(contact, &places, pressure * area));
+        }
+        expanded.joints.push(joint);
         expanded.areas.push((name_of_node(contact, number), area));
+        areas.push((number, area));
     }
+    expanded.summary.preload = preload.map(|preload| preload.summary(&areas)).transpose()?;
     Ok(expanded)
 }
 
@@ -171,6 +193,7 @@ pub(crate) fn placeholders(contact: &CompiledTable, numbers: &[i64]) -> Result<E
     let mut expanded = ExpandedContact {
         places: Vec::new(),
         joints: Vec::new(),
+        forces: Vec::new(),
         areas: Vec::new(),
         summary: ContactSummary::default(),
     };
@@ -301,6 +324,17 @@ fn joint(contact: &CompiledTable, number: i64, second: &str, area: f64) -> Compi
     table_of_node(contact, &name, entries)
 }
 
+/// Sets the preload of a joint, as a pressure (Pa).
+fn set_preload(joint: &mut CompiledTable, preload: &NodalPreload, pressure: f64) -> Result<(), Problem> {
+    let Some(entry) = joint.entries.iter_mut().find(|entry| entry.key == "law") else { return Ok(()) };
+    let CompiledValue::Law(info, law, _) = &mut entry.value else { return Ok(()) };
+    if info.parameters.iter().all(|parameter| parameter.key != "preload") {
+        let message = format!("the law `{}` has no preload", info.name);
+        return Err(Problem::new(&entry.location, "law", message).help("use `friction-contact`, or remove `preload`"));
+    }
+    preload.set(law, pressure)
+}
+
 /// Gives the quantities of a law the dimensions per area.
 fn per_area(law: &mut CompiledTable) {
     for entry in &mut law.entries {
@@ -316,7 +350,7 @@ fn per_area(law: &mut CompiledTable) {
 }
 
 /// Force per area.
-const PRESSURE: Dimension = Dimension { kg: 1, m: -1, s: -2, rad: 0 };
+pub(super) const PRESSURE: Dimension = Dimension { kg: 1, m: -1, s: -2, rad: 0 };
 
 fn summary(
     contact: &CompiledTable,
@@ -348,13 +382,14 @@ fn summary(
         gaps,
         angle: pairs.iter().map(angle).fold(0.0, f64::max),
         unpaired,
+        preload: None,
     }
 }
 
 impl ContactSummary {
     /// Describes the contact in a line.
     pub(crate) fn text(&self) -> String {
-        let Self { name, between: [first, second], joints, area: [paired, all], gaps, angle, unpaired } = self;
+        let Self { name, between: [first, second], joints, area: [paired, all], gaps, angle, unpaired, preload } = self;
         let number = |value: f64| format_significant(value, 4);
         let mut text = format!(
             "{name}: {joints} joint{} of {first} on {second}, area {} of {} mm^2",
@@ -369,6 +404,17 @@ impl ContactSummary {
                 number(high * 1e3),
                 number(angle.to_degrees())
             );
+        }
+        if let Some(PreloadSummary { total, pressures: [low, high], joints_without_row, .. }) = preload {
+            text += &format!(
+                ", preload {} in total, {} to {} MPa",
+                quantity_text(*total, Some(Dimension::FORCE)),
+                number(low * 1e-6),
+                number(high * 1e-6)
+            );
+            if *joints_without_row > 0 {
+                text += &format!(", none at {joints_without_row} node{}", plural_suffix(*joints_without_row));
+            }
         }
         if !unpaired.is_empty() {
             // Most nodes that a line lists.
@@ -391,6 +437,7 @@ impl ContactSummary {
             "gaps_m": self.gaps,
             "largest_angle_rad": self.angle,
             "unpaired_nodes": self.unpaired,
+            "preload_N": self.preload.as_ref().map(|preload| preload.total),
         })
     }
 }

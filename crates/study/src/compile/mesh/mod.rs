@@ -2,9 +2,11 @@
 //! anything else reads the lists of the model.
 //!
 //! - `sets`: places of the nodes of a set, and the mean over a set;
-//! - `contact`: joints between two faces.
+//! - `contact`: joints between two faces;
+//! - `preload`: the preloads of their nodes from a static step.
 
 pub(crate) mod contact;
+pub(crate) mod preload;
 pub(crate) mod sets;
 
 use super::compiled::{CompiledEntry, CompiledTable, CompiledValue};

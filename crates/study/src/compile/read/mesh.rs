@@ -49,7 +49,7 @@ impl Reader {
         }
         for contact in &contacts {
             let expanded = match &mesh {
-                Some(mesh) => contact::expand(contact, mesh, rotation),
+                Some(mesh) => contact::expand(contact, mesh, rotation, self.data.as_deref()),
                 None if self.study_file_only => contact::placeholders(contact, &self.mentioned(contact)),
                 None => Err(no_mesh(contact, "between")),
             };
@@ -57,6 +57,7 @@ impl Reader {
                 Ok(expanded) => {
                     lists.place.extend(expanded.places);
                     lists.joint.extend(expanded.joints);
+                    lists.force.extend(expanded.forces);
                     areas.extend(expanded.areas);
                     summaries.push(expanded.summary);
                 }

@@ -280,6 +280,7 @@ impl Reader {
         let title = words(self, "title");
         let source = words(self, "source");
 
+        self.data = self.data(&root).map(Arc::new);
         let (parameters, structure) = match template_and_table(&root) {
             Some((row, table)) => {
                 let TemplateFile { parameters, lists, source } = self.template(row)?;
@@ -294,7 +295,6 @@ impl Reader {
         let StudyRequest { kind, stated: mut study, vary, over } = self.request(&root)?;
         let method = self.method(&root);
         let figure = self.figure(&root);
-        let data = self.data(&root);
         let mut parameters = parameters?;
         let mut structure = structure;
         if let Some(structure) = &mut structure {
@@ -341,7 +341,7 @@ impl Reader {
             study,
             method: method?,
             figure,
-            data: Arc::new(data?),
+            data: self.data.take()?,
             memory: None,
             assembled: LastAssembled::default(),
         })

@@ -3,6 +3,7 @@
 
 use super::structure_cache::StructureCache;
 use crate::compile::repeat::{Iteration, Repetition};
+use crate::data::DataTable;
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::expression::Expression;
 use std::collections::HashMap;
@@ -27,6 +28,8 @@ pub(super) struct Reader {
     /// True if only the study file is read. Then only the names of a structure given by
     /// matrices are known.
     pub(super) study_file_only: bool,
+    /// The tables of `[[data]]`; `None` before they are read, and if they cannot be.
+    pub(super) data: Option<Arc<Vec<DataTable>>>,
     /// Structures that were read before.
     pub(super) structures: Option<Arc<StructureCache>>,
 }

@@ -53,6 +53,14 @@ impl Expression {
         Expression { steps: vec![(Operation::Push(ExpressionValue::bare(value)), 0..0)] }
     }
 
+    /// Returns the expression times a quantity.
+    pub(crate) fn times(&self, si: f64, dimension: Dimension) -> Self {
+        let mut steps = self.steps.clone();
+        steps.push((Operation::Push(ExpressionValue::new(si, dimension)), 0..0));
+        steps.push((Operation::Multiply, 0..0));
+        Expression { steps }
+    }
+
     /// Compiles `text`. A name means the parameter at its index in `parameters`.
     ///
     /// # Errors

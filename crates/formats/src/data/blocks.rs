@@ -1,0 +1,59 @@
+//! Blocks of results of a finite-element program: rows of numbers with titles, for one quantity
+//! at one time.
+
+use super::{Column, DataFile};
+
+/// The blocks of a file. Of several blocks with the same name, the last one counts.
+#[derive(Default)]
+pub(super) struct Blocks {
+    blocks: Vec<Block>,
+    /// Number of blocks that a later one replaced.
+    replaced: usize,
+}
+
+/// The rows of a quantity.
+pub(super) struct Block {
+    /// Name of the quantity; empty for the only one of a file.
+    pub name: String,
+    /// Titles of the columns.
+    pub titles: Vec<String>,
+    /// The rows, with as many numbers each.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Blocks {
+    /// Adds a block; one without rows is ignored.
+    pub fn add(&mut self, block: Block) {
+        if block.rows.is_empty() {
+            return;
+        }
+        match self.blocks.iter_mut().find(|known| known.name == block.name) {
+            Some(known) => {
+                *known = block;
+                self.replaced += 1;
+            }
+            None => self.blocks.push(block),
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// Returns the columns `QUANTITY.TITLE` of all blocks.
+    pub fn into_data(self) -> DataFile {
+        let columns = self.blocks.iter().flat_map(|block| {
+            block.titles.iter().enumerate().map(|(at, title)| Column {
+                name: if block.name.is_empty() { title.clone() } else { format!("{}.{title}", block.name) },
+                values: block.rows.iter().map(|row| row[at]).collect(),
+                ..Column::default()
+            })
+        });
+        let columns = columns.collect();
+        let notes = match self.replaced {
+            0 => Vec::new(),
+            count => vec![format!("{count} earlier results of the same quantities are left out; the last ones count")],
+        };
+        DataFile { columns, notes, ..DataFile::default() }
+    }
+}

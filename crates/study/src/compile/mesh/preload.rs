@@ -1,0 +1,182 @@
+//! Preloads of a contact from a static step: a pressure or a force for each node, from `[[data]]`.
+//!
+//! The preload of a joint is the pressure at its node times the area of the node, or the force of
+//! the node. A node without a row has no preload.
+//!
+//! These are the forces after the static step has deformed the structure, so that displacements
+//! count from there: constant forces on both places of a joint balance its preload. They stand for
+//! the loads of the static step. Without them the structure would relax and lose contact force.
+
+use super::contact::{NO_PARAMETERS, PRESSURE};
+use super::{entry, table_of_node};
+use crate::case::values::ResolvedValue;
+use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Expected};
+use crate::data::{ColumnError, DataTable};
+use crate::syntax::error::{Location, Problem};
+use crate::syntax::format::format_significant;
+use crate::syntax::key::Bounds;
+use crate::syntax::suggest::{alternatives, excerpt};
+use std::collections::{BTreeMap, HashSet};
+use stickslip::dimension::Dimension;
+
+/// Relative difference of the sum of all forces from the stated one above which it is an error.
+/// Areas of nodes shared otherwise in the static step change it by less.
+const LARGEST_DIFFERENCE: f64 = 0.02;
+
+/// The key of a law that the preload of its node replaces.
+const LAW_KEY: &str = "preload";
+
+/// What became of the preload of a contact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreloadSummary {
+    /// Sum of the forces of all joints before `scale`, N.
+    pub total: f64,
+    /// Smallest and largest pressure before `scale`, Pa.
+    pub pressures: [f64; 2],
+    /// Number of joints whose node has no row.
+    pub joints_without_row: usize,
+    /// Number of rows above zero whose node has no joint.
+    pub rows_without_joint: usize,
+}
+
+/// The preload of a contact: values by node.
+pub(super) struct NodalPreload {
+    values: BTreeMap<i64, f64>,
+    is_force: bool,
+    scale: CompiledQuantity,
+    total: Option<f64>,
+    location: Location,
+}
+
+impl NodalPreload {
+    /// Reads the preload of a contact; `None` if it states none.
+    pub fn new(contact: &CompiledTable, data: &[DataTable]) -> Result<Option<NodalPreload>, Problem> {
+        let Some(CompiledValue::Table(stated)) = contact.entry(LAW_KEY).map(|entry| &entry.value) else {
+            return Ok(None);
+        };
+        let Some(CompiledValue::Fixed(ResolvedValue::Text(name))) = stated.entry("data").map(|entry| &entry.value)
+        else {
+            return Ok(None);
+        };
+        let location = stated.location_of("data", None);
+        let table = data.iter().find(|table| table.name == *name).ok_or_else(|| {
+            let message = format!("there is no [[data]] `{}`", excerpt(name));
+            let help = match data {
+                [] => "add [[data]] with `name` and `file`".to_owned(),
+                known => format!("the tables are {}", alternatives(known.iter().map(|table| table.name.as_str()))),
+            };
+            Problem::new(location, "data", message).help(help)
+        })?;
+        let problem = |error: ColumnError| Problem::new(location, "data", error.message).help(error.help);
+        let is_force = !table.has("pressure") && table.has("force");
+        let (role, dimension) = if is_force { ("force", Dimension::FORCE) } else { ("pressure", PRESSURE) };
+        let rows = table.plain_values("node").map_err(problem)?;
+        let numbers = table.values(role, dimension).map_err(problem)?;
+        let mut values = BTreeMap::new();
+        for (row, (node, value)) in rows.iter().zip(&numbers).enumerate() {
+            let wrong = |what: String| {
+                let help = "correct the file: each row has the number of a node, and a value of zero or more that \
+                            presses the faces together";
+                Problem::new(location, "data", format!("row {} of `{name}` {what}", row + 1)).help(help)
+            };
+            if node.fract() != 0.0 || !node.is_finite() {
+                return Err(wrong(format!("has the node {node}, which is no whole number")));
+            }
+            if !(value.is_finite() && *value >= 0.0) {
+                return Err(wrong(format!("has the {role} {value} at node {node}")));
+            }
+            if values.insert(*node as i64, *value).is_some_and(|before| before != *value) {
+                return Err(wrong(format!("states another {role} of node {node} again")));
+            }
+        }
+        let Some(CompiledValue::Quantity { quantity: scale, .. }) = stated.entry("scale").map(|entry| &entry.value)
+        else {
+            return Ok(None);
+        };
+        let total = match stated.entry("total").map(|entry| &entry.value) {
+            Some(CompiledValue::Quantity { quantity, dimension, within, example }) => {
+                if quantity.expression.parameters().next().is_some() {
+                    let message = "this force belongs to the values of the file, so no parameter can change it";
+                    return Err(quantity.problem("total", message).help("write a number with its unit"));
+                }
+                let expected = Expected { dimension: *dimension, within: *within };
+                Some(quantity.number("total", expected, example, &NO_PARAMETERS)?)
+            }
+            _ => None,
+        };
+        Ok(Some(NodalPreload { values, is_force, scale: scale.clone(), total, location: stated.location.clone() }))
+    }
+
+    /// Returns the pressure (Pa) at a node with this area (m²), before `scale`.
+    pub fn pressure(&self, node: i64, area: f64) -> f64 {
+        let value = self.values.get(&node).copied().unwrap_or(0.0);
+        if self.is_force { value / area } else { value }
+    }
+
+    /// Sets the preload of a law per area.
+    pub fn set(&self, law: &mut CompiledTable, pressure: f64) -> Result<(), Problem> {
+        if law.entry(LAW_KEY).is_some() {
+            let message = "the contact and its law both state a preload";
+            return Err(Problem::new(law.location_of(LAW_KEY, None), LAW_KEY, message).help("remove one of them"));
+        }
+        let mut quantity = self.scale.clone();
+        quantity.expression = quantity.expression.times(pressure, PRESSURE);
+        let value = CompiledValue::Quantity {
+            quantity,
+            dimension: PRESSURE,
+            within: Bounds::AtLeastZero,
+            example: "\"2 MPa\"",
+        };
+        law.entries.push(CompiledEntry { key: LAW_KEY, location: self.location.clone(), value });
+        Ok(())
+    }
+
+    /// Returns the constant forces that balance a preload (N) along the normals of these places: on
+    /// the first along its normal, on the second against it.
+    pub fn balance(&self, contact: &CompiledTable, places: &[String], preload: f64) -> Vec<CompiledTable> {
+        let force = |(place, sign): (&String, f64)| {
+            let mut quantity = self.scale.clone();
+            quantity.expression = quantity.expression.times(sign * preload, Dimension::FORCE);
+            let (dimension, within) = (Dimension::FORCE, Bounds::Finite);
+            let value = CompiledValue::Quantity { quantity, dimension, within, example: "\"10 N\"" };
+            let entries = vec![
+                entry("on", ResolvedValue::Text(format!("{place}.n")), &self.location),
+                CompiledEntry { key: "amplitude", location: self.location.clone(), value },
+                entry("harmonic", ResolvedValue::Count(0), &self.location),
+            ];
+            table_of_node(contact, place, entries)
+        };
+        places.iter().zip([1.0, -1.0]).map(force).collect()
+    }
+
+    /// Compares the forces of all joints, (node, area) each, with the stated sum.
+    pub fn summary(&self, joints: &[(i64, f64)]) -> Result<PreloadSummary, Problem> {
+        let pressures = || joints.iter().map(|(node, area)| self.pressure(*node, *area));
+        let total: f64 = joints.iter().zip(pressures()).map(|((_, area), pressure)| area * pressure).sum();
+        let nodes: HashSet<i64> = joints.iter().map(|(node, _)| *node).collect();
+        let summary = PreloadSummary {
+            total,
+            pressures: [pressures().fold(f64::INFINITY, f64::min), pressures().fold(0.0, f64::max)],
+            joints_without_row: nodes.iter().filter(|node| !self.values.contains_key(node)).count(),
+            rows_without_joint: self
+                .values
+                .iter()
+                .filter(|(node, value)| **value > 0.0 && !nodes.contains(node))
+                .count(),
+        };
+        if let Some(stated) = self.total.filter(|stated| (total / stated - 1.0).abs() > LARGEST_DIFFERENCE) {
+            let number = |force: f64| format_significant(force, 4);
+            let message =
+                format!("the forces of the joints sum to {} N, but `total` is {} N", number(total), number(stated));
+            let help = format!(
+                "check the units of the columns and the set of the contact: {} rows belong to no joint, and {} of {} \
+                 joints have no row",
+                summary.rows_without_joint,
+                summary.joints_without_row,
+                joints.len()
+            );
+            return Err(Problem::new(&self.location, LAW_KEY, message).help(help));
+        }
+        Ok(summary)
+    }
+}
