@@ -288,7 +288,7 @@ impl Note {
                     Note::LargeRotation { points: more, place: other, largest: value },
                 ) => {
                     *points += more;
-                    // the order of the points does not matter: of equal values the first name counts
+                    // the result does not depend on the order of the points
                     if *value > *largest || (value == largest && other < place) {
                         (*place, *largest) = (other.clone(), *value);
                     }

@@ -536,6 +536,16 @@ fn contacts_with_the_next_sector_are_the_joints_of_their_nodes() {
     check_equal(&found, &dataset(folder.path(), &[SECTOR, &joints]), 1e-9);
     let summary = ModelSummary::new(&read(folder.path(), &[SECTOR, contact]).unwrap()).unwrap().to_string();
     assert!(summary.contains("shroud: 9 joints of HIGH on next.LOW, area 4 of 4 mm^2"), "{summary}");
+    // preloads of a static step are balanced on both sides of the shroud
+    let rows: String = nodes.iter().map(|(number, _)| format!("{number},10\n")).collect();
+    std::fs::write(folder.path().join("static.csv"), format!("node,pressure_MPa\n{rows}")).unwrap();
+    let data = "[[data]]\nname = \"static\"\nfile = \"static.csv\"\n";
+    let balanced = contact.replace(", preload = \"10 MPa\"", "") + "preload = { data = \"static\" }\n" + data;
+    let balanced = ModelSummary::new(&read(folder.path(), &[SECTOR, &balanced]).unwrap()).unwrap();
+    let normal = balanced.joints.iter().filter(|joint| joint.name.ends_with(".n"));
+    let pressed: Vec<[Option<f64>; 2]> = normal.map(|joint| [joint.normal_force, joint.normal_force_at_rest]).collect();
+    let is_whole = |[preload, at_rest]: &[Option<f64>; 2]| (at_rest.unwrap() / preload.unwrap() - 1.0).abs() < 1e-9;
+    assert!(pressed.len() >= 9 && pressed.iter().all(is_whole), "{pressed:?}");
     // without a stated tangent both sides share one direction in space
     let own =
         dataset(folder.path(), &[SECTOR, &contact.replace("tangent = [\"cos(60 deg)\", \"sin(60 deg)\", 0]\n", "")]);

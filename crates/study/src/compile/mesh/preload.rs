@@ -26,7 +26,7 @@ const LARGEST_DIFFERENCE: f64 = 0.02;
 /// The key of a law that the preload of its node replaces.
 const LAW_KEY: &str = "preload";
 
-/// What became of the preload of a contact.
+/// The preload of a contact for the summary of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PreloadSummary {
     /// Sum of the forces of all joints before `scale`, N.
