@@ -542,7 +542,7 @@ const PRELOAD: &[Key] = &[
         "data",
         ValueType::Text,
         "name of the [[data]] with the columns `node`, and `pressure` or `force`; positive values press the faces \
-         together, and nodes without a row have no preload",
+         together, and nodes without a row have no preload; a column `gap` opens the nodes without pressure",
         "\"static\"",
     ),
     default(

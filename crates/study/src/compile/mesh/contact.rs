@@ -173,7 +173,7 @@ pub(crate) fn expand(
         let mut joint = joint(contact, number, &sets[1], area);
         if let Some(preload) = &preload {
             let pressure = preload.pressure(number, area);
-            set_preload(&mut joint, preload, pressure)?;
+            set_preload(&mut joint, preload, number, pressure)?;
             let sides = ["a", "b"].into_iter().take(1 + usize::from(pair.opposite.is_some()));
             let places: Vec<String> = sides.map(|side| format!("{}_{side}", name_of_node(contact, number))).collect();
             expanded.forces.extend(preload.balance(contact, &places, pressure * area));
@@ -325,14 +325,14 @@ fn joint(contact: &CompiledTable, number: i64, second: &str, area: f64) -> Compi
 }
 
 /// Sets the preload of a joint, as a pressure (Pa).
-fn set_preload(joint: &mut CompiledTable, preload: &NodalPreload, pressure: f64) -> Result<(), Problem> {
+fn set_preload(joint: &mut CompiledTable, preload: &NodalPreload, node: i64, pressure: f64) -> Result<(), Problem> {
     let Some(entry) = joint.entries.iter_mut().find(|entry| entry.key == "law") else { return Ok(()) };
     let CompiledValue::Law(info, law, _) = &mut entry.value else { return Ok(()) };
     if info.parameters.iter().all(|parameter| parameter.key != "preload") {
         let message = format!("the law `{}` has no preload", info.name);
         return Err(Problem::new(&entry.location, "law", message).help("use `friction-contact`, or remove `preload`"));
     }
-    preload.set(law, pressure)
+    preload.set(law, node, pressure)
 }
 
 /// Gives the quantities of a law the dimensions per area.

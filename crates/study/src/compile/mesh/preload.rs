@@ -1,7 +1,8 @@
 //! Preloads of a contact from a static step: a pressure or a force for each node, from `[[data]]`.
 //!
 //! The preload of a joint is the pressure at its node times the area of the node, or the force of
-//! the node. A node without a row has no preload.
+//! the node. A node without a row has no preload. A node without pressure and with a `gap` has the
+//! negative preload that closes at this gap.
 //!
 //! These are the forces after the static step has deformed the structure, so that displacements
 //! count from there: constant forces on both places of a joint balance its preload. They stand for
@@ -43,6 +44,8 @@ pub struct PreloadSummary {
 pub(super) struct NodalPreload {
     values: BTreeMap<i64, f64>,
     is_force: bool,
+    /// Gaps of nodes without pressure, m.
+    gaps: BTreeMap<i64, f64>,
     scale: CompiledQuantity,
     total: Option<f64>,
     location: Location,
@@ -72,7 +75,8 @@ impl NodalPreload {
         let (role, dimension) = if is_force { ("force", Dimension::FORCE) } else { ("pressure", PRESSURE) };
         let rows = table.plain_values("node").map_err(problem)?;
         let numbers = table.values(role, dimension).map_err(problem)?;
-        let mut values = BTreeMap::new();
+        let gap = if table.has("gap") { table.values("gap", Dimension::LENGTH).map_err(problem)? } else { Vec::new() };
+        let (mut values, mut gaps) = (BTreeMap::new(), BTreeMap::new());
         for (row, (node, value)) in rows.iter().zip(&numbers).enumerate() {
             let wrong = |what: String| {
                 let help = "correct the file: each row has the number of a node, and a value of zero or more that \
@@ -87,6 +91,9 @@ impl NodalPreload {
             }
             if values.insert(*node as i64, *value).is_some_and(|before| before != *value) {
                 return Err(wrong(format!("states another {role} of node {node} again")));
+            }
+            if let Some(gap) = gap.get(row).filter(|gap| *value == 0.0 && **gap > 0.0) {
+                gaps.insert(*node as i64, *gap);
             }
         }
         let Some(CompiledValue::Quantity { quantity: scale, .. }) = stated.entry("scale").map(|entry| &entry.value)
@@ -104,7 +111,14 @@ impl NodalPreload {
             }
             _ => None,
         };
-        Ok(Some(NodalPreload { values, is_force, scale: scale.clone(), total, location: stated.location.clone() }))
+        Ok(Some(NodalPreload {
+            values,
+            is_force,
+            gaps,
+            scale: scale.clone(),
+            total,
+            location: stated.location.clone(),
+        }))
     }
 
     /// Returns the pressure (Pa) at a node with this area (m²), before `scale`.
@@ -113,20 +127,19 @@ impl NodalPreload {
         if self.is_force { value / area } else { value }
     }
 
-    /// Sets the preload of a law per area.
-    pub fn set(&self, law: &mut CompiledTable, pressure: f64) -> Result<(), Problem> {
+    /// Sets the preload of a law per area at a node with this pressure (Pa).
+    pub fn set(&self, law: &mut CompiledTable, node: i64, pressure: f64) -> Result<(), Problem> {
         if law.entry(LAW_KEY).is_some() {
             let message = "the contact and its law both state a preload";
             return Err(Problem::new(law.location_of(LAW_KEY, None), LAW_KEY, message).help("remove one of them"));
         }
-        let mut quantity = self.scale.clone();
-        quantity.expression = quantity.expression.times(pressure, PRESSURE);
-        let value = CompiledValue::Quantity {
-            quantity,
-            dimension: PRESSURE,
-            within: Bounds::AtLeastZero,
-            example: "\"2 MPa\"",
+        let stiffness = law.entry("normal").map(|entry| &entry.value);
+        let quantity = match (self.gaps.get(&node), stiffness) {
+            (Some(gap), Some(CompiledValue::Quantity { quantity, .. })) => times(quantity, -gap, Dimension::LENGTH),
+            _ => times(&self.scale, pressure, PRESSURE),
         };
+        let within = Bounds::Finite;
+        let value = CompiledValue::Quantity { quantity, dimension: PRESSURE, within, example: "\"2 MPa\"" };
         law.entries.push(CompiledEntry { key: LAW_KEY, location: self.location.clone(), value });
         Ok(())
     }
@@ -135,8 +148,7 @@ impl NodalPreload {
     /// the first along its normal, on the second against it.
     pub fn balance(&self, contact: &CompiledTable, places: &[String], preload: f64) -> Vec<CompiledTable> {
         let force = |(place, sign): (&String, f64)| {
-            let mut quantity = self.scale.clone();
-            quantity.expression = quantity.expression.times(sign * preload, Dimension::FORCE);
+            let quantity = times(&self.scale, sign * preload, Dimension::FORCE);
             let (dimension, within) = (Dimension::FORCE, Bounds::Finite);
             let value = CompiledValue::Quantity { quantity, dimension, within, example: "\"10 N\"" };
             let entries = vec![
@@ -179,4 +191,9 @@ impl NodalPreload {
         }
         Ok(summary)
     }
+}
+
+/// Returns a stated quantity times another one.
+fn times(stated: &CompiledQuantity, si: f64, dimension: Dimension) -> CompiledQuantity {
+    CompiledQuantity { expression: stated.expression.times(si, dimension), ..stated.clone() }
 }
