@@ -46,7 +46,12 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
     }
     if tables.is_empty() {
         let remedy = "write the report with the values at nodes, not only their extremes";
-        return Err(Error::new(ErrorKind::Format, Location::File, "the report has no table of values".into(), remedy));
+        return Err(Error::new(
+            ErrorKind::Truncated,
+            Location::File,
+            "the report has no table of values".into(),
+            remedy,
+        ));
     }
     let is_alone = tables.len() == 1;
     let mut blocks = Blocks::default();

@@ -40,7 +40,7 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
     close(&mut blocks, open)?;
     if blocks.is_empty() {
         let remedy = "request results in the deck, for example *CONTACT PRINT with CSTR, or *NODE PRINT";
-        return Err(Error::new(ErrorKind::Format, Location::File, "the file has no results".into(), remedy));
+        return Err(Error::new(ErrorKind::Truncated, Location::File, "the file has no results".into(), remedy));
     }
     Ok(blocks.into_data())
 }

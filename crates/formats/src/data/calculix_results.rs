@@ -54,7 +54,12 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
     }
     if blocks.is_empty() {
         let remedy = "request results at nodes as text, for example *CONTACT FILE or *NODE FILE in the deck";
-        return Err(Error::new(ErrorKind::Format, Location::File, "the file has no results at nodes".into(), remedy));
+        return Err(Error::new(
+            ErrorKind::Truncated,
+            Location::File,
+            "the file has no results at nodes".into(),
+            remedy,
+        ));
     }
     Ok(blocks.into_data())
 }

@@ -70,6 +70,20 @@ fn what_is_not_read_is_listed() {
     assert_eq!(file.notes, ["line 6 is left out: it has 2 of 3 fields", "Prüfstand 3"]);
 }
 
+#[test]
+fn incomplete_results_of_finite_element_programs_are_refused() {
+    for (name, length, words) in [
+        ("contact.frd", 2000, "no results at nodes"),
+        ("contact.frd", 8978, "the last result is not complete"),
+        ("contact.dat", 1500, "different numbers of values"),
+        ("contact.rpt", 400, "no table of values"),
+    ] {
+        let bytes = std::fs::read(folder().join(name)).expect("a file");
+        let error = read_bytes(&bytes[..length]).expect_err(name).to_string();
+        assert!(error.contains(words), "{name}: {error}");
+    }
+}
+
 fn files() -> Vec<Vec<u8>> {
     expected().iter().map(|(name, _)| std::fs::read(folder().join(name)).expect("a file")).collect()
 }
