@@ -293,14 +293,7 @@ impl CompiledQuantity {
             return Ok(number);
         }
         let message = format!("must be {}, found {}", within.description(), quantity_text(number, Some(dimension)));
-        // the page of the explorer shows a message without the line of the file
-        let problem = self.problem(key, message);
-        let has_parameter = self.expression.parameters().next().is_some();
-        Err(if has_parameter {
-            problem.help(format!("the value follows from `{}`", excerpt(&self.text)))
-        } else {
-            problem
-        })
+        Err(self.problem(key, message))
     }
 
     /// Converts `value`, the value of this quantity, to a number of this dimension.
