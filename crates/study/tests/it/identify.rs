@@ -131,6 +131,20 @@ fn a_loop_gives_its_parameters_and_a_study_file() {
 }
 
 /// A coefficient of friction and a normal load act only by their product.
+/// Each group of loops begins unloaded, also after a group that ends in slip.
+#[test]
+fn groups_of_loops_are_records_of_their_own() {
+    let (spring, stiffness, limit) = (2e3, 1e5, 3.0);
+    let row = |group: f64| move |(u, force): (f64, f64)| vec![u, force, group];
+    let first = loops(spring, stiffness, limit, 2e-4).into_iter().map(row(1.0));
+    let second = loops(spring, stiffness, limit, 1e-4).into_iter().map(row(2.0));
+    let dataset = identify(&csv("displacement_m,force_N,group", first.chain(second)), &loop_study(""));
+    for (name, truth) in [("k", spring), ("kt", stiffness), ("Ft", limit)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < 1e-6, "{name}: {}", found.value);
+    }
+}
+
 #[test]
 fn undetermined_parameters_are_named() {
     let mut noise = Noise(3);

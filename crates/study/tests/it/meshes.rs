@@ -288,7 +288,12 @@ fn wrong_preloads_of_a_static_step_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     write_files(folder.path(), 0.01, true);
     let good = "data = \"static\"";
-    let text = |columns: &str, preload: &str| preloaded(columns, |_, _| 5.0, preload);
+    let text = |columns: &str, preload: &str| {
+        let [file, contact] = preloaded(columns, |_, _| 5.0, preload);
+        let more = if columns.contains(',') { ",5\n" } else { "\n" };
+        let lines = file.lines().map(|line| line.to_owned() + if line.starts_with("node") { "\n" } else { more });
+        [lines.collect(), contact]
+    };
     let changed = |from: &str, to: &str| {
         let [file, contact] = text("pressure_MPa", good);
         assert!(contact.contains(from), "{contact}");
@@ -298,6 +303,7 @@ fn wrong_preloads_of_a_static_step_are_refused() {
     for (files, words) in [
         (text("pressure_MPa", "data = \"statik\""), &["no [[data]] `statik`", "`static`"][..]),
         (text("stress_MPa", good), &["no column `pressure`", "stress_MPa"]),
+        (text("force_N,pressure_MPa", good), &["`pressure` and a column `force`", "rename"]),
         (text("pressure_N", good), &["`pressure_N`", "has the unit"]),
         (
             text("pressure_MPa", "data = \"static\", total = \"2 kN\""),

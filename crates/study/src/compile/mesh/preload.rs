@@ -71,10 +71,23 @@ impl NodalPreload {
             Problem::new(location, "data", message).help(help)
         })?;
         let problem = |error: ColumnError| Problem::new(location, "data", error.message).help(error.help);
-        let is_force = !table.has("pressure") && table.has("force");
+        if table.has("pressure") && table.has("force") {
+            let message = format!("`{name}` has a column `pressure` and a column `force`");
+            return Err(Problem::new(location, "data", message).help("rename one of them; the other is used"));
+        }
+        let is_force = table.has("force");
         let (role, dimension) = if is_force { ("force", Dimension::FORCE) } else { ("pressure", PRESSURE) };
         let rows = table.plain_values("node").map_err(problem)?;
         let numbers = table.values(role, dimension).map_err(problem)?;
+        if rows.len() != numbers.len() {
+            let message = format!(
+                "the column `node` of `{name}` has {} rows, but the column `{role}` has {}",
+                rows.len(),
+                numbers.len()
+            );
+            let help = "name columns of one result in [[data]]";
+            return Err(Problem::new(location, "data", message).help(help));
+        }
         let gap = if table.has("gap") { table.values("gap", Dimension::LENGTH).map_err(problem)? } else { Vec::new() };
         let (mut values, mut gaps) = (BTreeMap::new(), BTreeMap::new());
         for (row, (node, value)) in rows.iter().zip(&numbers).enumerate() {

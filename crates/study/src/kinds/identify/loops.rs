@@ -1,7 +1,8 @@
 //! Loops of force over displacement of a joint, under the measured displacements.
 //!
 //! Springs and joints between the same two places act in parallel to the joint. A motion is
-//! straight between two rows; laws that depend on velocity need the time of each row.
+//! straight between two rows; laws that depend on velocity need the time of each row. Each group
+//! is a record of its own, which begins unloaded.
 
 use super::law_path::{LoadPath, forces_along};
 use super::targets::{Fitted, Measured, RowStates, Target, TargetInput};
@@ -16,7 +17,8 @@ pub(super) struct LoopTarget {
     joint: String,
     predict: bool,
     cycle: bool,
-    path: LoadPath,
+    /// The path of each group, in the order of the rows.
+    paths: Vec<LoadPath>,
     measured: Vec<Measured>,
 }
 
@@ -26,8 +28,12 @@ impl LoopTarget {
         let forces = input.column("force", Dimension::FORCE)?;
         let time = input.optional_column("time", Dimension::TIME)?;
         let error = |message: String, help: &str| Err(ColumnError { message, help: help.to_owned() });
+        let rows: Vec<usize> = (0..forces.len()).collect();
+        let groups: Vec<&[usize]> = rows.chunk_by(|a, b| input.group(*a) == input.group(*b)).collect();
         if let Some(time) = &time
-            && let Some(row) = time.windows(2).position(|pair| pair[0] >= pair[1])
+            && let Some(row) = (1..time.len())
+                .find(|row| input.group(row - 1) == input.group(*row) && time[row - 1] >= time[*row])
+                .map(|row| row - 1)
         {
             let row = input.measured(row + 1, 0.0, 0.0, 1.0).row;
             return error(
@@ -44,12 +50,16 @@ impl LoopTarget {
         let deviations = input.deviations(&forces, Dimension::FORCE)?;
         let measured =
             (0..forces.len()).map(|i| input.measured(i, displacement[i], forces[i], deviations[i])).collect();
+        let path = |rows: &&[usize]| LoadPath {
+            displacement: rows.iter().map(|row| displacement[*row]).collect(),
+            time: time.as_ref().map(|time| rows.iter().map(|row| time[*row]).collect()),
+        };
         let target = LoopTarget {
             data: input.data.name.clone(),
             joint: input.at.to_owned(),
             predict: input.predict,
             cycle: input.values.flag("cycle") == Some(true),
-            path: LoadPath { displacement, time },
+            paths: groups.iter().map(path).collect(),
             measured,
         };
         // a law that cannot follow a path is refused before the run
@@ -88,22 +98,26 @@ impl Target for LoopTarget {
             [a, b] if [b, a] == [&own.between[0], &own.between[1]] => Some(-1.0),
             _ => None,
         };
-        let path = if self.cycle { self.path.twice() } else { self.path.clone() };
-        let skipped = path.displacement.len() - self.path.displacement.len();
-        let mut values = vec![0.0; self.measured.len()];
-        for joint in joints {
-            let Some(sign) = sign(&joint.between) else { continue };
-            let forces = forces_along(&*joint.law, &path.scaled(sign))?;
-            values.iter_mut().zip(&forces[skipped..]).for_each(|(value, force)| *value += sign * force);
-        }
-        for spring in case.model.springs.iter().filter(|spring| sign(&spring.between).is_some()) {
-            let viscous = spring.damping != 0.0 && self.path.time.is_some();
-            for (i, value) in values.iter_mut().enumerate() {
-                *value += spring.stiffness * self.path.displacement[i];
-                if viscous {
-                    *value += spring.damping * self.path.velocity(i);
+        let mut values = Vec::with_capacity(self.measured.len());
+        for path in &self.paths {
+            let whole = if self.cycle { path.twice() } else { path.clone() };
+            let skipped = whole.displacement.len() - path.displacement.len();
+            let mut of_path = vec![0.0; path.displacement.len()];
+            for joint in joints {
+                let Some(sign) = sign(&joint.between) else { continue };
+                let forces = forces_along(&*joint.law, &whole.scaled(sign))?;
+                of_path.iter_mut().zip(&forces[skipped..]).for_each(|(value, force)| *value += sign * force);
+            }
+            for spring in case.model.springs.iter().filter(|spring| sign(&spring.between).is_some()) {
+                let viscous = spring.damping != 0.0 && path.time.is_some();
+                for (i, value) in of_path.iter_mut().enumerate() {
+                    *value += spring.stiffness * path.displacement[i];
+                    if viscous {
+                        *value += spring.damping * path.velocity(i);
+                    }
                 }
             }
+            values.extend(of_path);
         }
         Ok(Fitted { values, states: Vec::new() })
     }
