@@ -3,9 +3,9 @@
 //! A line of dashes separates the titles, on one or two lines, from the rows. A blank line ends
 //! them; smallest and largest values follow.
 
-use super::blocks::{Block, Blocks};
+use super::blocks::{Block, Blocks, numbered_titles};
 use super::{DataFile, DataFormat};
-use crate::error::{Error, ErrorKind, Location};
+use crate::error::Error;
 use crate::text::{Line, Lines};
 
 pub(super) const FORMAT: DataFormat = DataFormat {
@@ -44,22 +44,14 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
             above.push(line);
         }
     }
-    if tables.is_empty() {
-        let remedy = "write the report with the values at nodes, not only their extremes";
-        return Err(Error::new(
-            ErrorKind::Truncated,
-            Location::File,
-            "the report has no table of values".into(),
-            remedy,
-        ));
-    }
     let is_alone = tables.len() == 1;
     let mut blocks = Blocks::default();
     tables.into_iter().for_each(|table| {
         let name = if is_alone { String::new() } else { table.name };
         blocks.add(Block { name, ..table });
     });
-    Ok(blocks.into_data())
+    let remedy = "write the report with the values at nodes, not only their extremes";
+    blocks.into_data("the report has no table of values", remedy)
 }
 
 /// Reads the rows up to a blank line.
@@ -92,5 +84,5 @@ fn titles(above: &[Line<'_>], width: usize) -> Vec<String> {
             other => other.to_owned(),
         })
         .collect();
-    if words.len() == width { words } else { (1..=width).map(|at| format!("column_{at}")).collect() }
+    if words.len() == width { words } else { numbered_titles(width) }
 }

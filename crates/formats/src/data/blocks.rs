@@ -2,6 +2,7 @@
 //! at one time.
 
 use super::{Column, DataFile};
+use crate::error::{Error, ErrorKind, Location};
 
 /// The blocks of a file. Of several blocks with the same name, the last one counts.
 #[derive(Default)]
@@ -36,12 +37,14 @@ impl Blocks {
         }
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.blocks.is_empty()
-    }
-
     /// Returns the columns `QUANTITY.TITLE` of all blocks.
-    pub fn into_data(self) -> DataFile {
+    ///
+    /// # Errors
+    /// There is no block: `problem` says what the file has not, `remedy` what to do.
+    pub fn into_data(self, problem: &str, remedy: &str) -> Result<DataFile, Error> {
+        if self.blocks.is_empty() {
+            return Err(Error::new(ErrorKind::Truncated, Location::File, problem.to_owned(), remedy));
+        }
         let columns = self.blocks.iter().flat_map(|block| {
             block.titles.iter().enumerate().map(|(at, title)| Column {
                 name: if block.name.is_empty() { title.clone() } else { format!("{}.{title}", block.name) },
@@ -54,6 +57,11 @@ impl Blocks {
             0 => Vec::new(),
             count => vec![format!("{count} earlier results of the same quantities are left out; the last ones count")],
         };
-        DataFile { columns, notes, ..DataFile::default() }
+        Ok(DataFile { columns, notes, ..DataFile::default() })
     }
+}
+
+/// Returns titles for columns whose titles are unknown.
+pub(super) fn numbered_titles(width: usize) -> Vec<String> {
+    (1..=width).map(|at| format!("column_{at}")).collect()
 }

@@ -3,7 +3,7 @@
 //!
 //! The components stand in parentheses. If a row has one number more, it begins with the node.
 
-use super::blocks::{Block, Blocks};
+use super::blocks::{Block, Blocks, numbered_titles};
 use super::{DataFile, DataFormat};
 use crate::error::{Error, ErrorKind, Location};
 use crate::text::Lines;
@@ -38,11 +38,8 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
         }
     }
     close(&mut blocks, open)?;
-    if blocks.is_empty() {
-        let remedy = "request results in the deck, for example *CONTACT PRINT with CSTR, or *NODE PRINT";
-        return Err(Error::new(ErrorKind::Truncated, Location::File, "the file has no results".into(), remedy));
-    }
-    Ok(blocks.into_data())
+    let remedy = "request results in the deck, for example *CONTACT PRINT with CSTR, or *NODE PRINT";
+    blocks.into_data("the file has no results", remedy)
 }
 
 /// Reads a heading `QUANTITY (COMPONENTS) for set NAME and time T`.
@@ -76,7 +73,7 @@ fn close(blocks: &mut Blocks, open: Option<(Heading, Vec<Vec<f64>>)>) -> Result<
             ["element".to_owned(), "face".to_owned()].into_iter().chain(components.into_iter().skip(1)).collect()
         }
         Some(1) => std::iter::once("node".to_owned()).chain(components).collect(),
-        _ => (1..=width).map(|at| format!("column_{at}")).collect(),
+        _ => numbered_titles(width),
     };
     blocks.add(Block { name, titles, rows });
     Ok(())

@@ -52,16 +52,8 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
         let remedy = "run the analysis again, or copy the file again";
         return Err(Error::new(ErrorKind::Truncated, Location::File, "the last result is not complete".into(), remedy));
     }
-    if blocks.is_empty() {
-        let remedy = "request results at nodes as text, for example *CONTACT FILE or *NODE FILE in the deck";
-        return Err(Error::new(
-            ErrorKind::Truncated,
-            Location::File,
-            "the file has no results at nodes".into(),
-            remedy,
-        ));
-    }
-    Ok(blocks.into_data())
+    let remedy = "request results at nodes as text, for example *CONTACT FILE or *NODE FILE in the deck";
+    blocks.into_data("the file has no results at nodes", remedy)
 }
 
 /// Adds the values of a line to the last row.

@@ -21,16 +21,17 @@ impl SurveyedCase {
     pub(crate) fn new(study: &Study, index: usize) -> Result<Self, StudyError> {
         let case = study.case(index)?;
         // contacts that a constant load closes count as closed
-        let searched_and_found = Cell::new((false, false));
+        let is_missing = Cell::new(false);
         let forces = |system: &System| {
-            let found = StaticEquilibrium::under_load(system).map(|equilibrium| equilibrium.forces());
-            searched_and_found.set((StaticEquilibrium::has_load(system), found.is_some()));
-            found
+            let is_loaded = StaticEquilibrium::has_load(system);
+            let found = if is_loaded { StaticEquilibrium::of(system) } else { None };
+            is_missing.set(is_loaded && found.is_none());
+            Some(found?.forces())
         };
         let system = study.assembled.system(&case.model);
         let system = system.map_err(|error| study.error_at("study", 0, error.key, error.to_string(), None))?;
         let survey = case.model.survey_of(&system, &forces);
-        let lacks_equilibrium = searched_and_found.get() == (true, false) && survey.free().rigid > 0;
+        let lacks_equilibrium = is_missing.get() && survey.free().rigid > 0;
         Ok(SurveyedCase { case, survey, lacks_equilibrium })
     }
 }

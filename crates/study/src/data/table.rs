@@ -41,6 +41,20 @@ impl DataTable {
         DataTable { name, file, columns, content }
     }
 
+    /// Returns the table with this name.
+    ///
+    /// # Errors
+    /// There is none; the help lists the tables.
+    pub fn find_in<'a>(tables: &'a [DataTable], name: &str) -> Result<&'a DataTable, ColumnError> {
+        tables.iter().find(|table| table.name == name).ok_or_else(|| {
+            let help = match tables {
+                [] => "add [[data]] with `name` and `file`".to_owned(),
+                known => format!("the tables are {}", alternatives(known.iter().map(|table| table.name.as_str()))),
+            };
+            ColumnError { message: format!("there is no [[data]] `{}`", excerpt(name)), help }
+        })
+    }
+
     /// Returns whether the file was read.
     pub fn is_read(&self) -> bool {
         self.content.is_some()

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 use stickslip::law::IdealElement;
-use stickslip::model::{Body, Joint, Model, ROTATIONS};
+use stickslip::model::{Joint, Model};
 use stickslip::orbit::{Accuracy, JointMotion, Orbit, PlaceMotion};
 use stickslip::structure::Reduction;
 
@@ -160,21 +160,15 @@ impl Note {
         let range = spread.map(|spread| Note::HistorySpread(1, spread));
         said.chain(Note::stuck_offset_note(model, orbit))
             .chain(range)
-            .chain(Note::large_rotation(model, orbit))
+            .chain(Note::large_rotation(orbit))
             .chain(Note::slipping_note(model, orbit))
             .collect()
     }
 
     /// Returns a note if a body rotates so far that its displacements are no longer linear in
     /// the rotation.
-    fn large_rotation(model: &Model, orbit: &Orbit) -> Option<Note> {
-        // a sector of a disk appends its number to the name of the body
-        let is_rotation = |name: &str| {
-            let of_body = |body: &Body| name.strip_prefix(&*body.name).is_some_and(|rest| rest.starts_with(['.', '_']));
-            name.rsplit_once('.').is_some_and(|(_, along)| ROTATIONS.contains(&along))
-                && model.bodies.iter().any(of_body)
-        };
-        let rotations = orbit.places.iter().filter(|place| is_rotation(&place.name));
+    fn large_rotation(orbit: &Orbit) -> Option<Note> {
+        let rotations = orbit.places.iter().filter(|place| place.rotation_radius.is_some());
         let angle = |place: &PlaceMotion| place.maximum.abs().max(place.minimum.abs());
         let (place, largest) = rotations.map(|place| (place, angle(place))).max_by(|a, b| a.1.total_cmp(&b.1))?;
         // Rotation (rad) from which displacements have an error of 0.5 %, `θ²/2`.

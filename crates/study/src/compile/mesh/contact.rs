@@ -8,14 +8,13 @@
 //! ([`stickslip_formats::mesh::Face`] tells how areas are shared).
 
 use super::preload::{NodalPreload, PreloadSummary};
-use super::{MeshSource, entry, node_entry, set_problem, table_of_node};
+use super::{MeshSource, NO_PARAMETERS, entry, fixed_number, node_entry, set_problem, table_of_node};
 use crate::case::values::ResolvedValue;
-use crate::compile::compiled::{CompiledEntry, CompiledTable, CompiledValue, Environment, Expected, LawCoordinate};
+use crate::compile::compiled::{CompiledEntry, CompiledTable, CompiledValue, LawCoordinate};
 use crate::data::DataTable;
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::quantity_text;
 use crate::syntax::format::{format_significant, plural_suffix};
-use crate::syntax::key::Bounds;
 use serde_json::{Value as Json, json};
 use stickslip::dimension::Dimension;
 use stickslip::model::{Frame, GROUND, NEXT};
@@ -90,9 +89,6 @@ impl SectorRotation {
     }
 }
 
-/// The environment of values that no parameter may change.
-pub(super) const NO_PARAMETERS: Environment<'static> = Environment { names: &[], parameters: &[], values: Vec::new() };
-
 /// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
@@ -121,7 +117,7 @@ pub(crate) fn expand(
     };
     let in_next = |vector: [f64; 3]| rotation.map_or(vector, |rotation| rotation.in_next(vector));
     let second = if sets[1] == GROUND { None } else { Some(patch(next_set.unwrap_or(&sets[1]))?) };
-    let limit = match distance(contact)? {
+    let limit = match fixed_number(contact, "distance", "a parameter cannot change which nodes are in contact")? {
         Some(meters) => meters / source.length,
         None => second.as_ref().map_or(0.0, default_distance),
     };
@@ -216,21 +212,6 @@ fn between(contact: &CompiledTable) -> Result<([String; 2], &Location), Problem>
         _ => Err(Problem::new(location, "between", "a contact is between two sets of the mesh")
             .help("write between = [\"PADS\", \"DAMPER_TOP\"], [\"PADS\", \"ground\"] or, on a disk, [\"HIGH\", \"next.LOW\"]")),
     }
-}
-
-/// Returns the stated distance, m. It decides which joints exist, so no parameter may change it.
-fn distance(contact: &CompiledTable) -> Result<Option<f64>, Problem> {
-    let Some(CompiledValue::Quantity { quantity, example, .. }) = contact.entry("distance").map(|entry| &entry.value)
-    else {
-        return Ok(None);
-    };
-    if quantity.expression.parameters().next().is_some() {
-        return Err(quantity
-            .problem("distance", "a parameter cannot change which nodes are in contact")
-            .help("write a number with its unit"));
-    }
-    let expected = Expected { dimension: Dimension::LENGTH, within: Bounds::Positive };
-    quantity.number("distance", expected, example, &NO_PARAMETERS).map(Some)
 }
 
 /// Returns a tenth of the size of a face, the square root of its area.

@@ -9,7 +9,7 @@ pub(crate) mod contact;
 pub(crate) mod preload;
 pub(crate) mod sets;
 
-use super::compiled::{CompiledEntry, CompiledTable, CompiledValue};
+use super::compiled::{CompiledEntry, CompiledTable, CompiledValue, Environment, Expected};
 use crate::case::values::ResolvedValue;
 use crate::syntax::error::{Location, Problem};
 use contact::ContactSummary;
@@ -47,6 +47,23 @@ impl MeshSource {
 /// Returns a problem for a set that the mesh does not have.
 fn set_problem(error: Error, key: &str, location: &Location) -> Problem {
     Problem::new(location, key, error.problem).help(error.remedy)
+}
+
+/// The environment of values that no parameter may change.
+const NO_PARAMETERS: Environment<'static> = Environment { names: &[], parameters: &[], values: Vec::new() };
+
+/// Returns a stated number in SI that no parameter may change, for the reason `why`.
+fn fixed_number(table: &CompiledTable, key: &str, why: &str) -> Result<Option<f64>, Problem> {
+    let Some(CompiledValue::Quantity { quantity, dimension, within, example }) =
+        table.entry(key).map(|entry| &entry.value)
+    else {
+        return Ok(None);
+    };
+    if quantity.expression.parameters().next().is_some() {
+        return Err(quantity.problem(key, why).help("write a number with its unit"));
+    }
+    let expected = Expected { dimension: *dimension, within: *within };
+    quantity.number(key, expected, example, &NO_PARAMETERS).map(Some)
 }
 
 /// Returns an entry with a value that is already known.

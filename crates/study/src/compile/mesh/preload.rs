@@ -8,15 +8,14 @@
 //! count from there: constant forces on both places of a joint balance its preload. They stand for
 //! the loads of the static step. Without them the structure would relax and lose contact force.
 
-use super::contact::{NO_PARAMETERS, PRESSURE};
-use super::{entry, table_of_node};
+use super::contact::PRESSURE;
+use super::{entry, fixed_number, table_of_node};
 use crate::case::values::ResolvedValue;
-use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Expected};
+use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue};
 use crate::data::{ColumnError, DataTable};
 use crate::syntax::error::{Location, Problem};
 use crate::syntax::format::format_significant;
 use crate::syntax::key::Bounds;
-use crate::syntax::suggest::{alternatives, excerpt};
 use std::collections::{BTreeMap, HashSet};
 use stickslip::dimension::Dimension;
 
@@ -57,81 +56,58 @@ impl NodalPreload {
         let Some(CompiledValue::Table(stated)) = contact.entry(LAW_KEY).map(|entry| &entry.value) else {
             return Ok(None);
         };
-        let Some(CompiledValue::Fixed(ResolvedValue::Text(name))) = stated.entry("data").map(|entry| &entry.value)
-        else {
+        let scale = stated.entry("scale").map(|entry| &entry.value);
+        let (Some(name), Some(CompiledValue::Quantity { quantity: scale, .. })) = (stated.text("data"), scale) else {
             return Ok(None);
         };
-        let location = stated.location_of("data", None);
-        let table = data.iter().find(|table| table.name == *name).ok_or_else(|| {
-            let message = format!("there is no [[data]] `{}`", excerpt(name));
-            let help = match data {
-                [] => "add [[data]] with `name` and `file`".to_owned(),
-                known => format!("the tables are {}", alternatives(known.iter().map(|table| table.name.as_str()))),
-            };
-            Problem::new(location, "data", message).help(help)
-        })?;
-        let problem = |error: ColumnError| Problem::new(location, "data", error.message).help(error.help);
+        let why = "this force belongs to the values of the file, so no parameter can change it";
+        let total = fixed_number(stated, "total", why)?;
+        let (scale, location) = (scale.clone(), stated.location.clone());
+        let (values, gaps) = (BTreeMap::new(), BTreeMap::new());
+        let mut preload = NodalPreload { values, is_force: false, gaps, scale, total, location };
+        let read = DataTable::find_in(data, name).and_then(|table| preload.read(table));
+        read.map_err(|error| Problem::new(stated.location_of("data", None), "data", error.message).help(error.help))?;
+        Ok(Some(preload))
+    }
+
+    /// Reads the values of all nodes.
+    fn read(&mut self, table: &DataTable) -> Result<(), ColumnError> {
+        let name = &table.name;
+        let error = |message: String, help: &str| ColumnError { message, help: help.to_owned() };
         if table.has("pressure") && table.has("force") {
             let message = format!("`{name}` has a column `pressure` and a column `force`");
-            return Err(Problem::new(location, "data", message).help("rename one of them; the other is used"));
+            return Err(error(message, "rename one of them; the other is used"));
         }
-        let is_force = table.has("force");
-        let (role, dimension) = if is_force { ("force", Dimension::FORCE) } else { ("pressure", PRESSURE) };
-        let rows = table.plain_values("node").map_err(problem)?;
-        let numbers = table.values(role, dimension).map_err(problem)?;
-        if rows.len() != numbers.len() {
-            let message = format!(
-                "the column `node` of `{name}` has {} rows, but the column `{role}` has {}",
-                rows.len(),
-                numbers.len()
-            );
-            let help = "name columns of one result in [[data]]";
-            return Err(Problem::new(location, "data", message).help(help));
+        self.is_force = table.has("force");
+        let (role, dimension) = if self.is_force { ("force", Dimension::FORCE) } else { ("pressure", PRESSURE) };
+        let (nodes, values) = (table.plain_values("node")?, table.values(role, dimension)?);
+        let gaps = if table.has("gap") { table.values("gap", Dimension::LENGTH)? } else { Vec::new() };
+        if nodes.len() != values.len() {
+            let (nodes, values) = (nodes.len(), values.len());
+            let message =
+                format!("the column `node` of `{name}` has {nodes} rows, but the column `{role}` has {values}");
+            return Err(error(message, "name columns of one result in [[data]]"));
         }
-        let gap = if table.has("gap") { table.values("gap", Dimension::LENGTH).map_err(problem)? } else { Vec::new() };
-        let (mut values, mut gaps) = (BTreeMap::new(), BTreeMap::new());
-        for (row, (node, value)) in rows.iter().zip(&numbers).enumerate() {
+        for (row, (node, value)) in nodes.into_iter().zip(values).enumerate() {
             let wrong = |what: String| {
                 let help = "correct the file: each row has the number of a node, and a value of zero or more that \
                             presses the faces together";
-                Problem::new(location, "data", format!("row {} of `{name}` {what}", row + 1)).help(help)
+                error(format!("row {} of `{name}` {what}", row + 1), help)
             };
             if node.fract() != 0.0 || !node.is_finite() {
                 return Err(wrong(format!("has the node {node}, which is no whole number")));
             }
-            if !(value.is_finite() && *value >= 0.0) {
+            if !(value.is_finite() && value >= 0.0) {
                 return Err(wrong(format!("has the {role} {value} at node {node}")));
             }
-            if values.insert(*node as i64, *value).is_some_and(|before| before != *value) {
+            if self.values.insert(node as i64, value).is_some_and(|before| before != value) {
                 return Err(wrong(format!("states another {role} of node {node} again")));
             }
-            if let Some(gap) = gap.get(row).filter(|gap| *value == 0.0 && **gap > 0.0) {
-                gaps.insert(*node as i64, *gap);
+            if let Some(gap) = gaps.get(row).filter(|gap| value == 0.0 && **gap > 0.0) {
+                self.gaps.insert(node as i64, *gap);
             }
         }
-        let Some(CompiledValue::Quantity { quantity: scale, .. }) = stated.entry("scale").map(|entry| &entry.value)
-        else {
-            return Ok(None);
-        };
-        let total = match stated.entry("total").map(|entry| &entry.value) {
-            Some(CompiledValue::Quantity { quantity, dimension, within, example }) => {
-                if quantity.expression.parameters().next().is_some() {
-                    let message = "this force belongs to the values of the file, so no parameter can change it";
-                    return Err(quantity.problem("total", message).help("write a number with its unit"));
-                }
-                let expected = Expected { dimension: *dimension, within: *within };
-                Some(quantity.number("total", expected, example, &NO_PARAMETERS)?)
-            }
-            _ => None,
-        };
-        Ok(Some(NodalPreload {
-            values,
-            is_force,
-            gaps,
-            scale: scale.clone(),
-            total,
-            location: stated.location.clone(),
-        }))
+        Ok(())
     }
 
     /// Returns the pressure (Pa) at a node with this area (m²), before `scale`.

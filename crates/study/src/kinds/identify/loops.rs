@@ -2,7 +2,7 @@
 //!
 //! Springs and joints between the same two places act in parallel to the joint. A motion is
 //! straight between two rows; laws that depend on velocity need the time of each row. Each group
-//! is a record of its own, which begins unloaded.
+//! is a separate record that begins unloaded.
 
 use super::law_path::{LoadPath, forces_along};
 use super::targets::{Fitted, Measured, RowStates, Target, TargetInput};
@@ -31,11 +31,10 @@ impl LoopTarget {
         let rows: Vec<usize> = (0..forces.len()).collect();
         let groups: Vec<&[usize]> = rows.chunk_by(|a, b| input.group(*a) == input.group(*b)).collect();
         if let Some(time) = &time
-            && let Some(row) = (1..time.len())
-                .find(|row| input.group(row - 1) == input.group(*row) && time[row - 1] >= time[*row])
-                .map(|row| row - 1)
+            && let Some(pair) =
+                groups.iter().flat_map(|rows| rows.windows(2)).find(|pair| time[pair[0]] >= time[pair[1]])
         {
-            let row = input.measured(row + 1, 0.0, 0.0, 1.0).row;
+            let row = input.measured(pair[1], 0.0, 0.0, 1.0).row;
             return error(
                 format!("the time in row {row} is not later than in the row before"),
                 "sort the rows, or remove the column `time`",

@@ -278,7 +278,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let mut statistics = statistics::Statistics::new(&problem, &found, settings.loss);
         if let Some(reason) = statistics.failure(&problem) {
             let differences = problem.fitted(&found.x).map(|fitted| problem.scale_differences(&fitted));
-            return Err([vec![reason], differences.unwrap_or_default()].concat().join("; "));
+            let reasons: Vec<String> = std::iter::once(reason).chain(differences.unwrap_or_default()).collect();
+            return Err(reasons.join("; "));
         }
         statistics.check_intervals(&problem, &settings, &found);
         let is_profiled = case.values.flag("profile") == Some(true);

@@ -12,7 +12,7 @@ use crate::case::values::Values;
 use crate::compile::torsion::of_rotation;
 use crate::data::{ColumnError, DataTable};
 use crate::kinds::info::KeyError;
-use crate::syntax::suggest::{alternatives, excerpt};
+use crate::syntax::suggest::alternatives;
 use num_complex::Complex64;
 use std::fmt::Debug;
 use stickslip::dimension::Dimension;
@@ -259,14 +259,7 @@ const MAX_GROUPS: usize = 8;
 
 fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Target>, ColumnError> {
     let name = values.text("data").unwrap_or_default();
-    let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
-        let known: Vec<&str> = study.data.iter().map(|data| data.name.as_str()).collect();
-        let help = match known.as_slice() {
-            [] => "add [[data]] with `name` and `file`".to_owned(),
-            known => format!("the tables are {}", alternatives(known.iter().copied())),
-        };
-        ColumnError { message: format!("there is no [[data]] `{}`", excerpt(name)), help }
-    })?;
+    let data = DataTable::find_in(&study.data, name)?;
     let all = if data.has("group") { data.plain_values("group")? } else { vec![0.0; data.rows()] };
     let wanted = values.quantities("groups");
     let rows: Vec<usize> =

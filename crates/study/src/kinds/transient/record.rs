@@ -132,13 +132,8 @@ impl Records {
                 } else {
                     let column = text(table, "column").unwrap_or(role);
                     let name = text(table, "data").unwrap_or_default();
-                    let data = study.data.iter().find(|data| data.name == name).ok_or_else(|| {
-                        error(
-                            "data",
-                            format!("there is no [[data]] `{name}`"),
-                            "add [[data]] with this name and `file`",
-                        )
-                    })?;
+                    let data = DataTable::find_in(&study.data, name)
+                        .map_err(|missing| error("data", missing.message, "add [[data]] with this name and `file`"))?;
                     if !data.is_read() {
                         return Ok(None);
                     }
