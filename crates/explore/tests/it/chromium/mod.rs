@@ -74,6 +74,10 @@ impl Browser {
     }
 
     fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.try_call(method, parameters).unwrap_or_else(|error| panic!("{method}: {error}"))
+    }
+
+    fn try_call(&mut self, method: &str, parameters: Value) -> Result<Value, Value> {
         let id = self.next;
         self.next += 1;
         let mut message = json!({ "id": id, "method": method, "params": parameters });
@@ -87,8 +91,8 @@ impl Browser {
             bytes.pop();
             let message: Value = serde_json::from_slice(&bytes).unwrap();
             if message["id"] == id {
-                assert!(message["error"].is_null(), "{method}: {}", message["error"]);
-                return message["result"].clone();
+                let error = &message["error"];
+                return if error.is_null() { Ok(message["result"].clone()) } else { Err(error.clone()) };
             }
             self.events.push_back(message);
         }
@@ -119,10 +123,15 @@ impl Browser {
 
     /// Returns the value of an expression, of statements, or of a promise.
     pub fn evaluate(&mut self, script: &str) -> Value {
+        self.try_evaluate(script).unwrap_or_else(|error| panic!("{script}: {error}"))
+    }
+
+    /// Returns an error of Chromium if the page is loaded again meanwhile.
+    fn try_evaluate(&mut self, script: &str) -> Result<Value, Value> {
         let parameters = json!({ "expression": script, "awaitPromise": true, "returnByValue": true, "replMode": true });
-        let result = self.call("Runtime.evaluate", parameters);
+        let result = self.try_call("Runtime.evaluate", parameters)?;
         assert!(result["exceptionDetails"].is_null(), "{script}: {}", result["exceptionDetails"]);
-        result["result"]["value"].clone()
+        Ok(result["result"]["value"].clone())
     }
 
     /// Returns the value of a promise that is kept within 30 s.
@@ -159,9 +168,10 @@ impl Browser {
         self.wait_for(condition, Duration::from_secs(180));
     }
 
+    /// A page that is just loaded again does not fulfil the condition yet.
     fn wait_for(&mut self, condition: &str, time: Duration) {
         let end = Instant::now() + time;
-        while self.evaluate(&format!("Boolean({condition})")) != true {
+        while self.try_evaluate(&format!("Boolean({condition})")) != Ok(Value::Bool(true)) {
             let state = "document.getElementById('message')?.textContent + ' | ' + document.getElementById('panels')?.innerText?.slice(0, 400)";
             if Instant::now() > end {
                 panic!("not after {time:?}: {condition}; the page: {}; {:?}", self.evaluate(state), self.problems());
