@@ -178,10 +178,14 @@ fn inspect_file(file: &Path, format: Option<&str>, text: &mut String) -> Result<
         let name = Some(variable.name.as_str()).filter(|name| !name.is_empty());
         let matrix = match formats::read(file, format, name) {
             Ok(matrix) => matrix,
+            // other content of the file, such as a text, is not an error
+            Err(error) if several && matches!(error.kind, ErrorKind::Complex | ErrorKind::Unsupported) => {
+                let _ = writeln!(text, "  {variable}");
+                continue;
+            }
             Err(error) if several => {
                 let _ = writeln!(text, "  {variable}: {error}");
-                // Other content of the file, such as a text, is not an error.
-                whole &= matches!(error.kind, ErrorKind::Complex | ErrorKind::Unsupported);
+                whole = false;
                 continue;
             }
             Err(error) => return Err(error),

@@ -60,6 +60,7 @@ mod matrix_market;
 pub mod mesh;
 pub mod names;
 mod nastran_dmig;
+mod nastran_op2;
 mod nastran_op4;
 mod npy;
 mod npz;
@@ -88,6 +89,7 @@ pub const TABLE: &[Format] = &[
     npz::FORMAT,
     abaqus_element::FORMAT,
     abaqus_input::FORMAT,
+    nastran_op2::FORMAT,
     nastran_op4::FORMAT,
     ansys_full::FORMAT,
     harwell_boeing::FORMAT,

@@ -49,7 +49,9 @@ named! {
     SWEEP_RATE = [0, 0, -2, 1] "sweep rate" "Hz/s or rad/s^2";
     VELOCITY = [0, 1, -1, 0] "velocity" "m/s";
     INVERSE_VELOCITY = [0, -1, 1, 0] "inverse velocity" "s/m";
+    ACCELERATION = [0, 1, -2, 0] "acceleration" "m/s^2";
     FORCE = [1, 1, -2, 0] "force" "N";
+    PRESSURE = [1, -1, -2, 0] "pressure" "Pa";
     STIFFNESS = [1, 0, -2, 0] "stiffness" "N/m";
     CUBIC_STIFFNESS = [1, -2, -2, 0] "cubic stiffness" "N/m^3";
     INVERSE_LENGTH = [0, -1, 0, 0] "inverse length" "1/m";

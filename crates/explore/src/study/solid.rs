@@ -5,7 +5,6 @@
 
 use serde_json::{Value, json};
 use std::collections::HashMap;
-use stickslip::model::DisplacementField;
 use stickslip_report::base64;
 use stickslip_study::Study;
 use stickslip_study::dataset::{Dataset, FIELDS, MeshSource};
@@ -34,7 +33,7 @@ pub(crate) fn instants(study: &Study) -> Option<usize> {
     let nodes = study.mesh()?.mesh.nodes().len();
     let model = study.case(0).ok()?.model;
     let affordable = (settings.rows / nodes.max(1)).min(settings.instants);
-    (DisplacementField::refusal(&model).is_none() && affordable >= settings.least).then_some(affordable)
+    (model.ring.is_none() && affordable >= settings.least).then_some(affordable)
 }
 
 /// Returns the surface and its motion; `None` if the results have no displacements of all nodes.

@@ -4,7 +4,7 @@
     apt-get install calculix-ccx octave   # 2.20, 7.3.0
     venv/bin/python make.py
 
-Nothing but these programs writes a file here, except `punch.pch` and those of Abaqus and ANSYS, which follow their documentation, and
+Nothing but these programs writes a file here, except `punch.pch`, OUTPUT2 and those of Abaqus and ANSYS, which follow their documentation, and
 `chain_*`, a chain of three masses written by hand with what other programs add or leave out.
 Expected values stand in `NAME.bits`: rows and columns, then `row column bits` of every entry, the bits as 16 hexadecimal digits.
 """
@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 import scipy.io
 import scipy.sparse as sp
-from pyyeti.nastran import op4, wtdmig
+from pyyeti.nastran import op2, op4, wtdmig
 
 HERE = Path(__file__).parent
 warnings.simplefilter("ignore")
@@ -138,12 +138,66 @@ def ten_digits(matrix):
     return np.vectorize(lambda x: float(f"{x:.9e}"))(matrix)
 
 
+def output2(path, order, whole, matrices):
+    """Writes OUTPUT2 with a label, a table and these matrices, whose columns are strings of numbers; pyyeti reads it back."""
+    integers = lambda *values: struct.pack(f"{order}{len(values)}{'i' if whole == 4 else 'q'}", *values)
+    text = lambda value: value.ljust(2 * whole).encode()
+    with open(path, "wb") as file:
+
+        def record(data):
+            length = struct.pack(f"{order}i", len(data))
+            file.write(length + data + length)
+
+        def keys(*values):
+            for value in values:
+                record(integers(value))
+
+        def head(data):
+            keys(len(data) // whole)
+            record(data)
+
+        def block(name, trailer, kind):
+            head(text(name))
+            keys(-1)
+            head(integers(*trailer))
+            keys(-2, 1, 0)
+            head(text(name) + (integers(170, 170) if kind else b""))
+            keys(-3, 1, kind)
+
+        head(integers(11, 28, 26))
+        head(b"NASTRAN FORT TAPE ID CODE - ".ljust(7 * whole))
+        head(text("NX8.5"))
+        keys(-1, 0)
+        block("GEOM1", [101, 0, 0, 0, 0, 0, 0], 0)
+        head(integers(7, 1, 2, 3))
+        keys(-4, 1, 0, 0)
+        for name, matrix in matrices.items():
+            rows, columns = matrix.shape
+            block(name, [102, columns, rows, 6 if rows == columns else 2, 2, 2 * rows, 0], 1)
+            for column in range(columns):
+                values = matrix[:, column]
+                begins = [i for i in range(rows) if values[i] != 0 and (i == 0 or values[i - 1] == 0)]
+                for begin in begins:
+                    end = next((i for i in range(begin, rows) if values[i] == 0), rows)
+                    numbers = struct.pack(f"{order}{end - begin}d", *values[begin:end])
+                    head(integers(begin + 1) + numbers)
+                keys(-4 - column, 1, 1 if column + 1 < columns else 0)
+            keys(0)
+        keys(0)
+    with op2.OP2(path) as written:
+        back = written.rdop2mats()
+    assert all(np.array_equal(back[name][0], matrix) for name, matrix in matrices.items())
+
+
 def nastran():
     names, matrices = ["kaa", "maa", "gen"], [STIFFNESS, np.where(abs(MASS) < 1e-300, 0, MASS), GENERAL]
     for sparse in ["dense", "bigmat", "nonbigmat"]:
         op4.write(HERE / f"{sparse}_text.op4", names, matrices, binary=False, digits=16, sparse=sparse)
         op4.write(HERE / f"{sparse}_little.op4", names, matrices, binary=True, endian="<", sparse=sparse)
     op4.write(HERE / "bigmat_big_endian.op4", names, matrices, binary=True, endian=">", sparse="bigmat")
+
+    for file, order, whole in [("output2.op2", "<", 4), ("output2_64bit_big.op2", ">", 8)]:
+        output2(HERE / file, order, whole, dict(zip(["KAA", "MAA", "GEN"], matrices)))
 
     # Symmetric; square; rectangular, whose columns are numbers. A punch file has no row of zeros, and no word of it.
     rows = pd.MultiIndex.from_tuples(NODES, names=["id", "dof"])

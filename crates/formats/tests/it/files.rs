@@ -180,6 +180,10 @@ fn nastran_output4_of_pyyeti() {
         }
     }
     check("bigmat_big_endian.op4", Some("KAA"), "nastran-op4", "stiffness");
+    for file in ["output2.op2", "output2_64bit_big.op2"] {
+        check(file, Some("KAA"), "nastran-op2", "stiffness");
+        check(file, Some("GEN"), "nastran-op2", "general");
+    }
 }
 
 #[test]

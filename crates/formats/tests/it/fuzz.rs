@@ -269,6 +269,33 @@ fn large(format: &str) -> Vec<u8> {
             text += &format!("{:8}{:8}{:8}\n{:>23}\n", FULL + 1, 1, 1, fortran(1.0));
             text.into_bytes()
         }
+        "nastran-op2" => {
+            let mut bytes = Vec::new();
+            let mut record = |data: &[u8]| {
+                let length = (data.len() as u32).to_le_bytes();
+                bytes.extend([&length[..], data, &length[..]].concat());
+            };
+            let words = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
+            let size = FULL as i32;
+            for head in [&b"K       "[..], &words(&[101, size, size, 6, 1, size, 0]), b"K       "] {
+                record(&words(&[head.len() as i32 / 4]));
+                record(head);
+                let behind: &[i32] = match head.len() {
+                    8 => &[-1],
+                    _ => &[-2, 1, 0],
+                };
+                behind.iter().for_each(|key| record(&words(&[*key])));
+            }
+            [1, 1].iter().for_each(|key| record(&words(&[*key])));
+            for column in 0..size {
+                record(&words(&[1 + size]));
+                let values = (0..size).flat_map(|row| (1.5 + (row + column) as f32).to_le_bytes());
+                record(&words(&[1]).into_iter().chain(values).collect::<Vec<u8>>());
+                [-4, 1, i32::from(column + 1 < size)].iter().for_each(|key| record(&words(&[*key])));
+            }
+            [0, 0].iter().for_each(|key| record(&words(&[*key])));
+            bytes
+        }
         "harwell-boeing" => {
             let block =
                 |words: Vec<String>, per: usize| -> Vec<String> { words.chunks(per).map(<[String]>::concat).collect() };

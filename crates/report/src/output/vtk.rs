@@ -1,14 +1,15 @@
 //! Writes the displacements of all nodes of a mesh for ParaView: `fields.pvd`, a list of instants,
 //! and a file `.vtu` of VTK for each. Several orbits have a list each, `fields_1.pvd` ….
 //!
-//! The point data are `displacement` (m) and, at the nodes of contacts, `contact`: 0 none, 1 open,
+//! The point data are `displacement` (m), `velocity` (m/s) and, at the nodes of contacts, `contact`: 0 none, 1 open,
 //! 2 touching, 3 sticking, 4 slipping. At the nodes of contacts between meshes there are also
 //! `pressure` and `friction` (Pa), and `loss`, the dissipated energy per period and area (J/m²).
-//! Nodes that are not in the table are at rest.
+//! Nodes that are not in the table are at rest. For a disk, the files have all sectors.
 //! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
 
 use crate::base64::base64;
 use crate::output::result_file::{File, Output, ReportError};
+use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::ops::Range;
 use stickslip_formats::mesh::{Mesh, vtk_cell_type};
@@ -28,7 +29,7 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     let Some((table, source)) = table.zip(dataset.mesh.as_ref()) else { return Ok(Vec::new()) };
     let Some(fields) = Fields::new(table) else { return Ok(Vec::new()) };
     let (mut files, orbits) = (Vec::new(), fields.orbits());
-    let grid = Grid::new(source);
+    let grid = Grid::new(source, fields.sectors());
     for (number, orbit) in orbits.iter().enumerate() {
         let stem = if orbits.len() == 1 { "fields".to_owned() } else { format!("fields_{}", number + 1) };
         let mut list =
@@ -48,8 +49,12 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
 struct Fields<'a> {
     table: &'a Table,
     time: &'a [f64],
+    /// The sector of a disk.
+    sector: Option<&'a [u64]>,
     node: &'a [u64],
     displacement: [&'a [f64]; 3],
+    /// Results of earlier versions have none.
+    velocity: Option<[&'a [f64]; 3]>,
     contact: &'a [String],
     /// Names and columns of quantities per area; results of earlier versions have none.
     per_area: Vec<(&'static str, &'a [f64])>,
@@ -57,18 +62,29 @@ struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     fn new(table: &'a Table) -> Option<Fields<'a>> {
-        let [x, y, z] = ["x_m", "y_m", "z_m"].map(|name| table.numbers(name));
+        let vector = |unit: &str| {
+            let [x, y, z] = ["x", "y", "z"].map(|axis| table.numbers(&format!("{axis}_{unit}")));
+            Some([x?, y?, z?])
+        };
         Some(Fields {
             table,
             time: table.numbers("time_s")?,
+            sector: table.integers("sector"),
             node: table.integers("node")?,
-            displacement: [x?, y?, z?],
+            displacement: vector("m")?,
+            velocity: vector("m_per_s"),
             contact: table.texts("contact")?,
             per_area: [("pressure", "pressure_Pa"), ("friction", "friction_Pa"), ("loss", "loss_J_per_m2")]
                 .into_iter()
                 .filter_map(|(name, column)| Some((name, table.numbers(column)?)))
                 .collect(),
         })
+    }
+
+    /// Returns the number of sectors.
+    fn sectors(&self) -> usize {
+        let last = self.sector.and_then(|sector| sector.iter().max());
+        last.map_or(1, |last| usize::try_from(*last).map_or(1, |last| last + 1))
     }
 
     /// Returns the rows of each orbit: time does not fall within it.
@@ -97,48 +113,69 @@ fn ranges(rows: Range<usize>, begins: impl Fn(&usize) -> bool) -> Vec<Range<usiz
 /// The part of the files that does not depend on time.
 struct Grid<'a> {
     mesh: &'a Mesh,
+    sectors: usize,
     head: String,
 }
 
 impl<'a> Grid<'a> {
-    fn new(source: &'a MeshSource) -> Grid<'a> {
-        let MeshSource { mesh, length } = source;
+    fn new(source: &'a MeshSource, sectors: usize) -> Grid<'a> {
+        let MeshSource { mesh, length, axis } = source;
         let (nodes, elements) = (mesh.nodes(), mesh.elements());
-        let points = nodes.iter().flat_map(|node| node.position.map(|x| x * length));
-        let all = (0..elements.len()).flat_map(|element| mesh.element_nodes(element));
-        let ends = elements.iter().scan(0u32, |end, element| {
+        let points = (0..sectors).flat_map(|sector| {
+            let rotation = axis.map(|axis| axis.rotation(TAU * sector as f64 / sectors as f64));
+            nodes.iter().flat_map(move |node| {
+                let own = node.position.map(|x| x * length);
+                rotation.map_or(own, |to| to.map(|row| row[0] * own[0] + row[1] * own[1] + row[2] * own[2]))
+            })
+        });
+        let all = (0..sectors * elements.len()).flat_map(|element| {
+            let (sector, element) = (element / elements.len(), element % elements.len());
+            let first = (sector * nodes.len()) as u32;
+            mesh.element_nodes(element).iter().map(move |node| first + node)
+        });
+        let ends = elements.iter().cycle().take(sectors * elements.len()).scan(0u32, |end, element| {
             *end += element.shape.nodes() as u32;
             Some(*end)
         });
+        let types = (0..sectors).flat_map(|_| elements.iter().map(|element| vtk_cell_type(element.shape)));
         let mut head = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n\
              <UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-            nodes.len(),
-            elements.len()
+            sectors * nodes.len(),
+            sectors * elements.len()
         );
         head += &format!(
             "<Points>\n{}</Points>\n<Cells>\n",
             array("Float64", "Points", 3, points.flat_map(f64::to_le_bytes))
         );
-        head += &array("UInt32", "connectivity", 1, all.flat_map(|node| node.to_le_bytes()));
+        head += &array("UInt32", "connectivity", 1, all.flat_map(u32::to_le_bytes));
         head += &array("UInt32", "offsets", 1, ends.flat_map(u32::to_le_bytes));
-        head += &array("UInt8", "types", 1, elements.iter().map(|element| vtk_cell_type(element.shape)));
-        Grid { mesh, head: head + "</Cells>\n" }
+        head += &array("UInt8", "types", 1, types);
+        Grid { mesh, sectors, head: head + "</Cells>\n" }
     }
 
     /// Returns the file of an instant.
     fn file(&self, fields: &Fields, rows: Range<usize>) -> String {
-        let mut displacement = vec![[0.0; 3]; self.mesh.nodes().len()];
-        let mut contact = vec![0u8; displacement.len()];
-        let mut per_area = vec![vec![0.0; displacement.len()]; fields.per_area.len()];
-        for row in rows {
-            let node = i64::try_from(fields.node[row]).ok().and_then(|number| self.mesh.node(number));
-            let Some(node) = node else { continue };
-            displacement[node] = fields.displacement.map(|column| column[row]);
-            for (values, (_, column)) in per_area.iter_mut().zip(&fields.per_area) {
-                values[node] = column[row];
-            }
-            contact[node] = match fields.contact[row].as_str() {
+        let each = self.mesh.nodes().len();
+        let count = self.sectors * each;
+        let point = |row: usize| {
+            let node = i64::try_from(fields.node[row]).ok().and_then(|number| self.mesh.node(number))?;
+            Some(fields.sector.map_or(0, |sector| sector[row] as usize) * each + node)
+        };
+        let points: Vec<(usize, usize)> = rows.filter_map(|row| Some((row, point(row)?))).collect();
+        let vectors = |columns: &[&[f64]; 3]| {
+            let mut values = vec![[0.0; 3]; count];
+            points.iter().for_each(|(row, point)| values[*point] = columns.map(|column| column[*row]));
+            values.into_iter().flatten().flat_map(f64::to_le_bytes)
+        };
+        let mut text = self.head.clone() + "<PointData Vectors=\"displacement\">\n";
+        text += &array("Float64", "displacement", 3, vectors(&fields.displacement));
+        if let Some(velocity) = &fields.velocity {
+            text += &array("Float64", "velocity", 3, vectors(velocity));
+        }
+        let mut contact = vec![0u8; count];
+        for (row, point) in &points {
+            contact[*point] = match fields.contact[*row].as_str() {
                 "" => 0,
                 "open" => 1,
                 "touch" => 2,
@@ -146,11 +183,10 @@ impl<'a> Grid<'a> {
                 _ => 4,
             };
         }
-        let bytes = displacement.iter().flatten().flat_map(|x| x.to_le_bytes());
-        let mut text = self.head.clone() + "<PointData Vectors=\"displacement\">\n";
-        text += &array("Float64", "displacement", 3, bytes);
         text += &array("UInt8", "contact", 1, contact.into_iter());
-        for ((name, _), values) in fields.per_area.iter().zip(per_area) {
+        for (name, column) in &fields.per_area {
+            let mut values = vec![0.0; count];
+            points.iter().for_each(|(row, point)| values[*point] = column[*row]);
             text += &array("Float64", name, 1, values.into_iter().flat_map(f64::to_le_bytes));
         }
         text + "</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
@@ -178,7 +214,7 @@ mod tests {
     #[test]
     fn a_list_for_every_orbit_and_a_file_for_every_instant() {
         let deck = "*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n";
-        let source = MeshSource { mesh: read_bytes(deck.as_bytes()).unwrap(), length: 1e-3 };
+        let source = MeshSource { mesh: read_bytes(deck.as_bytes()).unwrap(), length: 1e-3, axis: None };
         let repeat = |one: &[f64]| [one, one].concat();
         let table = Table {
             name: "fields".to_owned(),

@@ -42,6 +42,8 @@ pub(super) struct Coordinates {
     /// coordinates.
     pub modes: Option<ModalDamping>,
     pub reduced: Option<Arc<ReducedComponent>>,
+    order: SectorOrder,
+    elimination: MotionElimination,
 }
 
 /// Relative tolerance: a moved place whose free part is smaller depends on other places and is
@@ -145,7 +147,14 @@ impl Coordinates {
             ring: ring_entries,
             modes: modes.map(|modes| turned.modes(&modes, moved.len())),
             reduced: part.reduced,
+            order,
+            elimination: turned,
         })
+    }
+
+    /// Returns a coordinate of the substructure over the free and then the moved coordinates.
+    pub fn of_substructure(&self, at: usize) -> Row {
+        self.elimination.row(&vec![(self.order.of_part(at), 1.0)])
     }
 
     /// Returns the number of a declared place among the moved places.

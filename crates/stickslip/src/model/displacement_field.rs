@@ -1,10 +1,14 @@
 //! Displacements of all rows of a structure, from the coordinates of a model.
 //!
-//! The coordinates of the structure are the first of a model: its rows, or the coordinates `q` of
-//! its reduction with the displacements `u = T q` of all rows.
+//! The coordinates of the structure are its rows, or the coordinates `q` of its reduction with the
+//! displacements `u = T q` of all rows. In a disk every sector has its own; the rows of its high
+//! side follow the next sector. The coordinates of a mistuned disk are the modes of the whole ring.
 
-use super::{Element, Model, ModelError, Place, Substructure};
-use crate::structure::Reduction;
+use super::coordinates::Coordinates;
+use super::name_resolution::Places;
+use super::{DiskPart, Element, Model, ModelError, Place, Substructure};
+use crate::structure::reduction::{ReductionError, RingShapes, Row};
+use crate::structure::{CoordinateAxis, ReducedForm, Reduction, RingRow};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -42,60 +46,137 @@ use std::sync::Arc;
 /// };
 /// let (system, field) = (model.assemble()?, DisplacementField::new(&model)?);
 /// let q = vec![0.3; system.structure().dofs()];
-/// let rows = field.rows(&q);
+/// let rows = field.rows(0, &q, &[]);
 /// assert!(rows.len() == n && (rows[n - 1] - system.place_axes()[0].component(&q)).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct DisplacementField {
-    /// `T`; `None` if all rows are coordinates.
+    /// The coordinates of the structure over the degrees of freedom and then the imposed
+    /// displacements.
+    coordinates: Vec<Row>,
+    /// Modes of a mistuned ring over the coordinates of all sectors.
+    ring_modes: Option<Arc<DMatrix<f64>>>,
+    /// `T` of the structure, or of a sector without the rows of its high side; `None` if all rows
+    /// are coordinates.
     shapes: Option<Arc<DMatrix<f64>>>,
-    rows: usize,
+    /// Number of degrees of freedom, without imposed displacements.
+    free: usize,
+    disk: Option<SectorRows>,
+}
+
+/// The rows of a sector.
+#[derive(Debug, Clone)]
+struct SectorRows {
+    sectors: usize,
+    /// Every row over the rows without the high side, of this and the next sector.
+    rows: Vec<RingRow>,
+    axis: Option<CoordinateAxis>,
 }
 
 impl DisplacementField {
-    /// Returns why the displacements of all rows of a model are not available: it is a disk, or it
-    /// has imposed motions, which change its coordinates.
-    pub fn refusal(model: &Model) -> Option<&'static str> {
-        match (model.ring.is_some(), model.motions.is_empty()) {
-            (true, _) => Some("the displacements of all nodes of a disk are not available"),
-            (_, false) => Some("the displacements of all nodes are not available with imposed motions"),
-            _ => None,
-        }
-    }
-
     /// Prepares the displacements of a model. Without a structure given by matrices it has no rows.
     ///
     /// # Errors
-    /// [`ModelError`] for a [`DisplacementField::refusal`], or if the structure cannot be reduced.
+    /// [`ModelError`] if the model is invalid, or its structure cannot be reduced.
     pub fn new(model: &Model) -> Result<DisplacementField, ModelError> {
-        if let Some(message) = DisplacementField::refusal(model) {
-            return Err(ModelError::new(Element::Whole, "fields", message.to_owned()));
-        }
-        let Some(Substructure { component, reduction, .. }) = &model.substructure else {
-            return Ok(DisplacementField { shapes: None, rows: 0 });
+        let Some(substructure) = &model.substructure else {
+            let coordinates = Vec::new();
+            return Ok(DisplacementField { coordinates, ring_modes: None, shapes: None, free: 0, disk: None });
         };
-        let rows = component.dofs();
-        if let Reduction::None { .. } = reduction {
-            return Ok(DisplacementField { shapes: None, rows });
-        }
-        let seen = Place::substructure_rows(&model.places);
-        let shapes = component.shapes(&seen, reduction);
-        let shapes = shapes.map_err(|error| ModelError::new(Element::Substructure, "reduce", error.to_string()))?;
-        Ok(DisplacementField { shapes: Some(shapes), rows })
+        let unknown = |error: ReductionError| ModelError::new(Element::Substructure, "reduce", error.to_string());
+        let coordinates = Coordinates::new(model, &Places::new(model)?)?;
+        let (mut ring_modes, mut shapes, mut disk) = (None, None, None);
+        let count = match (model.ring, &substructure.disk) {
+            (Some(ring), Some(part)) => {
+                let kept = substructure.component.sector(&part.boundary, ring.sectors);
+                disk = Some(SectorRows {
+                    sectors: ring.sectors,
+                    rows: kept.sector.rows().to_vec(),
+                    axis: part.boundary.axis(),
+                });
+                let reduced = coordinates.reduced.as_ref().map(|reduced| reduced.form());
+                let ring_shapes = match reduced {
+                    Some(ReducedForm::Ring(_)) => Some(ring_shapes(model, substructure, part).map_err(unknown)?),
+                    _ => None,
+                };
+                let sector = match (reduced, &ring_shapes) {
+                    (_, Some(shapes)) => Some(&shapes.sector),
+                    (Some(ReducedForm::Sector(sector)), _) => Some(sector),
+                    _ => None,
+                };
+                shapes =
+                    sector.map(|sector| Arc::new(DMatrix::from_column_slice(sector.n, sector.dofs(), &sector.basis)));
+                ring_modes = ring_shapes.as_ref().map(|shapes| shapes.columns.clone());
+                match &ring_modes {
+                    Some(modes) => modes.ncols(),
+                    None => ring.sectors * shapes.as_ref().map_or(kept.sector.dofs, |shapes| shapes.ncols()),
+                }
+            }
+            _ => {
+                if !matches!(substructure.reduction, Reduction::None { .. }) {
+                    let seen = Place::substructure_rows(&model.places);
+                    shapes = Some(substructure.component.shapes(&seen, &substructure.reduction).map_err(unknown)?);
+                }
+                shapes.as_ref().map_or(substructure.component.dofs(), |shapes| shapes.ncols())
+            }
+        };
+        let free = coordinates.free;
+        let coordinates = (0..count).map(|at| coordinates.of_substructure(at)).collect();
+        Ok(DisplacementField { coordinates, ring_modes, shapes, free, disk })
     }
 
-    /// Returns the displacements of all rows, m, for those of the degrees of freedom of the model.
+    /// Returns the number of sectors of a disk; 1 without a disk.
+    pub fn sectors(&self) -> usize {
+        self.disk.as_ref().map_or(1, |disk| disk.sectors)
+    }
+
+    /// Returns the axis of a disk about which each sector is rotated from the one before it.
+    pub fn axis(&self) -> Option<CoordinateAxis> {
+        self.disk.as_ref().and_then(|disk| disk.axis)
+    }
+
+    /// Returns the displacements of all rows of a sector, m, for those of the degrees of freedom
+    /// of the model and the imposed displacements. Those of a sector are along its own axes.
     ///
     /// # Panics
-    /// If there are fewer degrees of freedom than coordinates of the structure.
-    pub fn rows(&self, displacement: &[f64]) -> Vec<f64> {
-        match &self.shapes {
-            None => displacement[..self.rows].to_vec(),
-            Some(shapes) => {
-                let q = DVector::from_column_slice(&displacement[..shapes.ncols()]);
-                (shapes.as_ref() * q).as_slice().to_vec()
-            }
-        }
+    /// If there are fewer values than coordinates of the structure.
+    pub fn rows(&self, sector: usize, displacement: &[f64], imposed: &[f64]) -> Vec<f64> {
+        let value = |at: usize| if at < self.free { displacement[at] } else { imposed[at - self.free] };
+        let own = |row: &Row| row.iter().map(|(at, weight)| weight * value(*at)).sum::<f64>();
+        let Some(disk) = &self.disk else {
+            let q = DVector::from_iterator(self.coordinates.len(), self.coordinates.iter().map(own));
+            return self.shapes.as_ref().map_or_else(|| q.clone(), |shapes| shapes.as_ref() * &q).as_slice().to_vec();
+        };
+        let of_modes = self.ring_modes.as_ref().map(|modes| {
+            let q = DVector::from_iterator(self.coordinates.len(), self.coordinates.iter().map(own));
+            modes.as_ref() * q
+        });
+        let all = of_modes.as_ref().map_or(self.coordinates.len(), DVector::len);
+        let each = all / disk.sectors;
+        let kept = [sector, (sector + 1) % disk.sectors].map(|sector| {
+            let range = sector * each..(sector + 1) * each;
+            let q = match &of_modes {
+                Some(all) => all.rows(range.start, each).into_owned(),
+                None => DVector::from_iterator(each, self.coordinates[range].iter().map(own)),
+            };
+            self.shapes.as_ref().map_or_else(|| q.clone(), |shapes| shapes.as_ref() * &q)
+        });
+        let row = |row: &RingRow| row.iter().map(|(at, shift, weight)| weight * kept[*shift as usize][*at]).sum();
+        disk.rows.iter().map(row).collect()
+    }
+}
+
+/// Returns the shapes of the modes of a mistuned ring.
+fn ring_shapes(model: &Model, substructure: &Substructure, part: &DiskPart) -> Result<RingShapes, ReductionError> {
+    let sectors = model.ring.map_or(1, |ring| ring.sectors);
+    let stated = &model.places[..model.places.len() / sectors];
+    let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.iter().cloned()).collect();
+    let kept = substructure.component.sector(&part.boundary, sectors);
+    let blade = kept.blade(&substructure.component, &part.blade).map_err(|_| ReductionError::NoPorts)?;
+    let found = kept.mistuned_with_shapes(&blade, &part.deviations, &seen, &substructure.reduction)?;
+    match found.form() {
+        ReducedForm::Ring(modes) => modes.shapes.clone().ok_or(ReductionError::NoPorts),
+        _ => Err(ReductionError::NoPorts),
     }
 }

@@ -570,7 +570,7 @@ impl SectorCache {
         }
         // other patterns need not wait
         drop(known);
-        let answer = self.best_mistuned(blade, deviations, seen, how)?;
+        let answer = self.best_mistuned(blade, (deviations, seen), how, false)?;
         let mut known = blade.mistuned.lock().unwrap_or_else(PoisonError::into_inner);
         // Number of mistuning patterns whose modes are stored. A case is assembled several times
         // in succession, and a campaign has a million patterns. The modes of 240 blades with
@@ -582,7 +582,24 @@ impl SectorCache {
         Ok(answer)
     }
 
-    fn best_mistuned(&self, blade: &BladeCache, deviations: &[f64], seen: &[Row], how: &Reduction) -> ReducedResult {
+    /// Returns the mistuned ring as [`SectorCache::mistuned`] does, with the shapes of its modes.
+    pub fn mistuned_with_shapes(
+        &self,
+        blade: &BladeCache,
+        deviations: &[f64],
+        seen: &[Row],
+        how: &Reduction,
+    ) -> ReducedResult {
+        self.best_mistuned(blade, (deviations, seen), how, true)
+    }
+
+    fn best_mistuned(
+        &self,
+        blade: &BladeCache,
+        (deviations, seen): (&[f64], &[Row]),
+        how: &Reduction,
+        with_shapes: bool,
+    ) -> ReducedResult {
         // the number of modes is fixed, without blade vectors
         let (steps, enough) = match *how {
             Reduction::UpTo { tolerance, .. } => (1..STEPS.len(), tolerance),
@@ -608,10 +625,10 @@ impl SectorCache {
             }
         }
         let (few, mixed, deviation) = best.ok_or(ReductionError::NoPorts)?;
-        let (mut modes, mut left_out) = few.ring.modes(&mixed)?;
+        let (mut modes, mut left_out) = few.ring.modes(&mixed, with_shapes)?;
         for extent in EXTENTS.into_iter().skip(1).filter(|_| enough.is_finite()) {
             if left_out.error > enough {
-                (modes, left_out) = few.ring.modes(&few.ring.mistuned_modes(deviations, extent)?)?;
+                (modes, left_out) = few.ring.modes(&few.ring.mistuned_modes(deviations, extent)?, with_shapes)?;
             }
         }
         let deviation = if left_out.error > deviation.error { left_out } else { deviation };

@@ -221,6 +221,12 @@ impl Boundary {
         Ok(())
     }
 
+    /// Returns the axis about which displacements rotate from sector to sector; `None` if the axes
+    /// of displacements rotate with the sectors.
+    pub fn axis(&self) -> Option<CoordinateAxis> {
+        self.axis
+    }
+
     /// Returns the rows of the high side, which those of the next sector replace.
     pub fn high_rows(&self) -> impl Iterator<Item = usize> + '_ {
         let turned = self.rotated_rows.iter().flat_map(|[_, high]| high.iter().flatten().copied());
@@ -305,6 +311,11 @@ impl CyclicSector {
     ) -> Result<SparseMatrix, ReductionError> {
         let own = entries.filter(|entry| entry.2 == 0).map(|(row, column, _, value)| (row, column, value));
         SparseMatrix::from_triplets(self.dofs, own).map_err(|_| ReductionError::OutOfRange)
+    }
+
+    /// Returns every row of the component, in terms of the remaining rows.
+    pub fn rows(&self) -> &[RingRow] {
+        &self.rows
     }
 
     /// Converts a weighted sum of the component's rows to the remaining rows.

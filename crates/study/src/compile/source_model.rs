@@ -332,9 +332,11 @@ fn reduction_advice(model: &Model) -> Option<String> {
     let exchanged = || Component::new(component.rows().to_vec(), stiffness.clone(), None, mass.clone()).ok();
     let advice = match absurd.then(exchanged).flatten().as_ref().and_then(plausible_frequencies) {
         Some(frequencies) => exchange_advice(&frequencies),
-        None => "check the units and `up_to`; if the excitation is far above these frequencies, no modes are needed: \
-            reduce = false"
-            .to_owned(),
+        None => format!(
+            "check the units; `up_to` and `tolerance` of `reduce` set the frequency range and the error; reduce = false \
+             keeps all {} rows",
+            component.rows().len()
+        ),
     };
     Some(format!("its lowest frequencies are {}: {advice}", listed.join(", ")))
 }

@@ -7,9 +7,6 @@ use std::collections::BTreeMap;
 use stickslip::dimension::Dimension;
 use stickslip_formats::data::{Column, DataFile, split_unit};
 
-/// m/s², the dimension of accelerations.
-const ACCELERATION: Dimension = Dimension { kg: 0, m: 1, s: -2, rad: 0 };
-
 /// A table that the study names.
 #[derive(Debug, Clone)]
 pub(crate) struct DataTable {
@@ -175,7 +172,7 @@ impl FoundColumn<'_> {
 /// column in words.
 fn factor(found: &FoundColumn<'_>, dimension: Dimension) -> Result<f64, String> {
     let stated = [found.unit, found.column.unit.as_str()].into_iter().find(|unit| !unit.is_empty());
-    if stated == Some("g") && dimension == ACCELERATION {
+    if stated == Some("g") && dimension == Dimension::ACCELERATION {
         return Ok(STANDARD_GRAVITY);
     }
     let unit = match stated {
@@ -188,6 +185,7 @@ fn factor(found: &FoundColumn<'_>, dimension: Dimension) -> Result<f64, String> 
         Some(unit) => Err(format!("`{}` ({})", stated.unwrap_or("in its name"), dimension_text(unit.dimension))),
         // a number without unit is ambiguous as a frequency: hertz or rad/s
         None if dimension == Dimension::FREQUENCY => Err("Hz or rad/s, which it does not state".to_owned()),
+        None if dimension == Dimension::PRESSURE => Err("Pa or MPa, which it does not state".to_owned()),
         None => Ok(1.0),
     }
 }
@@ -209,7 +207,7 @@ mod tests {
         let value = |role: &str, dimension| data.values(role, dimension).map(|values| values[1]);
         assert_eq!(value("frequency", Dimension::FREQUENCY), Ok(20.0 * std::f64::consts::TAU));
         assert_eq!(value("force", Dimension::FORCE), Ok(4000.0));
-        assert_eq!(value("a", ACCELERATION), Ok(5.0 * STANDARD_GRAVITY));
+        assert_eq!(value("a", Dimension::ACCELERATION), Ok(5.0 * STANDARD_GRAVITY));
         assert_eq!(value("response", Dimension::LENGTH), Ok(6.0 * 1e-3));
         assert_eq!(value("x", Dimension::FORCE), Ok(6.0));
         for (role, dimension, part) in [

@@ -7,9 +7,6 @@ const fn dimension(kg: i8, m: i8, s: i8, rad: i8) -> Dimension {
     Dimension { kg, m, s, rad }
 }
 
-const PRESSURE: Dimension = dimension(1, -1, -2, 0);
-const ACCELERATION: Dimension = dimension(0, 1, -2, 0);
-
 /// Pairs of the expected dimension and the dimension that a model of rotation has there.
 const ROTATION_PAIRS: [(Dimension, Dimension); 9] = [
     (Dimension::MASS, dimension(1, 2, 0, 0)),
@@ -32,31 +29,33 @@ const TORSION: &str = "this quantity belongs to a rotation, but the masses of th
 pub(crate) fn dimension_advice(expected: Dimension, found: Dimension, text: &str) -> Option<String> {
     let said = match (expected, found) {
         _ if ROTATION_PAIRS.contains(&(expected, found)) => TORSION,
-        (Dimension::STIFFNESS, PRESSURE) => {
+        (Dimension::STIFFNESS, Dimension::PRESSURE) => {
             "this is a pressure; write a stiffness as a force over a length, such as \"10 N/mm\", or as a pressure \
              times an area over a length: \"210 GPa * 3 mm^2/(40 mm)\""
         }
-        (Dimension::FORCE, PRESSURE) => {
+        (Dimension::FORCE, Dimension::PRESSURE) => {
             "this is a pressure; multiply it by the area on which it acts: \"10 N/mm^2 * 25 mm^2\""
         }
-        (_, PRESSURE) => "this is a pressure, a force over an area",
-        (Dimension::LENGTH | ACCELERATION | Dimension::FORCE, Dimension::MASS) if is_grams(text) => match expected {
-            Dimension::FORCE => {
-                "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2, and a force as a mass times \
+        (_, Dimension::PRESSURE) => "this is a pressure, a force over an area",
+        (Dimension::LENGTH | Dimension::ACCELERATION | Dimension::FORCE, Dimension::MASS) if is_grams(text) => {
+            match expected {
+                Dimension::FORCE => {
+                    "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2, and a force as a mass times \
                  it: \"2 kg * 9.80665 m/s^2\""
-            }
-            Dimension::LENGTH => {
-                "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2; a motion is stated by its \
+                }
+                Dimension::LENGTH => {
+                    "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2; a motion is stated by its \
                  displacement, which at one frequency is the acceleration over the squared angular frequency: \
                  \"2*9.80665 m/s^2/(50 Hz)^2 * (1 rad)^2\""
+                }
+                _ => "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2",
             }
-            _ => "`g` is the gram; write the acceleration of gravity as 9.80665 m/s^2",
-        },
-        (Dimension::LENGTH, ACCELERATION) => {
+        }
+        (Dimension::LENGTH, Dimension::ACCELERATION) => {
             "a motion is stated by its displacement, which at one frequency is the acceleration over the squared \
              angular frequency: \"20 m/s^2/(50 Hz)^2 * (1 rad)^2\""
         }
-        (Dimension::FORCE, ACCELERATION) => "a force is a mass times an acceleration: \"2 kg * 20 m/s^2\"",
+        (Dimension::FORCE, Dimension::ACCELERATION) => "a force is a mass times an acceleration: \"2 kg * 20 m/s^2\"",
         _ => return None,
     };
     Some(said.to_owned())

@@ -305,6 +305,7 @@ fn wrong_preloads_of_a_static_step_are_refused() {
         (text("stress_MPa", good), &["no column `pressure`", "stress_MPa"]),
         (text("force_N,pressure_MPa", good), &["`pressure` and a column `force`", "rename"]),
         (text("pressure_N", good), &["`pressure_N`", "has the unit"]),
+        (text("pressure", good), &["Pa or MPa", "pressure [UNIT]"]),
         (
             text("pressure_MPa", "data = \"static\", total = \"2 kN\""),
             &["sum to 18.75 N", "`total` is 2000 N", "1 rows"],
@@ -448,9 +449,42 @@ fn fields_are_the_displacements_of_all_nodes() {
     let finer = of(&HEAD.replace("reduce = false", "reduce = { modes = 45 }"));
     let (coarse, fine) = (error(&reduced), error(&finer));
     assert!(coarse < 0.05 && fine < 0.2 * coarse, "{coarse} {fine}");
-    let moved = "[[motion]]\non = \"mover\"\namplitude = \"1 um\"\n[[spring]]\nbetween = [\"mover\", \"tip\"]\nstiffness = \"1 N/mm\"\n";
-    let error = read(folder.path(), &[HEAD, &study, CONTACT, moved]).unwrap_err().to_string();
-    assert!(error.contains("imposed motions"), "{error}");
+}
+
+/// A node with an imposed motion follows it, and moves the other nodes as it moves their places.
+#[test]
+fn fields_follow_imposed_motions() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let places = "[[place]]\nname = \"corner\"\nnodes = [\"118\"]\n[[place]]\nname = \"other\"\nnodes = [\"116\"]\n";
+    let motion = "[[motion]]\non = \"corner.x\"\namplitude = \"2 um\"\n";
+    let study = STUDY.replace("kind = \"response\"", "kind = \"orbit\"\nfields = 8\nsamples = 8");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "frequency = \"1500 Hz\"\n");
+    for reduction in ["reduce = false", "reduce = { modes = 20 }"] {
+        let head = HEAD.replace("reduce = false", reduction);
+        let found = dataset(folder.path(), &[&head, &study, CONTACT, places, motion]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+        let (orbit, fields) = (table("orbit"), table("fields"));
+        let (times, at) = (fields.numbers("time_s").unwrap(), orbit.numbers("time_s").unwrap());
+        let numbers = fields.integers("node").unwrap();
+        for row in (0..fields.rows()).filter(|row| [116, 118].contains(&numbers[*row])) {
+            let phase = std::f64::consts::TAU * 1500.0 * times[row];
+            let instant = at.iter().position(|time| (time - times[row]).abs() < 1e-15).unwrap();
+            for (column, what) in [("m", "displacement_m"), ("m_per_s", "velocity_m_per_s")] {
+                for axis in ["x", "y", "z"] {
+                    let name = if numbers[row] == 118 { "corner" } else { "other" };
+                    let expected = match (numbers[row], axis, column) {
+                        (118, "x", "m") => 2e-6 * phase.cos(),
+                        (118, "x", _) => -2e-6 * std::f64::consts::TAU * 1500.0 * phase.sin(),
+                        _ => orbit.numbers(&format!("{name}_{axis}_{what}")).unwrap()[instant],
+                    };
+                    let node = fields.numbers(&format!("{axis}_{column}")).unwrap()[row];
+                    let scale = if column == "m" { 1e-6 } else { 1e-2 };
+                    assert!((expected - node).abs() < 1e-9 * scale, "{name}.{axis} {column}: {expected} {node}");
+                }
+            }
+        }
+    }
 }
 
 /// A sector of a ring of six: three elements along the radius, two along the angle and two along
@@ -524,6 +558,69 @@ const SECTOR: &str = "schema = 1\n[structure]\nstiffness = \"sector.sti\"\nmass 
     [[force]]\non = \"tip.z\"\namplitude = \"20 N\"\nengine_order = 1\n[[place]]\nname = \"tip\"\nnodes = [\"4\"]\n\
     [study]\nkind = \"response\"\nfrequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n\
     [method]\nkind = \"harmonic-balance\"\nharmonics = 5\ntolerance = 0.5\n";
+
+/// The fields of a disk are along fixed axes: each sector agrees with its places rotated about the
+/// axis, and both sides of every boundary between sectors are one node.
+#[test]
+fn fields_of_a_disk_have_all_sectors_along_fixed_axes() {
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = write_sector(folder.path());
+    let blade = nodes.iter().filter(|(_, at)| at[0] > 1).map(|(number, _)| format!("{number}\n"));
+    std::fs::write(folder.path().join("blade.csv"), format!("node\n{}", blade.collect::<String>())).unwrap();
+    let contact = "[[contact]]\nname = \"shroud\"\nbetween = [\"HIGH\", \"next.LOW\"]\ntangent = [\"cos(60 deg)\", \"sin(60 deg)\", 0]\n\
+         law = { kind = \"friction-contact\", tangential = \"200 N/mm^3\", normal = \"300 N/mm^3\", friction = 0.3, preload = \"1 MPa\" }\n";
+    let study = SECTOR.replace("kind = \"response\"", "kind = \"orbit\"\nfields = 3\nsamples = 9");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "frequency = \"1500 Hz\"\n");
+    let mistuned = "axis = \"z\"\nblade = \"blade.csv\"\nmistuning = { of = \"blade.frequency\", deviation = \"5 %\", seed = 3 }\n";
+    for (reduction, disk) in [
+        ("reduce = false", "axis = \"z\"\n"),
+        ("reduce = { modes = 8 }", "axis = \"z\"\n"),
+        ("reduce = false", mistuned),
+        ("reduce = { up_to = \"3 kHz\", tolerance = 1e-2 }", mistuned),
+    ] {
+        let study = study.replace("reduce = false", reduction).replace("axis = \"z\"\n", disk);
+        let found = dataset(folder.path(), &[&study, contact]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+        let (orbit, fields) = (table("orbit"), table("fields"));
+        let (times, at) = (fields.numbers("time_s").unwrap(), orbit.numbers("time_s").unwrap());
+        let (sectors, numbers) = (fields.integers("sector").unwrap(), fields.integers("node").unwrap());
+        assert_eq!(fields.rows(), 3 * 6 * 36, "{reduction} {disk}");
+        let along = ["x", "y", "z"].map(|axis| fields.numbers(&format!("{axis}_m")).unwrap());
+        let moved = |row: usize| along.map(|values| values[row]);
+        let size = along.iter().flat_map(|values| values.iter()).fold(0.0, |size: f64, x| size.max(x.abs()));
+        let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|i| (a[i] - b[i]).abs() < 1e-9 * size);
+        let mut compared = [0, 0];
+        for row in 0..fields.rows() {
+            let (_, place) = *nodes.iter().find(|(number, _)| *number as u64 == numbers[row]).unwrap();
+            let instant = at.iter().position(|time| (time - times[row]).abs() < 1e-15).unwrap();
+            if numbers[row] == 4 {
+                let name = |axis: &str| format!("tip_{}_{axis}_displacement_m", sectors[row]);
+                let own = ["x", "y", "z"].map(|axis| orbit.numbers(&name(axis)).unwrap()[instant]);
+                let (sin, cos) = (std::f64::consts::TAU * sectors[row] as f64 / 6.0).sin_cos();
+                let fixed = [cos * own[0] - sin * own[1], sin * own[0] + cos * own[1], own[2]];
+                assert!(near(fixed, moved(row)), "{reduction} {disk}: {fixed:?} {:?}", moved(row));
+                compared[0] += 1;
+            }
+            if place[0] == 0 && place[1] == 2 {
+                let low = nodes.iter().find(|(_, other)| *other == [0, 0, place[2]]).unwrap().0 as u64;
+                let same = |other: &usize| {
+                    times[*other] == times[row] && sectors[*other] == (sectors[row] + 1) % 6 && numbers[*other] == low
+                };
+                let other = (0..fields.rows()).find(same).unwrap();
+                assert!(near(moved(row), moved(other)), "{reduction} {disk}: {:?} {:?}", moved(row), moved(other));
+                compared[1] += 1;
+            }
+        }
+        assert_eq!(compared, [3 * 6, 3 * 6 * 3]);
+        let contacts = fields.texts("contact").unwrap();
+        assert_eq!(contacts.iter().filter(|state| !state.is_empty()).count(), 3 * 6 * 9);
+        let pressure = fields.numbers("pressure_Pa").unwrap();
+        assert!(pressure.iter().any(|pressure| *pressure > 1e5) && pressure.iter().all(|p| p.is_finite()));
+    }
+    let without = read(folder.path(), &[&study.replace("axis = \"z\"\n", "")]).unwrap_err();
+    let said = format!("{without} {}", without.help_text().unwrap_or_default());
+    assert!(said.contains("axis"), "{said}");
+}
 
 /// The high side of a sector rubs on the low side of the next one. The joints by hand have the
 /// normal (-sin 60°, cos 60°, 0) on the high side and (0, 1, 0) on the low side, the tangent along

@@ -82,6 +82,17 @@ pub(crate) struct RingModes {
     damping: Option<DMatrix<f64>>,
     /// Observed displacements of every sector, one sector after the other, by modes.
     pub seen: DMatrix<f64>,
+    /// Shapes of the modes, if they were asked for.
+    pub shapes: Option<RingShapes>,
+}
+
+/// Shapes of the modes of a ring.
+#[derive(Debug, Clone)]
+pub(crate) struct RingShapes {
+    /// The sector whose coordinates they use.
+    pub sector: Arc<ReducedSector>,
+    /// One column per mode, over the coordinates of all sectors.
+    pub columns: Arc<DMatrix<f64>>,
 }
 
 impl NominalRing {
@@ -171,7 +182,11 @@ impl NominalRing {
     ///
     /// The error is that of the response to loads on all observed displacements. It is
     /// evaluated at the highest frequency of interest, where it is largest.
-    pub fn modes(&self, mixed: &MistunedModes) -> Result<(RingModes, ReductionDeviation), ReductionError> {
+    pub fn modes(
+        &self,
+        mixed: &MistunedModes,
+        with_shapes: bool,
+    ) -> Result<(RingModes, ReductionDeviation), ReductionError> {
         let (n, ports, shift) = (self.mass.n(), self.seen.len(), shift(self.up_to));
         let MistunedModes { values, shapes, factor, at_highest } = mixed;
         let low = values.len();
@@ -238,7 +253,7 @@ impl NominalRing {
             own[k].iter_mut().for_each(|of| *of /= size * size);
         }
         let error = self.residual_error((&own, &seen), &whole, at_highest);
-        let damping = self.damping.as_ref().map(|damping| {
+        let whole = (with_shapes || self.damping.is_some()).then(|| {
             let mut of_modes = of_modes;
             for (mut row, root) in of_modes.row_iter_mut().zip(&root) {
                 row.unscale_mut(*root);
@@ -249,10 +264,17 @@ impl NominalRing {
                 .chunks_exact_mut(n.max(1))
                 .zip(&sizes)
                 .for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
-            multi_vector::inner_products(n, &whole, &damping.multiply_columns(&whole))
+            whole
         });
+        let damping = self.damping.as_ref().zip(whole.as_ref());
+        let damping =
+            damping.map(|(damping, whole)| multi_vector::inner_products(n, whole, &damping.multiply_columns(whole)));
         let kind = format!("modes of the mistuned ring; {}", self.sector.kind);
-        Ok((RingModes { kind, own, damping, seen }, ReductionDeviation { error, omega: self.up_to }))
+        let shapes = whole.filter(|_| with_shapes).map(|whole| RingShapes {
+            sector: self.sector.clone(),
+            columns: Arc::new(DMatrix::from_vec(n, all, whole)),
+        });
+        Ok((RingModes { kind, own, damping, seen, shapes }, ReductionDeviation { error, omega: self.up_to }))
     }
 
     /// Returns the relative error of a modal response under loads of random signs. Each place

@@ -322,16 +322,13 @@ fn per_area(law: &mut CompiledTable) {
         if let CompiledValue::Quantity { dimension, example, .. } = &mut entry.value {
             *dimension = LawCoordinate::Face { area: 1.0 }.dimension(*dimension);
             *example = match *dimension {
-                PRESSURE => "\"2 MPa\"",
+                Dimension::PRESSURE => "\"2 MPa\"",
                 Dimension::CUBIC_STIFFNESS => "\"1e3 N/mm^3\"",
                 _ => example,
             };
         }
     }
 }
-
-/// Force per area.
-pub(super) const PRESSURE: Dimension = Dimension { kg: 1, m: -1, s: -2, rad: 0 };
 
 fn summary(
     contact: &CompiledTable,
@@ -386,12 +383,13 @@ impl ContactSummary {
                 number(angle.to_degrees())
             );
         }
-        if let Some(PreloadSummary { total, pressures: [low, high], joints_without_row, .. }) = preload {
+        if let Some(PreloadSummary { total, pressures: [low, high], is_scaled, joints_without_row, .. }) = preload {
             text += &format!(
-                ", preload {} in total, {} to {} MPa",
+                ", preload {} in total, {} to {} MPa{}",
                 quantity_text(*total, Some(Dimension::FORCE)),
                 number(low * 1e-6),
-                number(high * 1e-6)
+                number(high * 1e-6),
+                if *is_scaled { ", before `scale`" } else { "" }
             );
             if *joints_without_row > 0 {
                 text += &format!(", none at {joints_without_row} node{}", plural_suffix(*joints_without_row));

@@ -15,6 +15,7 @@ use crate::syntax::error::{Location, Problem};
 use contact::ContactSummary;
 use std::collections::HashMap;
 use std::sync::Arc;
+use stickslip::structure::CoordinateAxis;
 use stickslip_formats::Error;
 use stickslip_formats::mesh::Mesh;
 
@@ -25,6 +26,8 @@ pub struct MeshSource {
     pub mesh: Mesh,
     /// Unit of length of its coordinates, m.
     pub length: f64,
+    /// The axis of a disk whose sector it is.
+    pub axis: Option<CoordinateAxis>,
 }
 
 /// The mesh of a study, and what became of it.

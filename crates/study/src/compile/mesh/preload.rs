@@ -8,7 +8,6 @@
 //! count from there: constant forces on both places of a joint balance its preload. They stand for
 //! the loads of the static step. Without them the structure would relax and lose contact force.
 
-use super::contact::PRESSURE;
 use super::{entry, fixed_number, table_of_node};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue};
@@ -33,6 +32,8 @@ pub struct PreloadSummary {
     pub total: f64,
     /// Smallest and largest pressure before `scale`, Pa.
     pub pressures: [f64; 2],
+    /// True unless `scale` is the number 1.
+    pub is_scaled: bool,
     /// Number of joints whose node has no row.
     pub joints_without_row: usize,
     /// Number of rows above zero whose node has no joint.
@@ -79,7 +80,8 @@ impl NodalPreload {
             return Err(error(message, "rename one of them; the other is used"));
         }
         self.is_force = table.has("force");
-        let (role, dimension) = if self.is_force { ("force", Dimension::FORCE) } else { ("pressure", PRESSURE) };
+        let (role, dimension) =
+            if self.is_force { ("force", Dimension::FORCE) } else { ("pressure", Dimension::PRESSURE) };
         let (nodes, values) = (table.plain_values("node")?, table.values(role, dimension)?);
         let gaps = if table.has("gap") { table.values("gap", Dimension::LENGTH)? } else { Vec::new() };
         if nodes.len() != values.len() {
@@ -125,10 +127,10 @@ impl NodalPreload {
         let stiffness = law.entry("normal").map(|entry| &entry.value);
         let quantity = match (self.gaps.get(&node), stiffness) {
             (Some(gap), Some(CompiledValue::Quantity { quantity, .. })) => times(quantity, -gap, Dimension::LENGTH),
-            _ => times(&self.scale, pressure, PRESSURE),
+            _ => times(&self.scale, pressure, Dimension::PRESSURE),
         };
         let within = Bounds::Finite;
-        let value = CompiledValue::Quantity { quantity, dimension: PRESSURE, within, example: "\"2 MPa\"" };
+        let value = CompiledValue::Quantity { quantity, dimension: Dimension::PRESSURE, within, example: "\"2 MPa\"" };
         law.entries.push(CompiledEntry { key: LAW_KEY, location: self.location.clone(), value });
         Ok(())
     }
@@ -158,6 +160,7 @@ impl NodalPreload {
         let summary = PreloadSummary {
             total,
             pressures: [pressures().fold(f64::INFINITY, f64::min), pressures().fold(0.0, f64::max)],
+            is_scaled: self.scale.text != "1",
             joints_without_row: nodes.iter().filter(|node| !self.values.contains_key(node)).count(),
             rows_without_joint: self
                 .values

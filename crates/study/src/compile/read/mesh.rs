@@ -15,17 +15,34 @@ use crate::syntax::unit_sets;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use stickslip::structure::CoordinateAxis;
 use stickslip_formats::mesh;
 
-/// Returns the rotation between two sectors of `[disk]`, if the number of sectors is a plain
-/// number and the axis is stated.
-pub(super) fn sector_rotation(root: &TomlTable) -> Option<SectorRotation> {
-    let value = |table: &TomlTable, key: &str| table.get(key).map(|entry| entry.node.value.clone());
-    let Some(TomlValue::Table(disk)) = value(root, "disk") else { return None };
-    let Some(TomlValue::Number { value: sectors, .. }) = value(&disk, "sectors") else { return None };
-    let Some(TomlValue::Text { text, .. }) = value(&disk, "axis") else { return None };
-    let axis = coordinate_axis(&text)?;
-    (sectors > 0.0).then(|| SectorRotation { axis, angle: TAU / sectors })
+/// The axis of `[disk]`, and its number of sectors if it is a plain number.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct DiskRotation {
+    axis: Option<CoordinateAxis>,
+    sectors: Option<f64>,
+}
+
+impl DiskRotation {
+    pub fn new(root: &TomlTable) -> DiskRotation {
+        let value = |table: &TomlTable, key: &str| table.get(key).map(|entry| entry.node.value.clone());
+        let Some(TomlValue::Table(disk)) = value(root, "disk") else { return DiskRotation::default() };
+        let axis = match value(&disk, "axis") {
+            Some(TomlValue::Text { text, .. }) => coordinate_axis(&text),
+            _ => None,
+        };
+        let sectors = match value(&disk, "sectors") {
+            Some(TomlValue::Number { value, .. }) if value > 0.0 => Some(value),
+            _ => None,
+        };
+        DiskRotation { axis, sectors }
+    }
+
+    fn of_sectors(self) -> Option<SectorRotation> {
+        Some(SectorRotation { axis: self.axis?, angle: TAU / self.sectors? })
+    }
 }
 
 impl Reader {
@@ -35,10 +52,11 @@ impl Reader {
         &mut self,
         lists: &mut ModelLists,
         structure: Option<&CompiledTable>,
-        rotation: Option<SectorRotation>,
+        rotation: DiskRotation,
     ) -> Option<MeshUse> {
         let before = self.problems.len();
-        let mesh = if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table)) };
+        let mesh =
+            if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table, rotation.axis)) };
         let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
         let (mut summaries, mut areas) = (Vec::new(), HashMap::new());
         for place in places {
@@ -49,7 +67,7 @@ impl Reader {
         }
         for contact in &contacts {
             let expanded = match &mesh {
-                Some(mesh) => contact::expand(contact, mesh, rotation, self.data.as_deref()),
+                Some(mesh) => contact::expand(contact, mesh, rotation.of_sectors(), self.data.as_deref()),
                 None if self.study_file_only => contact::placeholders(contact, &self.mentioned(contact)),
                 None => Err(no_mesh(contact, "between")),
             };
@@ -76,7 +94,7 @@ impl Reader {
     }
 
     /// Reads the mesh of a structure; `None` without a mesh, or if it cannot be read.
-    fn mesh(&mut self, structure: &CompiledTable) -> Option<MeshSource> {
+    fn mesh(&mut self, structure: &CompiledTable, axis: Option<CoordinateAxis>) -> Option<MeshSource> {
         let entry = structure.entry("mesh")?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let units = match &structure.entry("units")?.value {
@@ -84,7 +102,7 @@ impl Reader {
             _ => return None,
         };
         match mesh::read(self.path_of(name)) {
-            Ok(mesh) => Some(MeshSource { mesh, length: units.length }),
+            Ok(mesh) => Some(MeshSource { mesh, length: units.length, axis }),
             Err(mut error) => {
                 let help = std::mem::take(&mut error.remedy);
                 let message = error.to_string().trim_end_matches("; ").to_owned();

@@ -373,7 +373,7 @@ impl Reader {
         let mesh = self.expand_sets(
             &mut lists,
             matrices.as_ref().map(|matrices| &matrices.table),
-            mesh::sector_rotation(root),
+            mesh::DiskRotation::new(root),
         )?;
         Some(SourceModel { lists, template: None, matrices, mesh })
     }

@@ -1,5 +1,7 @@
-//! The table `fields`: displacements and contact states of all nodes over one period, and the
-//! pressure, friction and loss per area at the nodes of contacts between meshes.
+//! The table `fields`: displacements, velocities and contact states of all nodes over one period,
+//! and the pressure, friction and loss per area at the nodes of contacts between meshes.
+//!
+//! For a disk the table has all sectors. Their displacements are along the fixed axes x, y, z.
 
 use super::word;
 use crate::case::study::Study;
@@ -9,8 +11,10 @@ use crate::kinds::info::KeyError;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{PreparedCase, UnitResult};
+use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
-use stickslip::model::{DisplacementField, Model};
+use std::f64::consts::TAU;
+use stickslip::model::{DisplacementField, Model, System};
 use stickslip::orbit::{JointSample, Orbit};
 
 /// Columns with quantities per area at the nodes of contacts.
@@ -18,10 +22,14 @@ const PER_AREA: [&str; 3] = ["pressure_Pa", "friction_Pa", "loss_J_per_m2"];
 /// Directions of a node, in the names of its rows.
 const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 
-/// Refuses a model whose nodes have no known displacements.
+/// Refuses a disk whose sectors have no known rotation.
 pub(super) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
-    match values.count("fields").and_then(|_| DisplacementField::refusal(model)) {
-        Some(message) => Err(KeyError::new("fields", message, "remove `fields`")),
+    let disk = model.substructure.as_ref().and_then(|own| own.disk.as_ref());
+    match disk.filter(|disk| values.count("fields").is_some() && disk.boundary.axis().is_none()) {
+        Some(_) => {
+            let message = "the displacements of all nodes of a disk need its axis";
+            Err(KeyError::new("fields", message, "add axis = \"z\" to [disk], or remove `fields`"))
+        }
         None => Ok(()),
     }
 }
@@ -30,8 +38,9 @@ pub(super) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
 pub(super) fn size(inputs: &SizeInputs<'_>) -> TableShape {
     let instants = inputs.case.values.count("fields").unwrap_or(0) as f64;
     let rows = inputs.case.model.substructure.as_ref().map_or(0, |structure| structure.component.dofs());
-    let nodes = rows.div_ceil(DIRECTIONS.len()) as f64;
-    TableShape { rows: inputs.points() * instants * nodes, numbers: inputs.varied + 9.0, words: 1.0 }
+    let sectors = inputs.case.model.ring.map_or(1, |ring| ring.sectors);
+    let nodes = (rows.div_ceil(DIRECTIONS.len()) * sectors) as f64;
+    TableShape { rows: inputs.points() * instants * nodes, numbers: inputs.varied + 13.0, words: 1.0 }
 }
 
 /// The nodes of a structure.
@@ -40,8 +49,8 @@ pub(super) struct Fields {
     instants: usize,
     /// The row of each direction, by the number of the node; `None` for a constrained one.
     nodes: BTreeMap<u64, [Option<usize>; 3]>,
-    /// The joint that begins at a node, by the number of the node.
-    joints: HashMap<u64, JointOfNode>,
+    /// The joint that begins at a node, by the sector and the number of the node.
+    joints: HashMap<(usize, u64), JointOfNode>,
 }
 
 /// The joint of a node.
@@ -95,9 +104,14 @@ impl Fields {
         };
         let with_faces = model.joints.iter().enumerate().filter(|(_, joint)| joint.law.has_faces());
         let areas = &study.structure.mesh.areas;
+        let sectors = model.ring.map_or(1, |ring| ring.sectors);
+        let each = (model.joints.len() / sectors).max(1);
         let joints = with_faces.filter_map(|(index, joint)| {
-            let area = areas.get(&joint.name).copied();
-            Some((node_of(&joint.between[0])?.0, JointOfNode { index, area, normal: joint.law.normal() }))
+            let sector = index / each;
+            let stated = if model.ring.is_some() { joint.name.rsplit_once('_')?.0 } else { &joint.name };
+            let area = areas.get(stated).copied();
+            let node = node_of(&joint.between[0])?.0;
+            Some(((sector, node), JointOfNode { index, area, normal: joint.law.normal() }))
         });
         let joints = joints.collect();
         Some(Fields { field, instants, nodes, joints })
@@ -105,28 +119,53 @@ impl Fields {
 
     /// Writes a row for every node at every instant.
     pub fn write(&self, prepared: &PreparedCase, orbit: &Orbit, rows: &mut TableBuilder) {
+        let sectors = self.field.sectors();
         for instant in 0..self.instants {
             let time = orbit.period() * instant as f64 / self.instants as f64;
             let sample = orbit.sample(time);
-            let displacement = self.field.rows(&sample.displacement);
-            for (node, along) in &self.nodes {
-                rows.varied(&prepared.case);
-                rows.number("frequency_Hz", hertz(orbit.omega));
-                rows.number("time_s", time);
-                rows.integer("node", *node);
-                for (axis, row) in DIRECTIONS.iter().zip(along) {
-                    rows.number(&format!("{axis}_m"), row.map_or(0.0, |row| displacement[row]));
+            let imposed = imposed(&prepared.system, orbit.omega, time);
+            for sector in 0..sectors {
+                let motion = [(&sample.displacement, &imposed[0]), (&sample.velocity, &imposed[1])]
+                    .map(|(values, imposed)| self.field.rows(sector, values, imposed));
+                let rotation = self.field.axis().map(|axis| axis.rotation(TAU * sector as f64 / sectors as f64));
+                for (node, along) in &self.nodes {
+                    rows.varied(&prepared.case);
+                    rows.number("frequency_Hz", hertz(orbit.omega));
+                    rows.number("time_s", time);
+                    if prepared.case.model.ring.is_some() {
+                        rows.integer("sector", sector as u64);
+                    }
+                    rows.integer("node", *node);
+                    for (values, unit) in motion.iter().zip(["m", "m_per_s"]) {
+                        let own = along.map(|row| row.map_or(0.0, |row| values[row]));
+                        let fixed = rotation.map_or(own, |to| to.map(|row| (0..3).map(|i| row[i] * own[i]).sum()));
+                        for (axis, value) in DIRECTIONS.iter().zip(fixed) {
+                            rows.number(&format!("{axis}_{unit}"), value);
+                        }
+                    }
+                    let joint = self.joints.get(&(sector, *node)).map(|joint| (joint, &sample.joints[joint.index]));
+                    rows.text("contact", joint.map(|(_, sample)| word(sample.contact)).unwrap_or_default());
+                    let values = joint.map_or([0.0; 3], |(joint, sample)| joint.per_area(orbit, sample));
+                    for (name, value) in PER_AREA.iter().zip(values) {
+                        rows.number(name, value);
+                    }
+                    rows.end_row();
                 }
-                let joint = self.joints.get(node).map(|joint| (joint, &sample.joints[joint.index]));
-                rows.text("contact", joint.map(|(_, sample)| word(sample.contact)).unwrap_or_default());
-                let values = joint.map_or([0.0; 3], |(joint, sample)| joint.per_area(orbit, sample));
-                for (name, value) in PER_AREA.iter().zip(values) {
-                    rows.number(name, value);
-                }
-                rows.end_row();
             }
         }
     }
+}
+
+/// Returns the displacements (m) and the velocities (m/s) of the places with imposed motions.
+fn imposed(system: &System, omega: f64, time: f64) -> [Vec<f64>; 2] {
+    let at = |derivative: i32| {
+        let part = |(harmonic, amplitude): &(u32, Complex64)| {
+            let rate = f64::from(*harmonic) * omega;
+            (amplitude * Complex64::new(0.0, rate).powi(derivative) * Complex64::cis(rate * time)).re
+        };
+        system.moved_places().iter().map(|place| place.motion.iter().map(part).sum()).collect()
+    };
+    [at(0), at(1)]
 }
 
 /// Returns the number of a node and the index of a direction for the name of a row, `17.y`.

@@ -37,7 +37,7 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "fields",
                 ValueType::Count(1, 1000),
-                "number of instants of the period at which the displacements of all nodes of the structure are \
+                "number of instants of the period at which the motions of all nodes of the structure are \
                  written to `fields.csv`, and with a `mesh` to `fields.pvd` for ParaView",
                 "24",
             ),

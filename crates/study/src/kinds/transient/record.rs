@@ -28,9 +28,6 @@ const SERIES: [f64; 3] = [1.5, -0.3, 1.0 / 30.0];
 /// Phase of the slow harmonics at the end of an interval, rad.
 const PHASE: f64 = 0.05;
 
-/// m/s².
-const ACCELERATION: Dimension = Dimension { kg: 0, m: 1, s: -2, rad: 0 };
-
 /// A column over time.
 #[derive(Debug, Clone)]
 struct Channel {
@@ -114,7 +111,7 @@ impl Records {
                 let (displacement, role) = match (list, on_ground, model.is_rotation(&on)) {
                     ("force", _, false) => (Dimension::FORCE, "force"),
                     ("force", _, true) => (Dimension::ENERGY, "force"),
-                    (_, true, _) => (ACCELERATION, "acceleration"),
+                    (_, true, _) => (Dimension::ACCELERATION, "acceleration"),
                     (_, _, false) => (Dimension::LENGTH, "displacement"),
                     (_, _, true) => (Dimension::ANGLE, "displacement"),
                 };
