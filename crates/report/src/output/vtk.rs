@@ -1,10 +1,11 @@
 //! Writes the displacements of all nodes of a mesh for ParaView: `fields.pvd`, a list of instants,
-//! and a file `.vtu` of VTK for each. Several orbits have a list each, `fields_1.pvd` ….
+//! and a file `.vtu` of VTK for each. Several orbits or modes have a list each, `fields_1.pvd` ….
 //!
-//! The point data are `displacement` (m), `velocity` (m/s) and, at the nodes of contacts, `contact`: 0 none, 1 open,
-//! 2 touching, 3 sticking, 4 slipping. At the nodes of contacts between meshes there are also
-//! `pressure` and `friction` (Pa), and `loss`, the dissipated energy per period and area (J/m²).
-//! Nodes that are not in the table are at rest. For a disk, the files have all sectors.
+//! The point data are `displacement` (m) and `velocity` (m/s). An orbit has `contact` at the nodes
+//! of contacts: 0 none, 1 open, 2 touching, 3 sticking, 4 slipping. At the nodes of contacts between
+//! meshes there are also `pressure` and `friction` (Pa), and `loss`, the dissipated energy per
+//! period and area (J/m²). Nodes that are not in the table are at rest. For a disk, the files have
+//! all sectors.
 //! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
 
 use crate::base64::base64;
@@ -55,7 +56,8 @@ struct Fields<'a> {
     displacement: [&'a [f64]; 3],
     /// Results of earlier versions have none.
     velocity: Option<[&'a [f64]; 3]>,
-    contact: &'a [String],
+    /// Shapes of modes have none.
+    contact: Option<&'a [String]>,
     /// Names and columns of quantities per area; results of earlier versions have none.
     per_area: Vec<(&'static str, &'a [f64])>,
 }
@@ -73,7 +75,7 @@ impl<'a> Fields<'a> {
             node: table.integers("node")?,
             displacement: vector("m")?,
             velocity: vector("m_per_s"),
-            contact: table.texts("contact")?,
+            contact: table.texts("contact"),
             per_area: [("pressure", "pressure_Pa"), ("friction", "friction_Pa"), ("loss", "loss_J_per_m2")]
                 .into_iter()
                 .filter_map(|(name, column)| Some((name, table.numbers(column)?)))
@@ -173,17 +175,19 @@ impl<'a> Grid<'a> {
         if let Some(velocity) = &fields.velocity {
             text += &array("Float64", "velocity", 3, vectors(velocity));
         }
-        let mut contact = vec![0u8; count];
-        for (row, point) in &points {
-            contact[*point] = match fields.contact[*row].as_str() {
-                "" => 0,
-                "open" => 1,
-                "touch" => 2,
-                "stick" => 3,
-                _ => 4,
-            };
+        if let Some(states) = fields.contact {
+            let mut contact = vec![0u8; count];
+            for (row, point) in &points {
+                contact[*point] = match states[*row].as_str() {
+                    "" => 0,
+                    "open" => 1,
+                    "touch" => 2,
+                    "stick" => 3,
+                    _ => 4,
+                };
+            }
+            text += &array("UInt8", "contact", 1, contact.into_iter());
         }
-        text += &array("UInt8", "contact", 1, contact.into_iter());
         for (name, column) in &fields.per_area {
             let mut values = vec![0.0; count];
             points.iter().for_each(|(row, point)| values[*point] = column[*row]);

@@ -48,6 +48,8 @@ pub struct ModePoint {
     pub places: Vec<Complex64>,
     /// Half of the peak-to-peak displacement of every place, m, with all harmonics.
     pub amplitudes: Vec<f64>,
+    /// First harmonic of every degree of freedom, m.
+    pub shape: Vec<Complex64>,
 }
 
 impl ModePoint {
@@ -66,6 +68,7 @@ impl ModePoint {
     ///     viscous: 0.0,
     ///     places,
     ///     amplitudes: vec![1.0, 2.0],
+    ///     shape: Vec::new(),
     /// };
     /// assert_eq!(
     ///     point.phases().iter().map(|phase| phase.abs()).collect::<Vec<_>>(),
@@ -295,6 +298,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
         viscous: equations.viscous_damping_ratio(state),
         places: equations.places(state),
         amplitudes: equations.half_ranges(state),
+        shape: equations.first_harmonic(state).to_vec(),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::compile::bare_numbers::literal_unit;
 use crate::compile::compiled::{
     CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, RangeScale, check_positive, check_range,
 };
-use crate::compile::mesh::MeshSource;
+use crate::compile::mesh::{MeshSet, MeshSource};
 use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
 use crate::compile::torsion::of_rotation;
@@ -227,6 +227,8 @@ pub struct Case {
     pub records: usize,
     /// True for a model of rotation: moments of inertia, angles and moments.
     pub is_torsional: bool,
+    /// The sets of the mesh that places and contacts name.
+    pub sets: Arc<Vec<MeshSet>>,
 }
 
 impl Case {
@@ -841,7 +843,8 @@ impl Study {
         let frequencies = values.frequencies("frequency").cloned();
         let records = self.structure.lists.records().len();
         let is_torsional = self.is_torsional();
-        Case { index, varied, parameters, model, values, frequencies, method, records, is_torsional }
+        let sets = self.structure.mesh.sets.clone();
+        Case { index, varied, parameters, model, values, frequencies, method, records, is_torsional, sets }
     }
 
     /// Returns name and dimensions of the axes of the kind's figure.

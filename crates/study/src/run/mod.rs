@@ -7,6 +7,7 @@
 //! - `result_block`: the results of consecutive units;
 //! - `point_row`: the table row of one orbit;
 //! - `output_columns`: additional columns that `output` selects;
+//! - `set_columns`: those of whole sets of the mesh;
 //! - `basis_check`: the check of the reduction basis.
 
 pub(crate) mod basis_check;
@@ -15,6 +16,7 @@ pub(crate) mod point_row;
 mod probe;
 pub mod result_block;
 mod runner;
+mod set_columns;
 mod thread_time;
 pub mod work;
 

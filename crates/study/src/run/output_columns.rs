@@ -2,6 +2,7 @@
 
 use crate::case::study::Case;
 use crate::results::columns;
+use crate::run::set_columns;
 use crate::run::work::PreparedCase;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -15,7 +16,7 @@ pub(crate) struct OutputColumns {
     /// One-line description.
     pub doc: &'static str,
     /// Names of its columns.
-    columns: fn(&System) -> Vec<String>,
+    columns: fn(&Case, &System) -> Vec<String>,
     /// Its numbers, one for each column.
     values: fn(&PreparedCase, &Orbit, &[Sample]) -> Vec<f64>,
 }
@@ -25,7 +26,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "joint_force",
         doc: "half the peak-to-peak value of the force of every joint",
-        columns: |system| joint_columns(system, "force_amplitude_N"),
+        columns: |_, system| joint_columns(system, "force_amplitude_N"),
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
@@ -35,7 +36,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "joint_mean",
         doc: "mean force of every joint over the period; for a contact the mean normal load",
-        columns: |system| joint_columns(system, "force_mean_N"),
+        columns: |_, system| joint_columns(system, "force_mean_N"),
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
@@ -49,7 +50,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "joint_motion",
         doc: "half the peak-to-peak value of the relative displacement of every joint",
-        columns: |system| joint_columns(system, "amplitude_m"),
+        columns: |_, system| joint_columns(system, "amplitude_m"),
         values: |_, orbit, _| {
             let axes = orbit.joints.iter().flat_map(|joint| &joint.displacement);
             axes.map(|(low, high)| 0.5 * (high - low).abs()).collect()
@@ -59,7 +60,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         name: "contact",
         doc: "shares of the period in which the faces of every joint stick and are apart, in addition to the slip \
             share",
-        columns: |system| {
+        columns: |_, system| {
             let joints = system.joints().iter();
             joints
                 .flat_map(|joint| [columns::stick_fraction(joint.name()), columns::open_fraction(joint.name())])
@@ -78,7 +79,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "velocity",
         doc: "half the peak-to-peak value of the velocity of every place",
-        columns: |system| place_columns(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
+        columns: |_, system| place_columns(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
             let places = prepared.system.place_axes().iter();
             places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.velocity)))).collect()
@@ -87,7 +88,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "acceleration",
         doc: "half the peak-to-peak value of the acceleration of every place",
-        columns: |system| place_columns(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
+        columns: |_, system| place_columns(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
             let places = prepared.system.place_axes().iter();
             places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.acceleration)))).collect()
@@ -96,7 +97,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "harmonics",
         doc: "amplitudes of harmonics 1 to 5 of the displacement of every place",
-        columns: |system| {
+        columns: |_, system| {
             let places = system.places().iter().zip(system.place_axes());
             let all = |(place, along): (&String, &Axis)| {
                 (1..=HARMONICS).map(|h| format!("{place}_harmonic{h}_{}", along.unit())).collect::<Vec<_>>()
@@ -108,7 +109,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     OutputColumns {
         name: "receptance",
         doc: "amplitude of the first harmonic of every place per unit of the largest force",
-        columns: |system| place_columns(system, |unit| format!("receptance_{unit}_per_N")),
+        columns: |_, system| place_columns(system, |unit| format!("receptance_{unit}_per_N")),
         values: |prepared, orbit, _| {
             let model = &prepared.case.model;
             let forces = model.forces.iter().enumerate();
@@ -118,6 +119,13 @@ pub(crate) const TABLE: &[OutputColumns] = &[
             let unit = |x: Complex64| if largest > 0.0 { x.norm() / largest } else { f64::NAN };
             orbit.places.iter().map(|place| unit(place.first_harmonic)).collect()
         },
+    },
+    OutputColumns {
+        name: "sets",
+        doc: "for every contact between meshes the dissipation of all its joints and the means of slip and separation \
+            over its area, and for every place on a set the largest distance of a node from rest",
+        columns: |case, _| set_columns::columns(case),
+        values: set_columns::values,
     },
 ];
 
@@ -166,7 +174,7 @@ fn selected(case: &Case) -> impl Iterator<Item = &'static OutputColumns> + '_ {
 
 /// Returns the names of the columns that `output` selects.
 pub(crate) fn columns(case: &Case, system: &System) -> Vec<String> {
-    selected(case).flat_map(|extra| (extra.columns)(system)).collect()
+    selected(case).flat_map(|extra| (extra.columns)(case, system)).collect()
 }
 
 /// Returns the values of these columns.

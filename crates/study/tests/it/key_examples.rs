@@ -271,7 +271,7 @@ fn study_with(table: &str, key: &Key, outer: &[(String, &Key)], kind: Option<&'s
         }
         if key.name == "fields" {
             let own = study.remove("study").unwrap();
-            study = parsed(MATRICES);
+            study = parsed(if kind.info.name == "nodal-diameter" { SECTOR } else { MATRICES });
             study.insert("study".into(), own);
         }
     }

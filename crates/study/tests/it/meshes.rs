@@ -451,6 +451,37 @@ fn fields_are_the_displacements_of_all_nodes() {
     assert!(coarse < 0.05 && fine < 0.2 * coarse, "{coarse} {fine}");
 }
 
+/// The columns of whole sets follow from those of their joints and nodes.
+#[test]
+fn sets_have_sums_means_and_largest_values() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let foot = "[[place]]\nname = \"foot\"\nset = \"FOOT\"\n";
+    let study =
+        STUDY.replace("kind = \"response\"", "kind = \"orbit\"\nsamples = 1024\noutput = [\"sets\", \"contact\"]");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "frequency = \"1500 Hz\"\n");
+    let found = dataset(folder.path(), &[HEAD, &study, CONTACT, foot]);
+    let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+    let (summary, orbit) = (table("orbits"), table("orbit"));
+    let number = |column: &str| summary.numbers(column).unwrap_or_else(|| panic!("{column}"))[0];
+    let grid = nodes(0.01, true);
+    let area_of = |n: u64| area(grid.iter().find(|(known, _)| *known as u64 == n).unwrap().1);
+    let lost: f64 = (10..=18).map(|n| number(&format!("pad_{n}_dissipation_J"))).sum();
+    assert!(lost > 0.0 && (number("pad_dissipation_J") / lost - 1.0).abs() < 1e-12);
+    let all: f64 = (10..=18).map(area_of).sum();
+    for share in ["slip_fraction", "open_fraction"] {
+        let mean: f64 = (10..=18).map(|n| area_of(n) * number(&format!("pad_{n}_{share}"))).sum::<f64>() / all;
+        assert!((number(&format!("pad_{share}")) - mean).abs() < 1e-12, "{share}");
+    }
+    let mut largest = 0.0f64;
+    for n in 1..=9 {
+        let along = ["x", "y", "z"].map(|axis| orbit.numbers(&format!("foot_{n}_{axis}_displacement_m")).unwrap());
+        let distance = |row: usize| along.iter().map(|values| values[row] * values[row]).sum::<f64>().sqrt();
+        largest = (0..orbit.rows()).map(distance).fold(largest, f64::max);
+    }
+    assert!(largest > 0.0 && (number("foot_largest_displacement_m") / largest - 1.0).abs() < 1e-12);
+}
+
 /// A node with an imposed motion follows it, and moves the other nodes as it moves their places.
 #[test]
 fn fields_follow_imposed_motions() {
@@ -620,6 +651,62 @@ fn fields_of_a_disk_have_all_sectors_along_fixed_axes() {
     let without = read(folder.path(), &[&study.replace("axis = \"z\"\n", "")]).unwrap_err();
     let said = format!("{without} {}", without.help_text().unwrap_or_default());
     assert!(said.contains("axis"), "{said}");
+}
+
+/// The shapes of modes at all nodes are those of the places, in every sector of a disk.
+#[test]
+fn fields_of_modes_are_the_shapes_of_their_places() {
+    let folder = tempfile::tempdir().unwrap();
+    write_sector(folder.path());
+    let study = SECTOR.replace("[method]\nkind = \"harmonic-balance\"\nharmonics = 5\ntolerance = 0.5\n", "");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "");
+    let diameters = study.replace("kind = \"response\"", "kind = \"nodal-diameter\"\nmodes = 2\nfields = 4");
+    for reduction in ["reduce = false", "reduce = { modes = 8 }"] {
+        let found = dataset(folder.path(), &[&diameters.replace("reduce = false", reduction)]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+        let (modes, fields) = (table("nodal_diameters"), table("fields"));
+        let each = 4 * 6 * 36;
+        assert_eq!(fields.rows(), each * modes.rows());
+        let (sectors, numbers) = (fields.integers("sector").unwrap(), fields.integers("node").unwrap());
+        let mut compared = 0;
+        for row in (0..fields.rows()).filter(|row| numbers[*row] == 4) {
+            let (mode, instant) = (row / each, row % each / (6 * 36));
+            let diameter = modes.integers("nodal_diameter").unwrap()[mode] as f64;
+            assert_eq!(fields.numbers("frequency_Hz").unwrap()[row], modes.numbers("frequency_Hz").unwrap()[mode]);
+            let turn = std::f64::consts::TAU * sectors[row] as f64 / 6.0;
+            let own = ["x", "y", "z"].map(|axis| {
+                let shape = modes.numbers(&format!("tip_{axis}_shape_per_sqrt_kg")).unwrap()[mode];
+                let phase = modes.numbers(&format!("tip_{axis}_phase_deg")).unwrap()[mode].to_radians();
+                shape * (phase + diameter * turn + std::f64::consts::FRAC_PI_2 * instant as f64).cos()
+            });
+            let (sin, cos) = turn.sin_cos();
+            let fixed = [cos * own[0] - sin * own[1], sin * own[0] + cos * own[1], own[2]];
+            for (axis, expected) in ["x_m", "y_m", "z_m"].iter().zip(fixed) {
+                let found = fields.numbers(axis).unwrap()[row];
+                assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()), "{axis}: {found} {expected}");
+            }
+            compared += 1;
+        }
+        assert_eq!(compared, modes.rows() * 4 * 6);
+    }
+    write_files(folder.path(), 0.01, true);
+    let kind = "kind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\nfields = 4\n";
+    let block = STUDY.replace("kind = \"response\"\nfrequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", kind);
+    let block = block.split("[method]").next().unwrap();
+    let corner = "[[place]]\nname = \"corner\"\nnodes = [\"118\"]\n";
+    let found = dataset(folder.path(), &[HEAD, block, corner]);
+    let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+    let (modes, fields) = (table("modes"), table("fields"));
+    assert_eq!((modes.rows(), fields.rows()), (3, 2 * 4 * 36));
+    let rows: Vec<usize> = (0..fields.rows()).filter(|row| fields.integers("node").unwrap()[*row] == 118).collect();
+    for (end, row) in [(0, 0), (1, 2)] {
+        for axis in ["x", "y", "z"] {
+            let values = fields.numbers(&format!("{axis}_m")).unwrap();
+            let found = values[rows[4 * end]].hypot(values[rows[4 * end + 1]]);
+            let expected = modes.numbers(&format!("corner_{axis}_first_harmonic_m")).unwrap()[row];
+            assert!((found - expected).abs() < 1e-9 * expected.max(1e-9), "{axis}: {found} {expected}");
+        }
+    }
 }
 
 /// The high side of a sector rubs on the low side of the next one. The joints by hand have the

@@ -38,6 +38,10 @@ pub struct WaveModes {
     pub free_shapes: Vec<Vec<Complex64>>,
     /// Shapes of the modes of `stuck`, in the same form.
     pub stuck_shapes: Vec<Vec<Complex64>>,
+    /// The shapes of `free` over the degrees of freedom of the first sector.
+    pub free_motions: Vec<Vec<Complex64>>,
+    /// The shapes of `stuck` over the degrees of freedom of the first sector.
+    pub stuck_motions: Vec<Vec<Complex64>>,
 }
 
 /// Converts a direction over the ring into its form in a wave: the real part and, for a complex
@@ -71,11 +75,15 @@ impl WaveRows {
 
     /// Combines the modes of both joint states, with shapes at the places.
     fn modes(&self, free: SelectedModes, stuck: SelectedModes, places: &[Row]) -> WaveModes {
-        let at_places = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.at_places(shape, places)).collect();
+        let normalized = |shapes: &[DVector<f64>]| shapes.iter().map(|shape| self.normalized(shape, places)).unzip();
+        let (free_shapes, free_motions) = normalized(&free.shapes);
+        let (stuck_shapes, stuck_motions) = normalized(&stuck.shapes);
         WaveModes {
             diameter: self.diameter,
-            free_shapes: at_places(&free.shapes),
-            stuck_shapes: at_places(&stuck.shapes),
+            free_shapes,
+            stuck_shapes,
+            free_motions,
+            stuck_motions,
             free: free.modes,
             stuck: stuck.modes,
         }
@@ -159,24 +167,26 @@ impl WaveRows {
         DVector::from_fn(2 * n, |i, _| if i < n { -shape[n + i] } else { shape[i - n] })
     }
 
-    /// Returns a sector's shape with `aᵀMa + bᵀMb = 1` at the places, normalized as in
-    /// [`WaveModes`].
-    fn at_places(&self, shape: &DVector<f64>, places: &[Row]) -> Vec<Complex64> {
+    /// Returns a sector's shape with `aᵀMa + bᵀMb = 1`, normalized as in [`WaveModes`]: at the
+    /// places, and over the degrees of freedom.
+    fn normalized(&self, shape: &DVector<f64>, places: &[Row]) -> (Vec<Complex64>, Vec<Complex64>) {
         let n = self.dofs;
-        let whole = |i: usize| Complex64::new(shape[i], if self.double { shape[n + i] } else { 0.0 });
         // the squares of a cosine over the sectors sum to half their number
         let scale = (if self.double { 2.0 } else { 1.0 } / self.sectors as f64).sqrt();
+        let whole = |i: usize| Complex64::new(shape[i], if self.double { shape[n + i] } else { 0.0 }) * scale;
         let at = |place: &Row| -> Complex64 {
             let term = |(row, weight): &(usize, f64)| {
-                whole(row % n) * unit_root((self.diameter * (row / n)) as i64, self.sectors) * (*weight * scale)
+                whole(row % n) * unit_root((self.diameter * (row / n)) as i64, self.sectors) * *weight
             };
             place.iter().map(term).sum()
         };
         let mut at: Vec<Complex64> = places.iter().map(at).collect();
-        if let Some(first) = first_largest(at.iter().map(|x| x.norm())).map(|first| at[first]) {
-            at.iter_mut().for_each(|x| *x *= first.conj() / first.norm());
+        let mut motion: Vec<Complex64> = (0..n).map(whole).collect();
+        let first = first_largest(at.iter().map(|x| x.norm())).map(|first| at[first]);
+        if let Some(first) = first.filter(|first| first.norm() > 0.0) {
+            at.iter_mut().chain(&mut motion).for_each(|x| *x *= first.conj() / first.norm());
         }
-        at
+        (at, motion)
     }
 }
 

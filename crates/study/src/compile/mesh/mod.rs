@@ -38,6 +38,19 @@ pub(crate) struct MeshUse {
     pub contacts: Vec<ContactSummary>,
     /// Area of each of these joints, by name, m².
     pub areas: HashMap<String, f64>,
+    /// The places and joints of each set.
+    pub sets: Arc<Vec<MeshSet>>,
+}
+
+/// The places or joints that one entry of a study file makes from a set of the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshSet {
+    /// Name of the entry.
+    pub name: String,
+    /// Names of the places or joints, in a disk those of one sector.
+    pub members: Vec<String>,
+    /// Area of each joint, m²; empty for places.
+    pub areas: Vec<f64>,
 }
 
 impl MeshSource {

@@ -6,7 +6,7 @@ use crate::case::disk::coordinate_axis;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::compile::mesh::contact::SectorRotation;
-use crate::compile::mesh::{MeshSource, MeshUse, contact, mentioned_nodes, sets};
+use crate::compile::mesh::{MeshSet, MeshSource, MeshUse, contact, mentioned_nodes, sets};
 use crate::compile::source_model::ModelLists;
 use crate::syntax::document::{TomlTable, TomlValue};
 use crate::syntax::error::Problem;
@@ -58,10 +58,15 @@ impl Reader {
         let mesh =
             if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table, rotation.axis)) };
         let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
-        let (mut summaries, mut areas) = (Vec::new(), HashMap::new());
+        let (mut summaries, mut areas, mut sets) = (Vec::new(), HashMap::new(), Vec::new());
         for place in places {
+            let name = place.name().filter(|_| place.entry("set").is_some()).map(str::to_owned);
             match self.places_on_sets(place, mesh.as_ref()) {
-                Ok(places) => lists.place.extend(places),
+                Ok(places) => {
+                    let members = places.iter().filter_map(|place| place.name()).map(str::to_owned).collect();
+                    sets.extend(name.map(|name| MeshSet { name, members, areas: Vec::new() }));
+                    lists.place.extend(places);
+                }
                 Err(problem) => self.problems.push(problem),
             }
         }
@@ -76,6 +81,11 @@ impl Reader {
                     lists.place.extend(expanded.places);
                     lists.joint.extend(expanded.joints);
                     lists.force.extend(expanded.forces);
+                    sets.push(MeshSet {
+                        name: contact.name().unwrap_or_default().to_owned(),
+                        members: expanded.areas.iter().map(|(joint, _)| joint.clone()).collect(),
+                        areas: expanded.areas.iter().map(|(_, area)| *area).collect(),
+                    });
                     areas.extend(expanded.areas);
                     summaries.push(expanded.summary);
                 }
@@ -90,7 +100,12 @@ impl Reader {
             self.problems
                 .push(Problem::new(&contact.location, "contact", message).help("use a coarser mesh of the faces"));
         }
-        (self.problems.len() == before).then(|| MeshUse { source: mesh.map(Arc::new), contacts: summaries, areas })
+        (self.problems.len() == before).then(|| MeshUse {
+            source: mesh.map(Arc::new),
+            contacts: summaries,
+            areas,
+            sets: Arc::new(sets),
+        })
     }
 
     /// Reads the mesh of a structure; `None` without a mesh, or if it cannot be read.

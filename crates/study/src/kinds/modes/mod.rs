@@ -2,6 +2,7 @@
 
 mod figure;
 
+use super::shared::fields::{self, Fields};
 use super::shared::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
@@ -9,6 +10,7 @@ use crate::check::warnings::mode_warnings;
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{amplitude_in, first_harmonic_in, phase_of};
+use crate::results::dataset::FIELDS;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
@@ -44,6 +46,7 @@ pub(super) const KIND: Kind = Kind {
             default("mode", ValueType::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),
             default("harmonics", ValueType::Count(1, 255), "15", "highest harmonic", "15"),
             default("samples", ValueType::Count(8, 1 << 16), "1024", "samples per period", "1024"),
+            fields::KEY,
         ],
         check,
         axes: [Some(Dimension::LENGTH), None],
@@ -52,7 +55,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: false,
         needs: |_, _, system| stickslip::curve::modes::check(system),
         adapts: false,
-        tables: &["modes", "modes_summary"],
+        tables: &["modes", "modes_summary", FIELDS],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -67,12 +70,15 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let points = values.table("amplitude").and_then(|table| table.count("points")).unwrap_or(61) as f64;
     let rows = inputs.cases * points;
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
+    // the shapes at both ends of the curve
+    let nodes = fields::size(inputs, 2.0 * inputs.cases);
     PlannedSize {
+        drawn: 2.0 * rows + nodes.rows,
         tables: vec![
             TableShape { rows, numbers: inputs.varied + 4.0 + 3.0 * inputs.places, words: 0.0 },
             TableShape { rows: inputs.cases, numbers: inputs.varied + 5.0, words: 0.0 },
+            nodes,
         ],
-        drawn: 2.0 * rows,
         unit: points * inputs.series_bytes(harmonics),
     }
 }
@@ -85,6 +91,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
         return Err(KeyError::new("amplitude", "the range is empty", "`from` must be below `to`"));
     }
     check_samples(values)?;
+    fields::check(values, model)?;
     let number = values.count("mode").unwrap_or(1);
     let mass_places = model.masses.iter().map(|mass| mass.places().len());
     let masses = mass_places.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
@@ -102,7 +109,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let Some(unit) = unit else {
         (work.context.finished)();
         part.count(|| location_of(prepared), "failed", Some(NO_SUCH_MODE.to_owned()));
-        part.tables = vec![TableBuilder::default(), TableBuilder::default()];
+        part.tables = (0..3).map(|_| TableBuilder::default()).collect();
         return Ok(part);
     };
     let mode = follow(prepared, unit).map_err(|error| (prepared.case.index, error))?;
@@ -144,7 +151,15 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     summary.number("frequency_there_Hz", end(largest));
     summary.reduction_error(reduction);
     summary.end_row();
-    part.tables = vec![rows, summary];
+    let mut of_nodes = TableBuilder::default();
+    if let Some(nodes) = Fields::new(work.study, prepared, &mut part) {
+        let ends = [mode.points.first(), mode.points.last().filter(|_| mode.points.len() > 1)];
+        for point in ends.into_iter().flatten() {
+            let head = |rows: &mut TableBuilder| rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
+            nodes.write_harmonic(prepared, point.omega, &point.shape, &head, &mut of_nodes);
+        }
+    }
+    part.tables = vec![rows, summary, of_nodes];
     Ok(part)
 }
 

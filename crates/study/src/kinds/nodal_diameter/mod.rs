@@ -4,17 +4,20 @@
 mod figure;
 
 use super::shared::disk_shape::place_and_sector;
+use super::shared::fields::{self, Fields};
 use super::shared::keys::no_requirements;
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{FREQUENCY, phase_of, shape_of};
+use crate::results::dataset::FIELDS;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::key::{ValueType, default, optional};
+use num_complex::Complex64;
 use stickslip::dimension::Dimension;
-use stickslip::model::{Model, System, WaveModes};
+use stickslip::model::{CyclicSymmetry, Model, System, WaveModes};
 
 /// Names of the table and its columns.
 const TABLE: &str = "nodal_diameters";
@@ -54,13 +57,14 @@ pub(super) const KIND: Kind = Kind {
                 "state of the joints in the drawn shapes",
                 "\"stuck\"",
             ),
+            fields::KEY,
         ],
         check,
         axes: [Some(Dimension::NONE), Some(Dimension::FREQUENCY)],
         uses_method: false,
         needs: no_requirements,
         adapts: false,
-        tables: &[TABLE],
+        tables: &[TABLE, FIELDS],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -78,6 +82,7 @@ fn states() -> Vec<(&'static str, &'static str)> {
 
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     check_disk(model)?;
+    fields::check(values, model)?;
     let (most, sectors) = (values.count("modes").unwrap_or(4), model.ring.map_or(0, |ring| ring.sectors as u64));
     if let Some(diameter) = values.count(DIAMETER).filter(|diameter| 2 * diameter > sectors) {
         let message = format!("a disk of {sectors} sectors has no {diameter} nodal diameters");
@@ -115,9 +120,10 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * inputs.dofs / sectors);
     let rows = inputs.cases * waves * 2.0 * modes;
     let shapes = 2.0 * inputs.places / sectors;
+    let nodes = fields::size(inputs, rows);
     PlannedSize {
-        tables: vec![TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 }],
-        drawn: rows,
+        drawn: rows + nodes.rows,
+        tables: vec![TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 }, nodes],
         // Size above which sparse factors give only the lowest modes.
         // Bytes of matrices and factors per row. Measured: 0.7 GB for 61,000 rows.
         unit: if each > 700.0 { 12e3 * each } else { 8.0 * each * each },
@@ -139,17 +145,20 @@ pub(super) fn waves(model: &Model, system: &System, most: usize) -> Result<Vec<W
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let mut part = UnitResult::default();
-    let mut rows = TableBuilder::default();
+    let (mut rows, mut of_nodes) = (TableBuilder::default(), TableBuilder::default());
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
     match waves(&prepared.case.model, &prepared.system, most) {
         Ok(waves) => {
             part.count(|| location_of(prepared), CONVERGED, None);
             write(prepared, &waves, &mut rows);
+            if let Some(nodes) = Fields::new(work.study, prepared, &mut part) {
+                write_fields(prepared, &waves, &nodes, &mut of_nodes);
+            }
         }
         Err(reason) => part.count(|| location_of(prepared), "failed", Some(reason)),
     }
     (work.context.finished)();
-    part.tables = vec![rows];
+    part.tables = vec![rows, of_nodes];
     Ok(part)
 }
 
@@ -182,6 +191,28 @@ fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) 
                 }
                 rows.reduction_error(prepared.system.reduction_evidence());
                 rows.end_row();
+            }
+        }
+    }
+}
+
+/// Writes the shapes of unit modal mass at all nodes, in the order of the other table.
+fn write_fields(prepared: &PreparedCase, waves: &[WaveModes], nodes: &Fields, rows: &mut TableBuilder) {
+    let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
+    let sectors = prepared.case.model.ring.map_or(1, |ring| ring.sectors);
+    for (state, name) in STATES.into_iter().enumerate() {
+        for wave in waves {
+            let symmetry = CyclicSymmetry { sectors, order: wave.diameter };
+            let (modes, motions) = [(&wave.free, &wave.free_motions), (&wave.stuck, &wave.stuck_motions)][state];
+            for (mode, (found, motion)) in modes.elastic.iter().zip(motions).take(most).enumerate() {
+                let turns = (0..sectors).map(|sector| symmetry.phase_factor(1, sector));
+                let motion: Vec<Complex64> = turns.flat_map(|turn| motion.iter().map(move |x| x * turn)).collect();
+                let head = |rows: &mut TableBuilder| {
+                    rows.text(JOINTS, name);
+                    rows.integer(DIAMETER, wave.diameter as u64);
+                    rows.integer(MODE, mode as u64 + 1);
+                };
+                nodes.write_harmonic(prepared, found.omega, &motion, &head, rows);
             }
         }
     }

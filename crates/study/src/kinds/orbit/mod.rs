@@ -1,10 +1,10 @@
 //! Orbits over one period, in time.
 
-mod fields;
 mod figure;
 
+use super::shared::contact_states::contact_word;
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
-use super::shared::orbit_sweep;
+use super::shared::{fields, orbit_sweep};
 use crate::case::values::hertz;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::excitation_warnings;
@@ -15,9 +15,9 @@ use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::point_row::{PointRow, describe_location};
 use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
-use crate::syntax::key::{ValueType, default, optional};
+use crate::syntax::key::{ValueType, default};
 use stickslip::dimension::Dimension;
-use stickslip::orbit::{Contact, Orbit, Sample, Symmetry};
+use stickslip::orbit::{Orbit, Sample, Symmetry};
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -34,13 +34,7 @@ pub(super) const KIND: Kind = Kind {
                 "computes all Floquet multipliers into `multipliers.csv`; `stable` needs only the largest one",
                 "true",
             ),
-            optional(
-                "fields",
-                ValueType::Count(1, 1000),
-                "number of instants of the period at which the motions of all nodes of the structure are \
-                 written to `fields.csv`, and with a `mesh` to `fields.pvd` for ParaView",
-                "24",
-            ),
+            fields::KEY,
         ],
         check: |values, model, _| check_output(values).and_then(|()| fields::check(values, model)),
         axes: [Some(Dimension::TIME), None],
@@ -63,7 +57,7 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let orbits = inputs.orbits(points);
     let wanted = inputs.case.values.flag("multipliers") == Some(true);
     let multipliers = if wanted { points * 2.0 * inputs.dofs } else { 0.0 };
-    let fields = fields::size(inputs);
+    let fields = fields::size(inputs, points);
     PlannedSize {
         tables: vec![
             inputs.motion(rows),
@@ -127,7 +121,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             motion.end_row();
         }
         if let Some(nodes) = &nodes {
-            nodes.write(prepared, &orbit, &mut of_nodes);
+            nodes.write_orbit(prepared, &orbit, &mut of_nodes);
         }
     }
     part.tables = vec![motion, summary, multipliers, of_nodes];
@@ -160,18 +154,7 @@ pub(super) fn write_sample(prepared: &PreparedCase, sample: &Sample, rows: &mut 
             rows.number(&format!("{label}_velocity_m_per_s"), state.velocity[a]);
             rows.number(&format!("{label}_force_N"), state.force[a]);
         }
-        let contact = if joint.law().has_faces() { word(state.contact) } else { "" };
+        let contact = if joint.law().has_faces() { contact_word(state.contact) } else { "" };
         rows.text(&format!("{}_contact", joint.name()), contact);
-    }
-}
-
-fn word(contact: Contact) -> &'static str {
-    match contact {
-        Contact::Stick => "stick",
-        Contact::SlipForward => "slip+",
-        Contact::SlipBackward => "slip-",
-        Contact::Slip => "slip",
-        Contact::Touch => "touch",
-        Contact::Open => "open",
     }
 }

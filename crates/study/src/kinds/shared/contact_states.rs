@@ -7,6 +7,7 @@ use crate::results::columns;
 use crate::results::dataset::{Axis, Panel, Series, Style, Table};
 use crate::results::drawing::numbers;
 use std::ops::Range;
+use stickslip::orbit::Contact;
 
 /// Up to this number of joints, each joint has one panel.
 const MAX_SINGLE: usize = 3;
@@ -166,4 +167,16 @@ fn areas(shares: &[Vec<f64>; 4], x: &[f64], occurring: &[ContactState], first: u
     // the upper edge of the last area is the edge of the panel
     areas.pop();
     areas
+}
+
+/// Returns the word of a contact state in tables.
+pub(in crate::kinds) fn contact_word(contact: Contact) -> &'static str {
+    match contact {
+        Contact::Stick => "stick",
+        Contact::SlipForward => "slip+",
+        Contact::SlipBackward => "slip-",
+        Contact::Slip => "slip",
+        Contact::Touch => "touch",
+        Contact::Open => "open",
+    }
 }

@@ -6,10 +6,12 @@
 //! - `points_to_doubt`: points that are unstable or less exact than requested;
 //! - `orbit_sweep`: the orbits of a unit, their instants, and failures;
 //! - `contact_states`: panels of contact states;
-//! - `disk_shape`: pictures of a disk.
+//! - `disk_shape`: pictures of a disk;
+//! - `fields`: the motions of all nodes.
 
 pub(super) mod contact_states;
 pub(super) mod disk_shape;
+pub(super) mod fields;
 pub(super) mod keys;
 pub(super) mod orbit_sweep;
 pub(super) mod peak_of;

@@ -164,7 +164,7 @@ impl<'a> ModeEquations<'a> {
     }
 
     /// Returns the first harmonic of the places.
-    fn first_harmonic<'s>(&self, state: &'s ModeState) -> &'s [Complex64] {
+    pub fn first_harmonic<'s>(&self, state: &'s ModeState) -> &'s [Complex64] {
         let n = self.system.dofs();
         &state.x[self.first * n..(self.first + 1) * n]
     }

@@ -1,9 +1,10 @@
-//! The table `fields`: displacements, velocities and contact states of all nodes over one period,
-//! and the pressure, friction and loss per area at the nodes of contacts between meshes.
+//! The table `fields`: displacements and velocities of all nodes over one period of an orbit or a
+//! mode. In an orbit also contact states, and the pressure, friction and loss per area at the nodes
+//! of contacts between meshes.
 //!
 //! For a disk the table has all sectors. Their displacements are along the fixed axes x, y, z.
 
-use super::word;
+use super::contact_states::contact_word;
 use crate::case::study::Study;
 use crate::case::values::{Values, hertz};
 use crate::check::size::{SizeInputs, TableShape};
@@ -11,40 +12,54 @@ use crate::kinds::info::KeyError;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{PreparedCase, UnitResult};
+use crate::syntax::key::{Key, ValueType, optional};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 use stickslip::model::{DisplacementField, Model, System};
 use stickslip::orbit::{JointSample, Orbit};
 
+/// The key `fields`.
+pub(in crate::kinds) const KEY: Key = optional(
+    "fields",
+    ValueType::Count(1, 1000),
+    "number of instants of the period at which the motions of all nodes of the structure are written to \
+     `fields.csv`, and with a `mesh` to `fields.pvd` for ParaView",
+    "24",
+);
+
 /// Columns with quantities per area at the nodes of contacts.
 const PER_AREA: [&str; 3] = ["pressure_Pa", "friction_Pa", "loss_J_per_m2"];
 /// Directions of a node, in the names of its rows.
 const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 
-/// Refuses a disk whose sectors have no known rotation.
-pub(super) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
-    let disk = model.substructure.as_ref().and_then(|own| own.disk.as_ref());
-    match disk.filter(|disk| values.count("fields").is_some() && disk.boundary.axis().is_none()) {
-        Some(_) => {
-            let message = "the displacements of all nodes of a disk need its axis";
-            Err(KeyError::new("fields", message, "add axis = \"z\" to [disk], or remove `fields`"))
-        }
-        None => Ok(()),
+/// Refuses a model without nodes, and a disk whose sectors have no known rotation.
+pub(in crate::kinds) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
+    if values.count("fields").is_none() {
+        return Ok(());
+    }
+    let refuse = |message: &str, help: &str| Err(KeyError::new("fields", message, help));
+    match &model.substructure {
+        None => refuse("only a structure given by matrices has the displacements of nodes", "remove `fields`"),
+        Some(own) if own.disk.as_ref().is_some_and(|disk| disk.boundary.axis().is_none()) => refuse(
+            "the displacements of all nodes of a disk need its axis",
+            "add axis = \"z\" to [disk], or remove `fields`",
+        ),
+        Some(_) => Ok(()),
     }
 }
 
-/// Returns the shape of the table.
-pub(super) fn size(inputs: &SizeInputs<'_>) -> TableShape {
+/// Returns the shape of the table for this number of motions.
+pub(in crate::kinds) fn size(inputs: &SizeInputs<'_>, motions: f64) -> TableShape {
     let instants = inputs.case.values.count("fields").unwrap_or(0) as f64;
     let rows = inputs.case.model.substructure.as_ref().map_or(0, |structure| structure.component.dofs());
     let sectors = inputs.case.model.ring.map_or(1, |ring| ring.sectors);
     let nodes = (rows.div_ceil(DIRECTIONS.len()) * sectors) as f64;
-    TableShape { rows: inputs.points() * instants * nodes, numbers: inputs.varied + 13.0, words: 1.0 }
+    TableShape { rows: motions * instants * nodes, numbers: inputs.varied + 13.0, words: 1.0 }
 }
 
 /// The nodes of a structure.
-pub(super) struct Fields {
+pub(in crate::kinds) struct Fields {
     field: DisplacementField,
     instants: usize,
     /// The row of each direction, by the number of the node; `None` for a constrained one.
@@ -117,40 +132,83 @@ impl Fields {
         Some(Fields { field, instants, nodes, joints })
     }
 
-    /// Writes a row for every node at every instant.
-    pub fn write(&self, prepared: &PreparedCase, orbit: &Orbit, rows: &mut TableBuilder) {
-        let sectors = self.field.sectors();
+    /// Writes a row for every node at every instant of an orbit.
+    pub fn write_orbit(&self, prepared: &PreparedCase, orbit: &Orbit, rows: &mut TableBuilder) {
         for instant in 0..self.instants {
             let time = orbit.period() * instant as f64 / self.instants as f64;
             let sample = orbit.sample(time);
             let imposed = imposed(&prepared.system, orbit.omega, time);
-            for sector in 0..sectors {
-                let motion = [(&sample.displacement, &imposed[0]), (&sample.velocity, &imposed[1])]
-                    .map(|(values, imposed)| self.field.rows(sector, values, imposed));
-                let rotation = self.field.axis().map(|axis| axis.rotation(TAU * sector as f64 / sectors as f64));
-                for (node, along) in &self.nodes {
-                    rows.varied(&prepared.case);
-                    rows.number("frequency_Hz", hertz(orbit.omega));
-                    rows.number("time_s", time);
-                    if prepared.case.model.ring.is_some() {
-                        rows.integer("sector", sector as u64);
+            let motion = [(&sample.displacement[..], &imposed[0][..]), (&sample.velocity, &imposed[1])];
+            let head = |rows: &mut TableBuilder| {
+                rows.number("frequency_Hz", hertz(orbit.omega));
+                rows.number("time_s", time);
+            };
+            self.write_instant(prepared, motion, Some((orbit, &sample.joints)), &head, rows);
+        }
+    }
+
+    /// Writes a row for every node at every instant of a harmonic motion, with the columns that
+    /// `head` writes. The motion is over all degrees of freedom.
+    pub fn write_harmonic(
+        &self,
+        prepared: &PreparedCase,
+        omega: f64,
+        motion: &[Complex64],
+        head: &dyn Fn(&mut TableBuilder),
+        rows: &mut TableBuilder,
+    ) {
+        let at_rest = vec![0.0; prepared.system.moved_places().len()];
+        for instant in 0..self.instants {
+            let phase = TAU * instant as f64 / self.instants as f64;
+            let displacement: Vec<f64> = motion.iter().map(|x| (x * Complex64::cis(phase)).re).collect();
+            let velocity: Vec<f64> = motion.iter().map(|x| -omega * (x * Complex64::cis(phase)).im).collect();
+            let head = |rows: &mut TableBuilder| {
+                head(rows);
+                rows.number("frequency_Hz", hertz(omega));
+                rows.number("time_s", phase / omega);
+            };
+            let motion = [(&displacement[..], &at_rest[..]), (&velocity, &at_rest)];
+            self.write_instant(prepared, motion, None, &head, rows);
+        }
+    }
+
+    /// Writes a row for every node: its displacement and velocity from those of the degrees of
+    /// freedom and the imposed ones, and the states of the joints.
+    fn write_instant(
+        &self,
+        prepared: &PreparedCase,
+        motion: [(&[f64], &[f64]); 2],
+        joints: Option<(&Orbit, &[JointSample])>,
+        head: &dyn Fn(&mut TableBuilder),
+        rows: &mut TableBuilder,
+    ) {
+        let sectors = self.field.sectors();
+        for sector in 0..sectors {
+            let motion = motion.map(|(values, imposed)| self.field.rows(sector, values, imposed));
+            let rotation = self.field.axis().map(|axis| axis.rotation(TAU * sector as f64 / sectors as f64));
+            for (node, along) in &self.nodes {
+                rows.varied(&prepared.case);
+                head(rows);
+                if prepared.case.model.ring.is_some() {
+                    rows.integer("sector", sector as u64);
+                }
+                rows.integer("node", *node);
+                for (values, unit) in motion.iter().zip(["m", "m_per_s"]) {
+                    let own = along.map(|row| row.map_or(0.0, |row| values[row]));
+                    let fixed = rotation.map_or(own, |to| to.map(|row| (0..3).map(|i| row[i] * own[i]).sum()));
+                    for (axis, value) in DIRECTIONS.iter().zip(fixed) {
+                        rows.number(&format!("{axis}_{unit}"), value);
                     }
-                    rows.integer("node", *node);
-                    for (values, unit) in motion.iter().zip(["m", "m_per_s"]) {
-                        let own = along.map(|row| row.map_or(0.0, |row| values[row]));
-                        let fixed = rotation.map_or(own, |to| to.map(|row| (0..3).map(|i| row[i] * own[i]).sum()));
-                        for (axis, value) in DIRECTIONS.iter().zip(fixed) {
-                            rows.number(&format!("{axis}_{unit}"), value);
-                        }
-                    }
-                    let joint = self.joints.get(&(sector, *node)).map(|joint| (joint, &sample.joints[joint.index]));
-                    rows.text("contact", joint.map(|(_, sample)| word(sample.contact)).unwrap_or_default());
+                }
+                if let Some((orbit, samples)) = joints {
+                    let joint = self.joints.get(&(sector, *node)).map(|joint| (joint, &samples[joint.index]));
+                    rows.text("contact", joint.map(|(_, sample)| contact_word(sample.contact)).unwrap_or_default());
                     let values = joint.map_or([0.0; 3], |(joint, sample)| joint.per_area(orbit, sample));
                     for (name, value) in PER_AREA.iter().zip(values) {
                         rows.number(name, value);
                     }
-                    rows.end_row();
                 }
+                rows.end_row();
             }
         }
     }
