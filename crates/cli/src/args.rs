@@ -140,6 +140,9 @@ pub enum Command {
         /// Format of the files, if their content does not show it
         #[arg(long)]
         format: Option<String>,
+        /// Write a picture of the mesh with its sets to this PNG file
+        #[arg(long, value_name = "PNG")]
+        picture: Option<PathBuf>,
     },
     /// Reduce the structure of a study and save the reduced matrices as input for other studies
     Reduce {

@@ -9,10 +9,11 @@ use std::fmt::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use stickslip::structure::Component;
-use stickslip_formats::mesh::{self, MeshReport};
+use stickslip_formats::mesh::{self, Mesh, MeshReport};
 use stickslip_formats::{self as formats, Error, ErrorKind, Matrix, MatrixReport, align_rows, constrained_rows, names};
 use stickslip_numerics::definiteness::sparse_definite;
 use stickslip_numerics::sparse;
+use stickslip_report::{mesh_picture, write_file};
 use stickslip_study::summary::{DIRECTIONS, mass_along};
 use stickslip_study::unit_sets;
 
@@ -63,9 +64,10 @@ impl Role {
 }
 
 /// Describes every matrix in the files, and prints the lowest frequencies of stiffness and
-/// mass.
-pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
+/// mass. Writes a picture of the only mesh if a file is named for it.
+pub fn inspect(files: &[PathBuf], format: Option<&str>, picture: Option<&Path>) -> Exit {
     let (mut text, mut wrong) = (String::new(), false);
+    let mut meshes = Vec::new();
     let mut square: Vec<NamedMatrix> = Vec::new();
     let mut rows = Vec::new();
     let mut row_names = None;
@@ -78,6 +80,7 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
                     let _ = writeln!(text, "{}", file.display());
                     MeshReport(&mesh).to_string().lines().for_each(|line| text += &format!("  {line}\n"));
                     text.push('\n');
+                    meshes.push((file, mesh));
                 }
                 Err(error) => {
                     complain!("error: {error}");
@@ -151,10 +154,29 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>) -> Exit {
             Err(why) => text += &format!("no frequencies: {why}\n"),
         }
     }
+    if let Some(path) = picture {
+        match draw(&meshes, path) {
+            Ok(()) => text += &format!("wrote {}\n", path.display()),
+            Err(problem) => {
+                complain!("error: {problem}");
+                wrong = true;
+            }
+        }
+    }
     match (wrong, print(&text)) {
         (true, _) => Exit::WrongInput,
         (false, exit) => exit,
     }
+}
+
+/// Writes a picture of the only mesh.
+fn draw(meshes: &[(&PathBuf, Mesh)], path: &Path) -> Result<(), String> {
+    let [(file, mesh)] = meshes else {
+        return Err(format!("--picture draws one mesh, but there are {}; name one file with a mesh", meshes.len()));
+    };
+    let title = file.file_name().unwrap_or_default().to_string_lossy();
+    let picture = mesh_picture(mesh, &title).map_err(|error| error.to_string())?;
+    write_file(path, &picture).map(|_| ()).map_err(|error| error.to_string())
 }
 
 /// Describes the matrices of one file in `text`.

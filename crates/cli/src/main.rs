@@ -72,7 +72,7 @@ fn main() -> ExitCode {
             let study = study.as_deref();
             plot::plot(&folders, &plot::PlotOptions { overlay, study, out: out.as_deref(), only: &only, open })
         }
-        Command::Inspect { files, format } => inspect::inspect(&files, format.as_deref()),
+        Command::Inspect { files, format, picture } => inspect::inspect(&files, format.as_deref(), picture.as_deref()),
         Command::Reduce { file, out, set } => reduce::reduce(&file, &set, &out),
         Command::Explore { study, port, no_open, threads } => {
             let open = if no_open { explore::OpenBrowser::No } else { explore::OpenBrowser::Yes };

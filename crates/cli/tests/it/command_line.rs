@@ -836,6 +836,13 @@ fn inspect_describes_meshes() {
     fs::write(folder.path().join("wrong.inp"), "*NODE\n1,0,0,0\n2,0,x\n").expect("a file");
     let inspected = stickslip(folder.path(), &["inspect", "wrong.inp"]);
     assert!(code(&inspected) == 2 && stderr(&inspected).contains("wrong.inp, line 3"), "{}", stderr(&inspected));
+    let picture = folder.path().join("mesh.png");
+    let path = picture.to_str().expect("a path");
+    let drawn = stickslip(&meshes, &["inspect", "quadratic.inp", "--picture", path]);
+    let bytes = fs::read(&picture).expect("a picture");
+    assert!(code(&drawn) == 0 && bytes.starts_with(b"\x89PNG"), "{}", stderr(&drawn));
+    let drawn = stickslip(&meshes, &["inspect", "quadratic.inp", "quadratic.inp", "--picture", path]);
+    assert!(code(&drawn) == 2 && stderr(&drawn).contains("name one file with a mesh"), "{}", stderr(&drawn));
 }
 
 /// `inspect` treats constrained and massless rows in the same way as a study.

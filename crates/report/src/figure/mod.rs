@@ -3,13 +3,15 @@
 //! - `panels`, `axis`, `colour`: what all outputs share: grid, ranges, drawing order and legend;
 //!   ticks; palette and colour scales.
 //! - `clip`, `font`: curves clipped to their panel; text widths in the embedded font.
-//! - `svg`, `png`, `html`: one output each.
+//! - `svg`, `png`, `html`: one output each;
+//! - `mesh_picture`: a picture of a mesh.
 
 mod axis;
 mod clip;
 pub(crate) mod colour;
 mod font;
 pub mod html;
+pub mod mesh_picture;
 mod panels;
 pub mod png;
 pub mod svg;

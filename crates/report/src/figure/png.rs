@@ -32,19 +32,28 @@ pub fn to_png(figure: &Figure) -> Result<Vec<u8>, ReportError> {
 }
 
 fn draw(figure: &Figure) -> Result<tiny_skia::Pixmap, ReportError> {
-    let mut options = usvg::Options { font_family: "DejaVu Sans".into(), ..usvg::Options::default() };
-    for weight in [Weight::Regular, Weight::Bold] {
-        options.fontdb_mut().load_font_data(font::data(weight).to_vec());
-    }
-    options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
-    let tree = usvg::Tree::from_str(&crate::figure::svg::to_svg(figure), &options)
-        .map_err(|e| ReportError::encode("figure.png", e))?;
+    let tree = parsed(&crate::figure::svg::to_svg(figure))?;
     let size = tree.size();
     let pixels = |length: f32| (length * SCALE).ceil() as u32;
     let mut pixmap = tiny_skia::Pixmap::new(pixels(size.width()), pixels(size.height()))
         .ok_or_else(|| ReportError::encode("figure.png", "the figure has too many panels for one image"))?;
     resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixmap.as_mut());
     Ok(pixmap)
+}
+
+fn parsed(svg: &str) -> Result<usvg::Tree, ReportError> {
+    let mut options = usvg::Options { font_family: "DejaVu Sans".into(), ..usvg::Options::default() };
+    for weight in [Weight::Regular, Weight::Bold] {
+        options.fontdb_mut().load_font_data(font::data(weight).to_vec());
+    }
+    options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
+    usvg::Tree::from_str(svg, &options).map_err(|e| ReportError::encode("figure.png", e))
+}
+
+/// Draws an SVG on a picture.
+pub(super) fn draw_on(svg: &str, canvas: &mut tiny_skia::Pixmap) -> Result<(), ReportError> {
+    resvg::render(&parsed(svg)?, tiny_skia::Transform::identity(), &mut canvas.as_mut());
+    Ok(())
 }
 
 #[cfg(test)]

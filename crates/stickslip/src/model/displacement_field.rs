@@ -171,7 +171,7 @@ impl DisplacementField {
 fn ring_shapes(model: &Model, substructure: &Substructure, part: &DiskPart) -> Result<RingShapes, ReductionError> {
     let sectors = model.ring.map_or(1, |ring| ring.sectors);
     let stated = &model.places[..model.places.len() / sectors];
-    let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.iter().cloned()).collect();
+    let seen = Place::substructure_rows(stated);
     let kept = substructure.component.sector(&part.boundary, sectors);
     let blade = kept.blade(&substructure.component, &part.blade).map_err(|_| ReductionError::NoPorts)?;
     let found = kept.mistuned_with_shapes(&blade, &part.deviations, &seen, &substructure.reduction)?;

@@ -149,10 +149,6 @@ impl SubstructureParts {
     /// Returns the parts of all sectors of a disk.
     fn ring(substructure: &Substructure, disk: &DiskPart, sectors: usize, model: &Model) -> Result<Self, ModelError> {
         let Substructure { component, reduction, .. } = substructure;
-        if let Some(i) = model.places.iter().position(|place| place.view_of.is_some()) {
-            let message = "a rotated view of a mass is not supported in a disk whose sector is given by matrices; define the blade by masses";
-            return Err(ModelError::new(Element::Place(i), "of", message));
-        }
         if !model.places.len().is_multiple_of(sectors) {
             let message = format!(
                 "{} places on {sectors} sectors: all sectors must have the same number of places",
@@ -167,7 +163,7 @@ impl SubstructureParts {
                 "its rows differ from those in the first sector; all sectors must be observed at the same rows";
             return Err(ModelError::new(Element::Place(i), "dof", message));
         }
-        let seen: Vec<Row> = stated.iter().flat_map(|place| place.rows.iter().cloned()).collect();
+        let seen = Place::substructure_rows(stated);
         let kept = component.sector(&disk.boundary, sectors);
         let blade = match disk.deviations.iter().any(|deviation| *deviation != 0.0) {
             true => Some(kept.blade(component, &disk.blade)),
@@ -204,6 +200,10 @@ impl SubstructureParts {
         for (i, place) in model.places.iter().enumerate() {
             let s = i / stated.len();
             next = if i % stated.len() == 0 { 0 } else { next };
+            if place.view_of.is_some() {
+                places.push(Vec::new());
+                continue;
+            }
             let rows = one.places[next..next + place.rows.len()].iter();
             let rows = rows.map(|row| row.iter().map(|&(to, shift, weight)| (at(s, shift, to), weight)).collect());
             next += place.rows.len();
@@ -231,6 +231,9 @@ impl SubstructureParts {
         let own = |of: usize| modes.own.iter().enumerate().map(|(k, own)| (k, k, own[of])).collect();
         let mut next = 0;
         let of_place = |place: &Place| {
+            if place.view_of.is_some() {
+                return Vec::new();
+            }
             next += place.rows.len();
             let rows = (next - place.rows.len()..next)
                 .map(|row| modes.seen.row(row).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect());

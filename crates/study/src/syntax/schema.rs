@@ -456,6 +456,12 @@ const BODY: &[Key] = &[
          in space with three rotations; name rotations rx, ry, rz to keep only those",
         "[\"x\", \"z\"]",
     ),
+    optional(
+        "position",
+        ValueType::Vector(Dimension::LENGTH),
+        "position of the centre of mass in the coordinates of the mesh, for a [[contact]] with the body",
+        "[\"60 mm\", 0, \"5 mm\"]",
+    ),
     REPEAT,
 ];
 
@@ -510,8 +516,8 @@ const CONTACT: &[Key] = &[
     required(
         "between",
         ValueType::Rows,
-        "two sets of the mesh, or one and \"ground\"; the nodes of the first meet the faces of the second; on a disk \
-         `next.SET` is the set of the next sector",
+        "two sets of the mesh, or one and \"ground\" or a [[body]]; the nodes of the first meet the faces of the \
+         second, or points of the body; on a disk `next.SET` is the set of the next sector",
         "[\"PADS\", \"ground\"]",
     ),
     required(

@@ -160,6 +160,94 @@ fn contacts_of_equal_meshes_are_the_joints_of_their_nodes() {
     assert_eq!(varied.tables[0].rows(), 4);
 }
 
+/// A rigid body on the pads: each node meets the point of the body at its position.
+#[test]
+fn contacts_with_a_body_are_the_joints_of_its_points() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let body = "[[body]]\nname = \"slab\"\nmass = \"10 g\"\ndirections = [\"x\", \"y\", \"z\"]\n\
+        inertia = [\"20 g mm^2\", \"20 g mm^2\", \"30 g mm^2\"]\nposition = [\"1.1 mm\", \"0.9 mm\", \"2 mm\"]\n\
+        [[force]]\non = \"slab.z\"\namplitude = \"-40 N\"\nharmonic = 0\n\
+        [[spring]]\nbetween = [\"slab.x\", \"ground\"]\nstiffness = \"100 N/mm\"\n\
+        [[spring]]\nbetween = [\"slab.y\", \"ground\"]\nstiffness = \"100 N/mm\"\n";
+    let contact = CONTACT.replace("\"LID\"", "\"slab\"");
+    let study = &STUDY.replace("30 N", "10 N");
+    let found = dataset(folder.path(), &[HEAD, study, body, &contact]);
+    let pads = nodes(0.01, true).into_iter().filter(|(number, at)| *number < 101 && at[2] == 1.0);
+    let point =
+        |at: [f64; 3]| format!("of = \"slab\"\noffset = [\"{} mm\", \"{} mm\", \"-1 mm\"]", at[0] - 1.1, at[1] - 0.9);
+    let joints: String = pads.map(|(number, at)| by_hand(number, at, &point(at))).collect();
+    let head = HEAD.replace("kt = \"200 N/mm^3\"\n", "");
+    check_equal(&found, &dataset(folder.path(), &[&head, study, body, &joints]), 1e-9);
+    let summary = ModelSummary::new(&read(folder.path(), &[HEAD, study, body, &contact]).unwrap()).unwrap().to_string();
+    assert!(summary.contains("pad: 9 joints of PADS on slab, area 4 of 4 mm^2"), "{summary}");
+    for (from, to, words) in [
+        ("position = [\"1.1 mm\", \"0.9 mm\", \"2 mm\"]\n", "", "position of the body `slab` is unknown"),
+        ("\"1.1 mm\"", "\"mu*1 mm\"", "a parameter cannot change the position"),
+    ] {
+        let error = read(folder.path(), &[HEAD, study, &body.replace(from, to), &contact]).unwrap_err().to_string();
+        assert!(error.contains(words), "{words}: {error}");
+    }
+}
+
+/// A body between two sectors touches the high side of its own and the low side of the next one.
+#[test]
+fn a_body_touches_its_own_and_the_next_sector() {
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = write_sector(folder.path());
+    let (sin, cos) = (std::f64::consts::TAU / 6.0).sin_cos();
+    // the damper is in the gap between the sectors, at 60 degrees
+    let centre = [12.0 * cos, 12.0 * sin, 1.0];
+    let body = format!(
+        "[[body]]\nname = \"damper\"\nmass = \"2 g\"\ndirections = [\"x\", \"y\", \"z\"]\n\
+         inertia = [\"2 g mm^2\", \"2 g mm^2\", \"3 g mm^2\"]\nposition = [\"{} mm\", \"{} mm\", \"{} mm\"]\n\
+         [[spring]]\nbetween = [\"damper.x\", \"ground\"]\nstiffness = \"1 N/mm\"\n\
+         [[spring]]\nbetween = [\"damper.y\", \"ground\"]\nstiffness = \"1 N/mm\"\n",
+        centre[0], centre[1], centre[2]
+    );
+    let law = "law = { kind = \"friction-contact\", tangential = \"200 N/mm^3\", normal = \"300 N/mm^3\", friction = 0.3, preload = \"4 MPa\" }\n";
+    let contact = |name: &str, set: &str| {
+        format!("[[contact]]\nname = \"{name}\"\nbetween = [\"{set}\", \"damper\"]\ntangent = [0, 0, 1]\n{law}")
+    };
+    let study = SECTOR;
+    let found = dataset(folder.path(), &[study, &body, &contact("own", "HIGH"), &contact("other", "next.LOW")]);
+    let mut joints = String::new();
+    for (number, at) in nodes.iter().filter(|(_, at)| at[1] != 1 && at[0] > 0) {
+        let share = |x: usize, last: usize| if x == last || x + 2 == last { 0.5 } else { 1.0 };
+        let area = share(at[0], 3) * share(at[2], 2);
+        // the side faces of both sectors are in the same plane
+        let offset =
+            [(10.0 + at[0] as f64) * cos - centre[0], (10.0 + at[0] as f64) * sin - centre[1], at[2] as f64 - 1.0];
+        let (name, next, normals) = match at[1] {
+            2 => ("own", "", [[-sin, cos], [-sin, cos]]),
+            _ => ("other", "next.", [[0.0, -1.0], [sin, -cos]]),
+        };
+        write!(
+            joints,
+            "[[place]]\nname = \"{name}_{number}_a\"\nnodes = [\"{number}\"]\nnormal = [{}, {}, 0]\ntangent = [0, 0, 1]\n\
+             [[place]]\nname = \"{name}_{number}_b\"\nof = \"damper\"\noffset = [\"{} mm\", \"{} mm\", \"{} mm\"]\n\
+             normal = [{}, {}, 0]\ntangent = [0, 0, 1]\n\
+             [[joint]]\nname = \"{name}_{number}\"\nbetween = [\"{next}{name}_{number}_a\", \"{name}_{number}_b\"]\n\
+             law = {{ kind = \"friction-contact\", tangential = \"{} N/mm\", normal = \"{} N/mm\", friction = 0.3, preload = \"{} N\" }}\n",
+            normals[0][0], normals[0][1], offset[0], offset[1], offset[2], normals[1][0], normals[1][1],
+            200.0 * area, 300.0 * area, 4.0 * area
+        )
+        .unwrap();
+    }
+    let expected = dataset(folder.path(), &[study, &body, &joints]);
+    let (found, expected) = (&found.tables[0], &expected.tables[0]);
+    let columns = expected.columns.iter().filter(|column| column.name.contains("amplitude_m"));
+    let mut compared = 0;
+    for column in columns {
+        let [a, b] = [found, expected].map(|table| table.numbers(&column.name).unwrap().to_vec());
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() <= 1e-9 * b.abs() + 1e-15 && b.is_finite(), "{}: {a} {b}", column.name);
+            compared += 1;
+        }
+    }
+    assert!(compared > 30, "{compared}");
+}
+
 /// The lid has nodes at its corners only: the counterpart of a node is a bilinear mean of them.
 #[test]
 fn contacts_of_different_meshes_are_weighted_sums() {

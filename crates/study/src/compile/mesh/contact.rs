@@ -92,20 +92,27 @@ impl SectorRotation {
 /// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
-/// Returns the places and joints that an entry of `[[contact]]` states. `rotation` is that of the
-/// sectors of a disk, if it is known; `data` are the tables of the study, if they could be
-/// read.
-pub(crate) fn expand(
-    contact: &CompiledTable,
-    source: &MeshSource,
-    rotation: Option<SectorRotation>,
-    data: Option<&Vec<DataTable>>,
-) -> Result<ExpandedContact, Problem> {
+/// What surrounds a contact.
+#[derive(Clone, Copy)]
+pub(crate) struct ContactInputs<'a> {
+    pub source: &'a MeshSource,
+    /// The rotation of the sectors of a disk, if it is known.
+    pub rotation: Option<SectorRotation>,
+    /// The tables of the study, if they could be read.
+    pub data: Option<&'a Vec<DataTable>>,
+    pub bodies: &'a [CompiledTable],
+}
+
+/// Returns the places and joints that an entry of `[[contact]]` states.
+pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Result<ExpandedContact, Problem> {
+    let ContactInputs { source, rotation, data, bodies } = inputs;
     let preload = data.map(|data| NodalPreload::new(contact, data)).transpose()?.flatten();
     let (sets, location) = between(contact)?;
     let patch = |set: &str| source.mesh.patch(set).map_err(|error| set_problem(error, "between", location));
-    let first = patch(&sets[0])?;
-    let next_set = sets[1].strip_prefix(NEXT);
+    let body = bodies.iter().find(|body| body.name() == Some(&sets[1])).map(|body| ContactBody::new(body, location));
+    let body = body.transpose()?;
+    let next_set = if body.is_some() { sets[0].strip_prefix(NEXT) } else { sets[1].strip_prefix(NEXT) };
+    let first = patch(if body.is_some() { next_set.unwrap_or(&sets[0]) } else { &sets[0] })?;
     let rotation = match (next_set, rotation) {
         (None, _) => None,
         (Some(_), Some(rotation)) => Some(rotation),
@@ -115,15 +122,23 @@ pub(crate) fn expand(
             return Err(Problem::new(location, "between", message).help(help));
         }
     };
-    let in_next = |vector: [f64; 3]| rotation.map_or(vector, |rotation| rotation.in_next(vector));
-    let second = if sets[1] == GROUND { None } else { Some(patch(next_set.unwrap_or(&sets[1]))?) };
+    // the nodes along the axes of the second side
+    let in_second = |vector: [f64; 3]| match (rotation, &body) {
+        (None, _) => vector,
+        (Some(rotation), None) => rotation.in_next(vector),
+        (Some(rotation), Some(_)) => rotation.in_own(vector),
+    };
+    let second = match (&body, sets[1] == GROUND) {
+        (Some(_), _) | (_, true) => None,
+        _ => Some(patch(next_set.unwrap_or(&sets[1]))?),
+    };
     let limit = match fixed_number(contact, "distance", "a parameter cannot change which nodes are in contact")? {
         Some(meters) => meters / source.length,
         None => second.as_ref().map_or(0.0, default_distance),
     };
     let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
     for own in first.nodes() {
-        let node = PatchNode { position: in_next(own.position), normal: in_next(own.normal), ..*own };
+        let node = PatchNode { position: in_second(own.position), normal: in_second(own.normal), ..*own };
         match &second {
             None => pairs.push(Pair { node, opposite: None, normal: node.normal }),
             Some(second) => match second.closest(&node).filter(|found| found.point.distance <= limit) {
@@ -152,12 +167,21 @@ pub(crate) fn expand(
         let number = source.number(pair.node.node);
         let area = pair.node.area * source.length * source.length;
         let mut frames = [pair.normal; 2].map(|normal| FrameVectors { normal, tangent: None });
-        if let Some(rotation) = rotation {
-            // both tangents are the same direction in space
-            frames[0].normal = rotation.in_own(pair.normal);
-            let tangent = tangent(contact, frames[0].normal)?;
-            frames[0].tangent = Some(tangent);
-            frames[1].tangent = Some(rotation.in_next(tangent));
+        // both tangents are the same direction in space
+        match (rotation, &body) {
+            (Some(rotation), None) => {
+                frames[0].normal = rotation.in_own(pair.normal);
+                let tangent = tangent(contact, frames[0].normal)?;
+                frames[0].tangent = Some(tangent);
+                frames[1].tangent = Some(rotation.in_next(tangent));
+            }
+            (Some(rotation), Some(_)) => {
+                frames[0].normal = rotation.in_next(pair.normal);
+                let tangent = tangent(contact, pair.normal)?;
+                frames[0].tangent = Some(rotation.in_next(tangent));
+                frames[1].tangent = Some(tangent);
+            }
+            (None, _) => {}
         }
         let mut side = |suffix: &str, rows: CompiledEntry, frame: FrameVectors| {
             expanded.places.push(place(contact, &format!("{number}_{suffix}"), rows, Some(frame)));
@@ -166,11 +190,17 @@ pub(crate) fn expand(
         if let Some(opposite) = &pair.opposite {
             side("b", opposite_rows(opposite, source, location), frames[1]);
         }
-        let mut joint = joint(contact, number, &sets[1], area);
+        if let Some(body) = &body {
+            let mut point = place(contact, &format!("{number}_b"), body.entry(location), Some(frames[1]));
+            point.entries.push(body.offset(pair.node.position, source.length, location));
+            expanded.places.push(point);
+        }
+        let has_pair = pair.opposite.is_some() || body.is_some();
+        let mut joint = joint(contact, number, &sets, area);
         if let Some(preload) = &preload {
             let pressure = preload.pressure(number, area);
             set_preload(&mut joint, preload, number, pressure)?;
-            let sides = ["a", "b"].into_iter().take(1 + usize::from(pair.opposite.is_some()));
+            let sides = ["a", "b"].into_iter().take(1 + usize::from(has_pair));
             let places: Vec<String> = sides.map(|side| format!("{}_{side}", name_of_node(contact, number))).collect();
             expanded.forces.extend(preload.balance(contact, &places, pressure * area));
         }
@@ -180,6 +210,45 @@ pub(crate) fn expand(
     }
     expanded.summary.preload = preload.map(|preload| preload.summary(&areas)).transpose()?;
     Ok(expanded)
+}
+
+/// A body that touches the mesh.
+struct ContactBody {
+    name: String,
+    /// Position of its centre of mass, m.
+    position: [f64; 3],
+}
+
+impl ContactBody {
+    fn new(body: &CompiledTable, location: &Location) -> Result<ContactBody, Problem> {
+        let name = body.name().unwrap_or_default().to_owned();
+        let refuse = |message: String, help: &str| Err(Problem::new(location, "between", message).help(help));
+        let position =
+            body.entry("position").map(|entry| entry.value.evaluate("position", &NO_PARAMETERS, &mut Vec::new()));
+        match position {
+            Some(Ok(ResolvedValue::Vector(position))) => Ok(ContactBody { name, position }),
+            Some(_) => refuse(
+                format!("a parameter cannot change the position of `{name}`, which touches the mesh"),
+                "write three lengths",
+            ),
+            None => refuse(
+                format!("the position of the body `{name}` is unknown"),
+                "add to its [[body]] position = [\"60 mm\", 0, \"5 mm\"], its centre of mass in the coordinates of the \
+                 mesh",
+            ),
+        }
+    }
+
+    /// Returns the entry that makes a place one of the body.
+    fn entry(&self, location: &Location) -> CompiledEntry {
+        entry("of", ResolvedValue::Text(self.name.clone()), location)
+    }
+
+    /// Returns the offset of a point of the mesh with this unit of length, m.
+    fn offset(&self, point: [f64; 3], length: f64, location: &Location) -> CompiledEntry {
+        let offset = [0, 1, 2].map(|axis| point[axis] * length - self.position[axis]);
+        entry("offset", ResolvedValue::Vector(offset), location)
+    }
 }
 
 /// Returns stand-ins for the places and joints of these nodes, if the mesh is not read.
@@ -197,7 +266,7 @@ pub(crate) fn placeholders(contact: &CompiledTable, numbers: &[i64]) -> Result<E
         for suffix in ["a", "b"].into_iter().take(1 + usize::from(is_pair)) {
             expanded.places.push(place(contact, &format!("{number}_{suffix}"), node_entry(*number, location), None));
         }
-        expanded.joints.push(joint(contact, *number, &sets[1], 1.0));
+        expanded.joints.push(joint(contact, *number, &sets, 1.0));
     }
     Ok(expanded)
 }
@@ -282,16 +351,16 @@ fn name_of_node(contact: &CompiledTable, number: i64) -> String {
     format!("{}_{number}", contact.name().unwrap_or_default())
 }
 
-/// Returns the joint of a node with the face `second`.
-fn joint(contact: &CompiledTable, number: i64, second: &str, area: f64) -> CompiledTable {
+/// Returns the joint of a node of the first side with the second.
+fn joint(contact: &CompiledTable, number: i64, sets: &[String; 2], area: f64) -> CompiledTable {
     let name = name_of_node(contact, number);
     let location = contact.location_of("between", None);
-    let opposite = match second {
+    let end = |set: &String, side: &str| match set.as_str() {
         GROUND => GROUND.to_owned(),
-        second if second.starts_with(NEXT) => format!("{NEXT}{name}_b"),
-        _ => format!("{name}_b"),
+        set if set.starts_with(NEXT) => format!("{NEXT}{name}_{side}"),
+        _ => format!("{name}_{side}"),
     };
-    let ends = [format!("{name}_a"), opposite];
+    let ends = [end(&sets[0], "a"), end(&sets[1], "b")];
     let ends = CompiledValue::Names(ends.into_iter().map(|end| (end, location.clone())).collect());
     let mut entries = vec![entry("name", ResolvedValue::Text(name.clone()), contact.location_of("name", None))];
     entries.push(CompiledEntry { key: "between", location: location.clone(), value: ends });

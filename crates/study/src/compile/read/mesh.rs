@@ -5,7 +5,7 @@ use super::reader::Reader;
 use crate::case::disk::coordinate_axis;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
-use crate::compile::mesh::contact::SectorRotation;
+use crate::compile::mesh::contact::{ContactInputs, SectorRotation};
 use crate::compile::mesh::{MeshSet, MeshSource, MeshUse, contact, mentioned_nodes, sets};
 use crate::compile::source_model::ModelLists;
 use crate::syntax::document::{TomlTable, TomlValue};
@@ -72,7 +72,10 @@ impl Reader {
         }
         for contact in &contacts {
             let expanded = match &mesh {
-                Some(mesh) => contact::expand(contact, mesh, rotation.of_sectors(), self.data.as_deref()),
+                Some(source) => {
+                    let (rotation, data) = (rotation.of_sectors(), self.data.as_deref());
+                    contact::expand(contact, ContactInputs { source, rotation, data, bodies: &lists.body })
+                }
                 None if self.study_file_only => contact::placeholders(contact, &self.mentioned(contact)),
                 None => Err(no_mesh(contact, "between")),
             };

@@ -1,0 +1,245 @@
+//! A picture of a mesh as PNG: its outer faces with their edges, seen from one corner, and the
+//! nodes of its sets in colours.
+
+use crate::figure::colour::PALETTE;
+use crate::figure::png::draw_on;
+use crate::output::result_file::ReportError;
+use resvg::tiny_skia::{FillRule, Paint, PathBuilder, Pixmap, Stroke, Transform};
+use std::fmt::Write;
+use stickslip_formats::mesh::Mesh;
+
+/// Width and height, pixels.
+const SIZE: [f64; 2] = [1600.0, 1200.0];
+/// Margins at the left, top, right and bottom, pixels. The right one has the legend.
+const MARGINS: [f64; 4] = [60.0, 90.0, 380.0, 150.0];
+/// Horizontal and vertical angle of the view, degrees: x points to the right, z up.
+const VIEW: [f64; 2] = [-60.0, 25.0];
+/// Most sets in the legend.
+const MOST_SETS: usize = 12;
+/// Most characters of a name in the legend.
+const NAME_LENGTH: usize = 22;
+/// Above this number of faces, edges are drawn thin.
+const MANY_FACES: usize = 5_000;
+
+/// The direction of the view: unit vectors to the right, up, and towards the viewer.
+struct View([[f64; 3]; 3]);
+
+impl View {
+    fn new() -> View {
+        let [(sin, cos), (rise, level)] = VIEW.map(|angle| angle.to_radians().sin_cos());
+        View([[-sin, cos, 0.0], [-cos * rise, -sin * rise, level], [cos * level, sin * level, rise]])
+    }
+
+    fn of(&self, vector: [f64; 3]) -> [f64; 3] {
+        self.0.map(|axis| axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2])
+    }
+}
+
+/// A face in the view.
+struct SeenFace {
+    corners: Vec<usize>,
+    depth: f64,
+    /// Cosine of the angle between its normal and the view.
+    facing: f64,
+}
+
+/// Returns a picture of a mesh with a title.
+///
+/// # Errors
+/// [`ReportError`] if the picture cannot be drawn.
+pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
+    let failed = |reason: &dyn std::fmt::Display| ReportError::encode("picture of the mesh", reason);
+    let view = View::new();
+    let seen: Vec<[f64; 3]> = mesh.nodes().iter().map(|node| view.of(node.position)).collect();
+    let place = placement(&seen);
+    let at: Vec<[f32; 2]> = seen.iter().map(|point| place(point).map(|x| x as f32)).collect();
+    let mut canvas = Pixmap::new(SIZE[0] as u32, SIZE[1] as u32).ok_or_else(|| failed(&"the image has no size"))?;
+    canvas.fill(resvg::tiny_skia::Color::WHITE);
+    let faces = faces(mesh, &seen);
+    let edge = if faces.len() > MANY_FACES { 0.5 } else { 1.2 };
+    for face in &faces {
+        polygon(&mut canvas, &at, face, edge);
+    }
+    // nodes behind the body are hidden
+    let mut visible = vec![faces.is_empty(); seen.len()];
+    faces.iter().flat_map(|face| &face.corners).for_each(|node| visible[*node] = true);
+    let shown: Vec<(String, Vec<usize>)> = mesh
+        .sets()
+        .iter()
+        .map(|set| (set.name.clone(), mesh.nodes_of(&set.name).unwrap_or_default()))
+        .filter(|(_, nodes)| !nodes.is_empty() && nodes.len() < seen.len())
+        .collect();
+    if faces.is_empty() {
+        let all: Vec<usize> = (0..seen.len()).collect();
+        dots(&mut canvas, &at, &all, "#888888", 1.5);
+    }
+    for (number, (_, nodes)) in shown.iter().enumerate().take(MOST_SETS) {
+        let nodes: Vec<usize> = nodes.iter().copied().filter(|node| visible[*node]).collect();
+        dots(&mut canvas, &at, &nodes, colour(number), 5.0);
+    }
+    draw_on(&labels(mesh, title, &shown, &view), &mut canvas)?;
+    canvas.encode_png().map_err(|error| failed(&error))
+}
+
+/// Returns the map from the view to pixels.
+fn placement(seen: &[[f64; 3]]) -> impl Fn(&[f64; 3]) -> [f64; 2] {
+    let range = |axis: usize| {
+        seen.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
+            [low.min(point[axis]), high.max(point[axis])]
+        })
+    };
+    let ranges = [range(0), range(1)];
+    let [left, top, right, bottom] = MARGINS;
+    let room = [SIZE[0] - left - right, SIZE[1] - top - bottom];
+    let scale = [0, 1].map(|axis| room[axis] / (ranges[axis][1] - ranges[axis][0]));
+    let scale = scale.into_iter().filter(|scale| scale.is_finite()).fold(f64::INFINITY, f64::min);
+    let scale = if scale.is_finite() { scale } else { 1.0 };
+    let middle = ranges.map(|[low, high]| 0.5 * (low + high));
+    move |point: &[f64; 3]| {
+        [left + 0.5 * room[0] + scale * (point[0] - middle[0]), top + 0.5 * room[1] - scale * (point[1] - middle[1])]
+    }
+}
+
+/// Returns the outer faces of solids that are towards the viewer, and the faces of shells, from the
+/// farthest to the nearest.
+fn faces(mesh: &Mesh, seen: &[[f64; 3]]) -> Vec<SeenFace> {
+    let corners = |nodes: &[usize]| nodes[..if nodes.len().is_multiple_of(3) { 3 } else { 4 }].to_vec();
+    let solids = mesh.outer_faces().into_iter().map(|face| corners(&face.nodes));
+    let shells = mesh.elements().iter().enumerate().filter(|(_, element)| !element.shape.is_solid());
+    let shells = shells.map(|(index, element)| {
+        mesh.element_nodes(index)[..element.shape.family.corners()].iter().map(|node| *node as usize).collect()
+    });
+    let mut faces: Vec<SeenFace> = solids
+        .map(|corners| (corners, true))
+        .chain(shells.map(|corners: Vec<usize>| (corners, false)))
+        .filter(|(corners, _)| corners.len() > 2)
+        .map(|(corners, is_outward)| {
+            let [a, b, c] = [0, 1, corners.len() - 1].map(|corner| seen[corners[corner]]);
+            let [u, v] = [b, c].map(|other| [0, 1, 2].map(|axis| other[axis] - a[axis]));
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let facing = normal[2] / normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let depth = corners.iter().map(|node| seen[*node][2]).sum::<f64>() / corners.len() as f64;
+            SeenFace { corners, depth, facing: if is_outward { facing } else { facing.abs() } }
+        })
+        .filter(|face| face.facing > 0.0)
+        .collect();
+    faces.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    faces
+}
+
+fn polygon(canvas: &mut Pixmap, at: &[[f32; 2]], face: &SeenFace, edge: f32) {
+    let mut path = PathBuilder::new();
+    for (corner, node) in face.corners.iter().enumerate() {
+        let [x, y] = at[*node];
+        if corner == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
+    }
+    path.close();
+    let Some(path) = path.finish() else { return };
+    // faces towards the viewer are lighter
+    let light = (205.0 + 45.0 * face.facing) as u8;
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(light, light, light.saturating_add(4), 255);
+    canvas.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
+    paint.set_color_rgba8(110, 115, 125, 255);
+    let stroke = Stroke { width: edge, ..Stroke::default() };
+    canvas.stroke_path(&path, &paint, &stroke, Transform::identity(), None);
+}
+
+fn dots(canvas: &mut Pixmap, at: &[[f32; 2]], nodes: &[usize], colour: &str, radius: f32) {
+    let mut paint = Paint { anti_alias: true, ..Paint::default() };
+    let [red, green, blue] = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap_or(0));
+    paint.set_color_rgba8(red, green, blue, 255);
+    for [x, y] in nodes.iter().map(|node| at[*node]) {
+        let mut path = PathBuilder::new();
+        path.push_circle(x, y, radius);
+        let Some(path) = path.finish() else { continue };
+        canvas.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
+    }
+}
+
+fn colour(number: usize) -> &'static str {
+    PALETTE[number % PALETTE.len()][0]
+}
+
+/// Returns title, legend, extent and axes as SVG.
+fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View) -> String {
+    let [width, height] = SIZE;
+    let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
+    let mut svg = format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">");
+    let mut text = |x: f64, y: f64, size: u32, text: &str| {
+        let _ = write!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"#222222\">{}</text>", escaped(text));
+    };
+    text(MARGINS[0], 52.0, 30, title);
+    // six significant digits
+    let short = |x: f64| format!("{x:.5e}").parse::<f64>().unwrap_or(x);
+    let extent = mesh.extent().map_or_else(String::new, |ranges| {
+        let of = |(axis, range): (&str, &std::ops::Range<f64>)| {
+            format!("{axis} {} to {}", short(range.start), short(range.end))
+        };
+        ["x", "y", "z"].into_iter().zip(&ranges).map(of).collect::<Vec<_>>().join(", ")
+    });
+    let count = format!("{} nodes, {} elements", mesh.nodes().len(), mesh.elements().len());
+    text(MARGINS[0] + 150.0, height - 40.0, 22, &format!("{count}; {extent}"));
+    let (left, mut y) = (width - MARGINS[2] + 50.0, MARGINS[1] + 20.0);
+    let mut marks = String::new();
+    for (number, (name, nodes)) in sets.iter().enumerate().take(MOST_SETS) {
+        let mut short: String = name.chars().take(NAME_LENGTH).collect();
+        if short.len() < name.len() {
+            short.push('…');
+        }
+        text(left + 24.0, y, 22, &format!("{short} ({})", nodes.len()));
+        let _ = write!(marks, "<circle cx=\"{left}\" cy=\"{}\" r=\"8\" fill=\"{}\"/>", y - 7.0, colour(number));
+        y += 36.0;
+    }
+    if sets.len() > MOST_SETS {
+        text(left, y, 22, &format!("and {} more sets", sets.len() - MOST_SETS));
+    }
+    // the axes at the bottom on the left
+    let origin = [MARGINS[0] + 55.0, height - 75.0];
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let mut unit = [0.0; 3];
+        unit[axis] = 1.0;
+        let [x, y, _] = view.of(unit);
+        let end = [origin[0] + 50.0 * x, origin[1] - 50.0 * y];
+        text(end[0] + 10.0 * x - 6.0, end[1] - 10.0 * y + 7.0, 22, name);
+        let _ = write!(
+            marks,
+            "<line x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" stroke=\"#222222\" stroke-width=\"2.5\"/>",
+            origin[0], origin[1], end[0], end[1]
+        );
+    }
+    svg + &marks + "</svg>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stickslip_formats::mesh::read_bytes;
+
+    const BRICK: &str = "*NODE\n1,0,0,0\n2,2,0,0\n3,2,1,0\n4,0,1,0\n5,0,0,1\n6,2,0,1\n7,2,1,1\n8,0,1,1\n\
+        *ELEMENT,TYPE=C3D8\n1,1,2,3,4,5,6,7,8\n*NSET,NSET=TOP\n5,6,7,8\n*NSET,NSET=BOTTOM\n1,2,3,4\n";
+
+    /// The top is seen, the bottom is behind the body, and every face has its shade.
+    #[test]
+    fn visible_nodes_of_sets_are_coloured() {
+        let mesh = read_bytes(BRICK.as_bytes()).unwrap();
+        let picture = Pixmap::decode_png(&mesh_picture(&mesh, "brick <1>").unwrap()).unwrap();
+        let count = |colour: &str| {
+            let rgb = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap());
+            picture.pixels().iter().filter(|p| [p.red(), p.green(), p.blue()] == rgb).count()
+        };
+        // a dot has a radius of 5 pixels, the mark in the legend one of 8
+        let (dot, mark) = (25.0 * std::f64::consts::PI, 64.0 * std::f64::consts::PI);
+        let top = count(colour(0)) as f64;
+        assert!(top > 4.0 * dot * 0.7 + mark * 0.8 && top < 4.0 * dot * 1.2 + mark * 1.2, "{top}");
+        // one corner of the bottom is hidden
+        let bottom = count(colour(1)) as f64;
+        assert!(bottom > 3.0 * dot * 0.7 + mark * 0.8 && bottom < 3.0 * dot * 1.2 + mark * 1.2, "{bottom}");
+    }
+
+    #[test]
+    fn a_mesh_of_nodes_alone_has_dots() {
+        let mesh = read_bytes(b"*NODE\n1,0,0,0\n2,1,1,1\n3,0,1,0\n").unwrap();
+        assert!(!mesh_picture(&mesh, "nodes").unwrap().is_empty());
+    }
+}
