@@ -4,6 +4,7 @@
 //! - `explore`: the explorer as a command;
 //! - `golden`: texts as users read them;
 //! - `inspect_data`: measured data;
+//! - `mesh_chapter`: the commands of the book's page on meshes;
 //! - `plot`: figures from stored results, and comparisons of runs;
 //! - `stream`: runs that are killed, sharded, or lose their disk.
 
@@ -11,5 +12,6 @@ mod command_line;
 mod explore;
 mod golden;
 mod inspect_data;
+mod mesh_chapter;
 mod plot;
 mod stream;

@@ -6,7 +6,7 @@ use crate::figure::png::draw_on;
 use crate::output::result_file::ReportError;
 use resvg::tiny_skia::{FillRule, Paint, PathBuilder, Pixmap, Stroke, Transform};
 use std::fmt::Write;
-use stickslip_formats::mesh::Mesh;
+use stickslip_formats::mesh::{Members, Mesh};
 
 /// Width and height, pixels.
 const SIZE: [f64; 2] = [1600.0, 1200.0];
@@ -20,6 +20,8 @@ const MOST_SETS: usize = 12;
 const NAME_LENGTH: usize = 22;
 /// Above this number of faces, edges are drawn thin.
 const MANY_FACES: usize = 5_000;
+/// Above this product of faces and nodes of sets, nodes behind another part are drawn too.
+const MAX_TESTS: usize = 100_000_000;
 
 /// The direction of the view: unit vectors to the right, up, and towards the viewer.
 struct View([[f64; 3]; 3]);
@@ -39,8 +41,24 @@ impl View {
 struct SeenFace {
     corners: Vec<usize>,
     depth: f64,
-    /// Cosine of the angle between its normal and the view.
-    facing: f64,
+    /// Unit normal; its last component is the cosine of the angle to the view.
+    normal: [f64; 3],
+}
+
+impl SeenFace {
+    /// Returns whether it is in front of a point, by more than `tolerance`.
+    fn hides(&self, point: &[f64; 3], seen: &[[f64; 3]], tolerance: f64) -> bool {
+        let count = self.corners.len();
+        let mut sides = (0..count).map(|corner| {
+            let [a, b] = [corner, (corner + 1) % count].map(|corner| seen[self.corners[corner]]);
+            (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])
+        });
+        let first = sides.next().unwrap_or(0.0);
+        let origin = seen[self.corners[0]];
+        let across = self.normal[0] * (point[0] - origin[0]) + self.normal[1] * (point[1] - origin[1]);
+        let front = origin[2] - across / self.normal[2];
+        sides.all(|side| side * first > 0.0) && front > point[2] + tolerance
+    }
 }
 
 /// Returns a picture of a mesh with a title.
@@ -66,6 +84,7 @@ pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
     let shown: Vec<(String, Vec<usize>)> = mesh
         .sets()
         .iter()
+        .filter(|set| !matches!(set.members, Members::Elements(_)))
         .map(|set| (set.name.clone(), mesh.nodes_of(&set.name).unwrap_or_default()))
         .filter(|(_, nodes)| !nodes.is_empty() && nodes.len() < seen.len())
         .collect();
@@ -73,8 +92,12 @@ pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
         let all: Vec<usize> = (0..seen.len()).collect();
         dots(&mut canvas, &at, &all, "#888888", 1.5);
     }
+    let extent = seen.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let count: usize = shown.iter().map(|(_, nodes)| nodes.len()).sum();
+    let tested = &faces[..if count * faces.len() <= MAX_TESTS { faces.len() } else { 0 }];
+    let is_hidden = |node: usize| tested.iter().any(|face| face.hides(&seen[node], &seen, 1e-6 * extent));
     for (number, (_, nodes)) in shown.iter().enumerate().take(MOST_SETS) {
-        let nodes: Vec<usize> = nodes.iter().copied().filter(|node| visible[*node]).collect();
+        let nodes: Vec<usize> = nodes.iter().copied().filter(|node| visible[*node] && !is_hidden(*node)).collect();
         dots(&mut canvas, &at, &nodes, colour(number), 5.0);
     }
     draw_on(&labels(mesh, title, &shown, &view), &mut canvas)?;
@@ -117,11 +140,13 @@ fn faces(mesh: &Mesh, seen: &[[f64; 3]]) -> Vec<SeenFace> {
             let [a, b, c] = [0, 1, corners.len() - 1].map(|corner| seen[corners[corner]]);
             let [u, v] = [b, c].map(|other| [0, 1, 2].map(|axis| other[axis] - a[axis]));
             let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-            let facing = normal[2] / normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let size = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            // a shell is seen from both sides
+            let size = if is_outward || normal[2] > 0.0 { size } else { -size };
             let depth = corners.iter().map(|node| seen[*node][2]).sum::<f64>() / corners.len() as f64;
-            SeenFace { corners, depth, facing: if is_outward { facing } else { facing.abs() } }
+            SeenFace { corners, depth, normal: normal.map(|x| x / size) }
         })
-        .filter(|face| face.facing > 0.0)
+        .filter(|face| face.normal[2] > 1e-6)
         .collect();
     faces.sort_by(|a, b| a.depth.total_cmp(&b.depth));
     faces
@@ -136,7 +161,7 @@ fn polygon(canvas: &mut Pixmap, at: &[[f32; 2]], face: &SeenFace, edge: f32) {
     path.close();
     let Some(path) = path.finish() else { return };
     // faces towards the viewer are lighter
-    let light = (205.0 + 45.0 * face.facing) as u8;
+    let light = (205.0 + 45.0 * face.normal[2]) as u8;
     let mut paint = Paint::default();
     paint.set_color_rgba8(light, light, light.saturating_add(4), 255);
     canvas.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);

@@ -449,13 +449,14 @@ impl ContactSummary {
                 ", gaps {} to {} mm, angles up to {} deg",
                 number(low * 1e3),
                 number(high * 1e3),
-                number(angle.to_degrees())
+                // decimals of coordinates in the file turn faces by less
+                number((angle.to_degrees() * 1e3).round() * 1e-3)
             );
         }
         if let Some(PreloadSummary { total, pressures: [low, high], is_scaled, joints_without_row, .. }) = preload {
             text += &format!(
-                ", preload {} in total, {} to {} MPa{}",
-                quantity_text(*total, Some(Dimension::FORCE)),
+                ", preload {} N in total, {} to {} MPa{}",
+                number(*total),
                 number(low * 1e-6),
                 number(high * 1e-6),
                 if *is_scaled { ", before `scale`" } else { "" }
