@@ -3,8 +3,8 @@
 //! The file is a sequence of Fortran records. A record of one integer is a key: the number of words
 //! in the next record, or a mark if it is zero or negative. Integers have four bytes, or eight in
 //! 64-bit files. After an optional label, each data block has its name, a trailer with its sizes,
-//! the name again, and its contents up to the key 0. The contents of a matrix are its columns, and
-//! each record in a column begins with the row of its first number. Symmetric matrices are complete.
+//! the name again, and its contents up to the key 0. The contents of a matrix are its columns. Each
+//! record in a column begins with the row of its first number. Symmetric matrices are complete.
 //!
 //! Source: NX Nastran DMAP Programmer's Guide, module OUTPUT2; the trailer as in module MATMOD.
 
@@ -124,8 +124,8 @@ impl<'a> Op2Cursor<'a> {
         Ok(Some((String::from_utf8_lossy(&name).into_owned(), trailer, is_matrix)))
     }
 
-    /// Reads the records of a data block, each with its place and the number of its group, up to the
-    /// end of the block. A group is a column of a matrix.
+    /// Reads the records of a data block up to its end, each with its place and the number of its
+    /// group. A group is a column of a matrix.
     fn contents(
         &mut self,
         mut each: impl FnMut(usize, ByteCursor<'a>, &'a [u8]) -> Result<(), Error>,

@@ -8,27 +8,47 @@ use resvg::tiny_skia::{FillRule, Paint, PathBuilder, Pixmap, Stroke, Transform};
 use std::fmt::Write;
 use stickslip_formats::mesh::{Members, Mesh};
 
-/// Width and height, pixels.
-const SIZE: [f64; 2] = [1600.0, 1200.0];
-/// Margins at the left, top, right and bottom, pixels. The right one has the legend.
-const MARGINS: [f64; 4] = [60.0, 90.0, 380.0, 150.0];
-/// Horizontal and vertical angle of the view, degrees: x points to the right, z up.
-const VIEW: [f64; 2] = [-60.0, 25.0];
-/// Most sets in the legend.
-const MOST_SETS: usize = 12;
-/// Most characters of a name in the legend.
-const NAME_LENGTH: usize = 22;
-/// Above this number of faces, edges are drawn thin.
-const MANY_FACES: usize = 5_000;
-/// Above this product of faces and nodes of sets, nodes behind another part are drawn too.
-const MAX_TESTS: usize = 100_000_000;
+/// Settings of the picture.
+#[derive(Debug, Clone, Copy)]
+struct PictureSettings {
+    /// Width and height, pixels. Default 1600 by 1200: half a page in print.
+    size: [f64; 2],
+    /// Margins at the left, top, right and bottom, pixels. Default: room for the title, the legend
+    /// and the axes.
+    margins: [f64; 4],
+    /// Horizontal and vertical angle of the view, degrees. Default: x points to the right, z up.
+    view: [f64; 2],
+    /// Largest number of sets in the legend. Default 12: as many as have room.
+    sets: usize,
+    /// Largest number of characters of a name in the legend. Default 22: the width of the legend.
+    name_length: usize,
+    /// Number of faces above which edges are thin. Default 5000: faces of about 15 pixels.
+    many_faces: usize,
+    /// Product of faces and nodes of sets above which nodes behind another part are drawn too.
+    /// Default 1e8: a second.
+    tests: usize,
+}
+
+impl Default for PictureSettings {
+    fn default() -> Self {
+        PictureSettings {
+            size: [1600.0, 1200.0],
+            margins: [60.0, 90.0, 380.0, 150.0],
+            view: [-60.0, 25.0],
+            sets: 12,
+            name_length: 22,
+            many_faces: 5_000,
+            tests: 100_000_000,
+        }
+    }
+}
 
 /// The direction of the view: unit vectors to the right, up, and towards the viewer.
 struct View([[f64; 3]; 3]);
 
 impl View {
-    fn new() -> View {
-        let [(sin, cos), (rise, level)] = VIEW.map(|angle| angle.to_radians().sin_cos());
+    fn new(angles: [f64; 2]) -> View {
+        let [(sin, cos), (rise, level)] = angles.map(|angle| angle.to_radians().sin_cos());
         View([[-sin, cos, 0.0], [-cos * rise, -sin * rise, level], [cos * level, sin * level, rise]])
     }
 
@@ -67,14 +87,16 @@ impl SeenFace {
 /// [`ReportError`] if the picture cannot be drawn.
 pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
     let failed = |reason: &dyn std::fmt::Display| ReportError::encode("picture of the mesh", reason);
-    let view = View::new();
+    let settings = PictureSettings::default();
+    let view = View::new(settings.view);
     let seen: Vec<[f64; 3]> = mesh.nodes().iter().map(|node| view.of(node.position)).collect();
-    let place = placement(&seen);
+    let place = placement(&seen, settings);
     let at: Vec<[f32; 2]> = seen.iter().map(|point| place(point).map(|x| x as f32)).collect();
-    let mut canvas = Pixmap::new(SIZE[0] as u32, SIZE[1] as u32).ok_or_else(|| failed(&"the image has no size"))?;
+    let mut canvas = Pixmap::new(settings.size[0] as u32, settings.size[1] as u32)
+        .ok_or_else(|| failed(&"the image has no size"))?;
     canvas.fill(resvg::tiny_skia::Color::WHITE);
     let faces = faces(mesh, &seen);
-    let edge = if faces.len() > MANY_FACES { 0.5 } else { 1.2 };
+    let edge = if faces.len() > settings.many_faces { 0.5 } else { 1.2 };
     for face in &faces {
         polygon(&mut canvas, &at, face, edge);
     }
@@ -94,26 +116,26 @@ pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
     }
     let extent = seen.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let count: usize = shown.iter().map(|(_, nodes)| nodes.len()).sum();
-    let tested = &faces[..if count * faces.len() <= MAX_TESTS { faces.len() } else { 0 }];
+    let tested = &faces[..if count * faces.len() <= settings.tests { faces.len() } else { 0 }];
     let is_hidden = |node: usize| tested.iter().any(|face| face.hides(&seen[node], &seen, 1e-6 * extent));
-    for (number, (_, nodes)) in shown.iter().enumerate().take(MOST_SETS) {
+    for (number, (_, nodes)) in shown.iter().enumerate().take(settings.sets) {
         let nodes: Vec<usize> = nodes.iter().copied().filter(|node| visible[*node] && !is_hidden(*node)).collect();
         dots(&mut canvas, &at, &nodes, colour(number), 5.0);
     }
-    draw_on(&labels(mesh, title, &shown, &view), &mut canvas)?;
+    draw_on(&labels(mesh, title, &shown, &view, settings), &mut canvas)?;
     canvas.encode_png().map_err(|error| failed(&error))
 }
 
 /// Returns the map from the view to pixels.
-fn placement(seen: &[[f64; 3]]) -> impl Fn(&[f64; 3]) -> [f64; 2] {
+fn placement(seen: &[[f64; 3]], settings: PictureSettings) -> impl Fn(&[f64; 3]) -> [f64; 2] {
     let range = |axis: usize| {
         seen.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
             [low.min(point[axis]), high.max(point[axis])]
         })
     };
     let ranges = [range(0), range(1)];
-    let [left, top, right, bottom] = MARGINS;
-    let room = [SIZE[0] - left - right, SIZE[1] - top - bottom];
+    let PictureSettings { size, margins: [left, top, right, bottom], .. } = settings;
+    let room = [size[0] - left - right, size[1] - top - bottom];
     let scale = [0, 1].map(|axis| room[axis] / (ranges[axis][1] - ranges[axis][0]));
     let scale = scale.into_iter().filter(|scale| scale.is_finite()).fold(f64::INFINITY, f64::min);
     let scale = if scale.is_finite() { scale } else { 1.0 };
@@ -187,14 +209,14 @@ fn colour(number: usize) -> &'static str {
 }
 
 /// Returns title, legend, extent and axes as SVG.
-fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View) -> String {
-    let [width, height] = SIZE;
+fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View, settings: PictureSettings) -> String {
+    let PictureSettings { size: [width, height], margins, .. } = settings;
     let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
     let mut svg = format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">");
     let mut text = |x: f64, y: f64, size: u32, text: &str| {
         let _ = write!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"#222222\">{}</text>", escaped(text));
     };
-    text(MARGINS[0], 52.0, 30, title);
+    text(margins[0], 52.0, 30, title);
     // six significant digits
     let short = |x: f64| format!("{x:.5e}").parse::<f64>().unwrap_or(x);
     let extent = mesh.extent().map_or_else(String::new, |ranges| {
@@ -204,11 +226,11 @@ fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View) 
         ["x", "y", "z"].into_iter().zip(&ranges).map(of).collect::<Vec<_>>().join(", ")
     });
     let count = format!("{} nodes, {} elements", mesh.nodes().len(), mesh.elements().len());
-    text(MARGINS[0] + 150.0, height - 40.0, 22, &format!("{count}; {extent}"));
-    let (left, mut y) = (width - MARGINS[2] + 50.0, MARGINS[1] + 20.0);
+    text(margins[0] + 150.0, height - 40.0, 22, &format!("{count}; {extent}"));
+    let (left, mut y) = (width - margins[2] + 50.0, margins[1] + 20.0);
     let mut marks = String::new();
-    for (number, (name, nodes)) in sets.iter().enumerate().take(MOST_SETS) {
-        let mut short: String = name.chars().take(NAME_LENGTH).collect();
+    for (number, (name, nodes)) in sets.iter().enumerate().take(settings.sets) {
+        let mut short: String = name.chars().take(settings.name_length).collect();
         if short.len() < name.len() {
             short.push('…');
         }
@@ -216,11 +238,11 @@ fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View) 
         let _ = write!(marks, "<circle cx=\"{left}\" cy=\"{}\" r=\"8\" fill=\"{}\"/>", y - 7.0, colour(number));
         y += 36.0;
     }
-    if sets.len() > MOST_SETS {
-        text(left, y, 22, &format!("and {} more sets", sets.len() - MOST_SETS));
+    if sets.len() > settings.sets {
+        text(left, y, 22, &format!("and {} more sets", sets.len() - settings.sets));
     }
     // the axes at the bottom on the left
-    let origin = [MARGINS[0] + 55.0, height - 75.0];
+    let origin = [margins[0] + 55.0, height - 75.0];
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let mut unit = [0.0; 3];
         unit[axis] = 1.0;

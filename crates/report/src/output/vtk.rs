@@ -2,9 +2,9 @@
 //! and a file `.vtu` of VTK for each. Several orbits or modes have a list each, `fields_1.pvd` ….
 //!
 //! The point data are `displacement` (m) and `velocity` (m/s). An orbit has `contact` at the nodes
-//! of contacts: 0 none, 1 open, 2 touching, 3 sticking, 4 slipping. At the nodes of contacts between
-//! meshes there are also `pressure` and `friction` (Pa), and `loss`, the dissipated energy per
-//! period and area (J/m²). Nodes that are not in the table are at rest. For a disk, the files have
+//! of contacts: 0 none, 1 open, 2 touching, 3 sticking, 4 slipping. Contacts between meshes also
+//! have `pressure` and `friction` (Pa), and `loss`, the dissipated energy per period and area
+//! (J/m²). Nodes that are not in the table are at rest. For a disk, the files have
 //! all sectors.
 //! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
 

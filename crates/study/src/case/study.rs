@@ -18,7 +18,7 @@ use crate::compile::bare_numbers::literal_unit;
 use crate::compile::compiled::{
     CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue, Environment, RangeScale, check_positive, check_range,
 };
-use crate::compile::mesh::{MeshSet, MeshSource};
+use crate::compile::mesh::{MeshSource, NamedMembers};
 use crate::compile::source_model::{MatrixSource, SourceModel, model_problem};
 use crate::compile::template_errors;
 use crate::compile::torsion::of_rotation;
@@ -228,7 +228,7 @@ pub struct Case {
     /// True for a model of rotation: moments of inertia, angles and moments.
     pub is_torsional: bool,
     /// The sets of the mesh that places and contacts name.
-    pub sets: Arc<Vec<MeshSet>>,
+    pub sets: Arc<Vec<NamedMembers>>,
 }
 
 impl Case {

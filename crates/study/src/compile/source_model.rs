@@ -10,6 +10,7 @@ use crate::syntax::error::{Location, Problem};
 use crate::syntax::expression::quantity_text;
 use crate::syntax::suggest::{alternatives, suggest};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use stickslip::dimension::Dimension;
 use stickslip::model::{Element, Model, ModelError, NEXT, ROTATIONS};
 use stickslip::structure::{Component, NodeCoordinates, Reduction, ReductionKind};
@@ -24,6 +25,15 @@ pub(crate) struct SourceModel {
     pub mesh: MeshUse,
 }
 
+/// Stresses from the displacements of a structure.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StressMatrix {
+    /// Names of the stresses.
+    pub names: Vec<String>,
+    /// For each stress the rows of the structure and their weights, Pa/m.
+    pub rows: Vec<Vec<(usize, f64)>>,
+}
+
 /// `[structure]`, with the contents of its files.
 #[derive(Debug, Clone)]
 pub(crate) struct MatrixSource {
@@ -34,6 +44,8 @@ pub(crate) struct MatrixSource {
     pub stress_stiffening: Option<StressStiffening>,
     /// Number of constrained rows in the files, which the component does not contain.
     pub constrained_rows: usize,
+    /// The matrix of stresses, if one is named.
+    pub stress: Option<Arc<StressMatrix>>,
 }
 
 impl MatrixSource {
@@ -56,6 +68,13 @@ impl MatrixSource {
                 let place = [number, row, column].map(|index| index as u64);
                 place.iter().for_each(|index| hasher.update(&index.to_le_bytes()));
                 hasher.update(&value.to_le_bytes());
+            }
+        }
+        for (name, weights) in self.stress.iter().flat_map(|stress| stress.names.iter().zip(&stress.rows)) {
+            hasher.update(name.as_bytes());
+            for (row, weight) in weights {
+                hasher.update(&(*row as u64).to_le_bytes());
+                hasher.update(&weight.to_le_bytes());
             }
         }
         Some(format!("{:08x}", hasher.finalize()))

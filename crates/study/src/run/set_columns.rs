@@ -2,7 +2,7 @@
 //! motion of a set of nodes. A disk has them for every sector.
 
 use crate::case::study::Case;
-use crate::compile::mesh::MeshSet;
+use crate::compile::mesh::NamedMembers;
 use crate::results::columns;
 use crate::run::work::PreparedCase;
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ fn endings(case: &Case) -> Vec<String> {
 
 /// Returns the names of the columns.
 pub(super) fn columns(case: &Case) -> Vec<String> {
-    let of_set = |set: &MeshSet, ending: &String| {
+    let of_set = |set: &NamedMembers, ending: &String| {
         let name = format!("{}{ending}", set.name);
         match set.areas.is_empty() {
             true => vec![format!("{name}_largest_displacement_m")],
@@ -42,7 +42,7 @@ pub(super) fn values(prepared: &PreparedCase, orbit: &Orbit, samples: &[Sample])
         let place = &system.places()[i];
         places.entry(place.split_once('.').map_or(place, |(node, _)| node)).or_default().push(i);
     }
-    let of_contact = |set: &MeshSet, ending: &str| -> Vec<f64> {
+    let of_contact = |set: &NamedMembers, ending: &str| -> Vec<f64> {
         let (mut lost, mut slip, mut open, mut all) = (0.0, 0.0, 0.0, 0.0);
         for (member, area) in set.members.iter().zip(&set.areas) {
             let Some(joint) = joints.get(format!("{member}{ending}").as_str()) else { continue };
@@ -54,7 +54,7 @@ pub(super) fn values(prepared: &PreparedCase, orbit: &Orbit, samples: &[Sample])
         }
         vec![lost, slip / all, open / all]
     };
-    let of_nodes = |set: &MeshSet, ending: &str| -> Vec<f64> {
+    let of_nodes = |set: &NamedMembers, ending: &str| -> Vec<f64> {
         let nodes = set.members.iter().filter_map(|member| places.get(format!("{member}{ending}").as_str()));
         let nodes: Vec<&Vec<usize>> = nodes.collect();
         let distance = |sample: &Sample, node: &[usize]| {
@@ -64,7 +64,7 @@ pub(super) fn values(prepared: &PreparedCase, orbit: &Orbit, samples: &[Sample])
         let all = samples.iter().flat_map(|sample| nodes.iter().map(move |node| distance(sample, node)));
         vec![all.fold(0.0, f64::max).sqrt()]
     };
-    let of_set = |set: &MeshSet, ending: &str| {
+    let of_set = |set: &NamedMembers, ending: &str| {
         if set.areas.is_empty() { of_nodes(set, ending) } else { of_contact(set, ending) }
     };
     let endings = endings(case);

@@ -198,6 +198,19 @@ pub const STRUCTURE: &[Key] = &[
         "\"mm-t-s\"",
     ),
     optional(
+        "stress",
+        ValueType::File,
+        "file of a matrix that gives stresses, its rows, from the displacements of all rows of the stiffness matrix, its \
+         columns; kind `orbit` writes `stress.csv` with the largest stresses of the period",
+        "\"blade_stress.mtx\"",
+    ),
+    optional(
+        "stress_rows",
+        ValueType::Text,
+        "CSV file `row,name` with the names of the rows of `stress`; absent: their numbers from 1",
+        "\"stress_rows.csv\"",
+    ),
+    optional(
         "mesh",
         ValueType::Text,
         "file of the mesh with the nodes of these rows, for `set`, for sets in `nodes`, and for [[contact]]: input deck \

@@ -145,6 +145,7 @@ fn host(table: &str, key: &str) -> (&'static str, &'static str, &'static [&'stat
         ("", "disk") => (RING, "", &[]),
         ("structure.stiffened", "name" | "format") => (MATRICES, "file = \"blade.mat\"", &[]),
         ("structure.reduce", "modes") => (MATRICES, "", &["up_to"]),
+        ("structure", "stress_rows") => (MATRICES, "stress = \"blade_stress.mtx\"", &[]),
         ("structure.reduce", "orders") => (MATRICES, "modes = 5", &["up_to"]),
         ("place", "of") => (FACE, "", &[]),
         ("place", "offset") => (BODY, "", &[]),
@@ -205,6 +206,8 @@ fn write_files(folder: &Path) {
     let mut full = vec![0.0; 81];
     entries(1.1e3).for_each(|(i, k, value)| (full[9 * i + k], full[9 * k + i]) = (value, value));
     write("blade.mat", &matlab("K", 9, &full));
+    write("blade_stress.mtx", b"%%MatrixMarket matrix coordinate real general\n1 9 1\n1 9 2e5\n");
+    write("stress_rows.csv", b"row,name\n1,root\n");
     write("sector_boundary.csv", b"low,high\n188,189\n");
     write("blade_nodes.csv", b"node\n1353\n");
     let at = |degrees: f64, radius: f64| {

@@ -539,6 +539,56 @@ fn fields_are_the_displacements_of_all_nodes() {
     assert!(coarse < 0.05 && fine < 0.2 * coarse, "{coarse} {fine}");
 }
 
+/// Stresses are weighted sums of the displacements of all rows, along the axes of each sector.
+#[test]
+fn stresses_follow_from_the_displacements() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    // row 106 is 118.x; 2 N/mm^2 and -3 N/mm^2 for each mm
+    let rows = std::fs::read_to_string(folder.path().join("block.dof")).unwrap();
+    let row = |name: &str| 1 + rows.lines().position(|line| line.trim() == name).unwrap();
+    let matrix = format!(
+        "%%MatrixMarket matrix coordinate real general\n3 {} 4\n1 {} 2\n2 {} -3\n3 {} 2\n3 {} -3\n",
+        rows.lines().count(),
+        row("118.1"),
+        row("118.3"),
+        row("118.1"),
+        row("118.3")
+    );
+    std::fs::write(folder.path().join("stress.mtx"), matrix).unwrap();
+    std::fs::write(folder.path().join("rows.csv"), "row,name\n1,a\n2,b\n3,both\n").unwrap();
+    let head =
+        HEAD.replace("reduce = false\n", "reduce = false\nstress = \"stress.mtx\"\nstress_rows = \"rows.csv\"\n");
+    let corner = "[[place]]\nname = \"corner\"\nnodes = [\"118\"]\n";
+    let study = STUDY.replace("kind = \"response\"", "kind = \"orbit\"\nsamples = 256");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "frequency = \"1500 Hz\"\n");
+    for reduction in ["reduce = false", "reduce = { modes = 20 }"] {
+        let found = dataset(folder.path(), &[&head.replace("reduce = false", reduction), &study, CONTACT, corner]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+        let (orbit, stress) = (table("orbit"), table("stress"));
+        assert_eq!(stress.texts("stress").unwrap(), ["a", "b", "both"]);
+        let [x, z] = ["x", "z"].map(|axis| orbit.numbers(&format!("corner_{axis}_displacement_m")).unwrap());
+        let times = orbit.numbers("time_s").unwrap();
+        // a megapascal for a millimetre
+        let factor = 1e9;
+        let of: [&dyn Fn(usize) -> f64; 3] =
+            [&|i| 2.0 * factor * x[i], &|i| -3.0 * factor * z[i], &|i| factor * (2.0 * x[i] - 3.0 * z[i])];
+        for (number, of) in of.iter().enumerate() {
+            let largest = stress.numbers("largest_Pa").unwrap()[number];
+            let time = stress.numbers("time_of_largest_s").unwrap()[number];
+            let instant = times.iter().position(|known| (known - time).abs() < 1e-15).unwrap();
+            assert!((largest / of(instant) - 1.0).abs() < 1e-9, "{largest} {}", of(instant));
+            let most = (0..times.len()).map(|i| of(i).abs()).fold(0.0, f64::max);
+            assert!(largest.abs() > 0.999 * most && largest.abs() <= most * (1.0 + 1e-9), "{largest} {most}");
+        }
+    }
+    std::fs::write(folder.path().join("stress.mtx"), "%%MatrixMarket matrix coordinate real general\n1 2 1\n1 1 2\n")
+        .unwrap();
+    let error = read(folder.path(), &[&head, &study, CONTACT, corner]).unwrap_err();
+    let said = format!("{error} {}", error.help_text().unwrap_or_default());
+    assert!(said.contains("2 columns") && said.contains("transpose"), "{said}");
+}
+
 /// The columns of whole sets follow from those of their joints and nodes.
 #[test]
 fn sets_have_sums_means_and_largest_values() {

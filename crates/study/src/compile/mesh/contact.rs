@@ -13,7 +13,6 @@ use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledEntry, CompiledTable, CompiledValue, LawCoordinate};
 use crate::data::DataTable;
 use crate::syntax::error::{Location, Problem};
-use crate::syntax::expression::quantity_text;
 use crate::syntax::format::{format_significant, plural_suffix};
 use serde_json::{Value as Json, json};
 use stickslip::dimension::Dimension;
@@ -92,7 +91,7 @@ impl SectorRotation {
 /// Weight of a node of a face below which it does not take part: rounding of coordinates in files.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
-/// What surrounds a contact.
+/// Inputs of a contact from the rest of the study.
 #[derive(Clone, Copy)]
 pub(crate) struct ContactInputs<'a> {
     pub source: &'a MeshSource,

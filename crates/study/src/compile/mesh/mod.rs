@@ -39,12 +39,12 @@ pub(crate) struct MeshUse {
     /// Area of each of these joints, by name, m².
     pub areas: HashMap<String, f64>,
     /// The places and joints of each set.
-    pub sets: Arc<Vec<MeshSet>>,
+    pub sets: Arc<Vec<NamedMembers>>,
 }
 
 /// The places or joints that one entry of a study file makes from a set of the mesh.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MeshSet {
+pub struct NamedMembers {
     /// Name of the entry.
     pub name: String,
     /// Names of the places or joints, in a disk those of one sector.

@@ -6,7 +6,7 @@ use crate::case::disk::coordinate_axis;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::compile::mesh::contact::{ContactInputs, SectorRotation};
-use crate::compile::mesh::{MeshSet, MeshSource, MeshUse, contact, mentioned_nodes, sets};
+use crate::compile::mesh::{MeshSource, MeshUse, NamedMembers, contact, mentioned_nodes, sets};
 use crate::compile::source_model::ModelLists;
 use crate::syntax::document::{TomlTable, TomlValue};
 use crate::syntax::error::Problem;
@@ -64,7 +64,7 @@ impl Reader {
             match self.places_on_sets(place, mesh.as_ref()) {
                 Ok(places) => {
                     let members = places.iter().filter_map(|place| place.name()).map(str::to_owned).collect();
-                    sets.extend(name.map(|name| MeshSet { name, members, areas: Vec::new() }));
+                    sets.extend(name.map(|name| NamedMembers { name, members, areas: Vec::new() }));
                     lists.place.extend(places);
                 }
                 Err(problem) => self.problems.push(problem),
@@ -84,7 +84,7 @@ impl Reader {
                     lists.place.extend(expanded.places);
                     lists.joint.extend(expanded.joints);
                     lists.force.extend(expanded.forces);
-                    sets.push(MeshSet {
+                    sets.push(NamedMembers {
                         name: contact.name().unwrap_or_default().to_owned(),
                         members: expanded.areas.iter().map(|(joint, _)| joint.clone()).collect(),
                         areas: expanded.areas.iter().map(|(_, area)| *area).collect(),

@@ -9,12 +9,13 @@ use super::structure_cache::StructureKey;
 use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
-use crate::compile::source_model::{MatrixSource, exchange_advice, plausible_frequencies};
+use crate::compile::source_model::{MatrixSource, StressMatrix, exchange_advice, plausible_frequencies};
 use crate::syntax::document::TomlTable;
 use crate::syntax::error::Problem;
 use crate::syntax::schema::STRUCTURE;
-use crate::syntax::unit_sets;
+use crate::syntax::unit_sets::{self, UnitSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use stickslip::structure::{Component, StructureError};
 use stickslip_formats::{self as formats, names};
 use stickslip_numerics::sparse::SparseMatrix;
@@ -35,7 +36,13 @@ impl Reader {
             return None;
         }
         if self.study_file_only {
-            return Some(MatrixSource { table: stated, component: None, stress_stiffening: None, constrained_rows: 0 });
+            return Some(MatrixSource {
+                table: stated,
+                component: None,
+                stress_stiffening: None,
+                constrained_rows: 0,
+                stress: None,
+            });
         }
         let folder = Path::new(study_file).parent().unwrap_or(Path::new(""));
         let known = self.structures.as_ref().zip(structure_key(&stated, folder));
@@ -44,8 +51,9 @@ impl Reader {
             None => read(&stated, folder),
         };
         match structure {
-            Ok(ReadStructure { component, stress_stiffening, constrained_rows }) => {
-                Some(MatrixSource { table: stated, component: Some(component), stress_stiffening, constrained_rows })
+            Ok(ReadStructure { component, stress_stiffening, constrained_rows, stress }) => {
+                let component = Some(component);
+                Some(MatrixSource { table: stated, component, stress_stiffening, constrained_rows, stress })
             }
             Err(problem) => {
                 self.problems.push(problem);
@@ -63,11 +71,13 @@ pub(super) struct ReadStructure {
     pub stress_stiffening: Option<StressStiffening>,
     /// Number of constrained rows in the files, which the component does not contain.
     pub constrained_rows: usize,
+    /// The matrix of stresses, if one is named.
+    pub stress: Option<Arc<StressMatrix>>,
 }
 
 /// Returns what identifies the content of the files; `None` if a file cannot be found.
 fn structure_key(stated: &CompiledTable, folder: &Path) -> Option<StructureKey> {
-    let keys = ["stiffness", "mass", "damping", "stiffened", "dofs"];
+    let keys = ["stiffness", "mass", "damping", "stiffened", "dofs", "stress", "stress_rows"];
     let files: Vec<_> = keys.into_iter().filter_map(|key| Some((key, file(stated, key)?))).collect();
     let units = match &stated.entry("units")?.value {
         CompiledValue::Fixed(ResolvedValue::Text(text)) => text,
@@ -192,7 +202,63 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<ReadStructure, Problem>
     if let Some(Err(error)) = stiffened.as_ref().map(|stiffened| stiffened.component_at(&component, 1.0)) {
         return Err(problem("stiffened", error.to_string()));
     }
-    Ok(ReadStructure { component, stress_stiffening: stiffened, constrained_rows: left_out.len() })
+    let stress = stress(stated, folder, units, (rows, &kept))?.map(Arc::new);
+    Ok(ReadStructure { component, stress_stiffening: stiffened, constrained_rows: left_out.len(), stress })
+}
+
+/// Reads the matrix of stresses. `rows` is the number of rows of the structure in its file, and
+/// `kept` are those that are not constrained.
+fn stress(
+    stated: &CompiledTable,
+    folder: &Path,
+    units: &UnitSet,
+    (rows, kept): (usize, &[usize]),
+) -> Result<Option<StressMatrix>, Problem> {
+    let problem = |key: &str, message: String| Problem::new(stated.location_of(key, None), key, message);
+    let Some(of) = file(stated, "stress") else {
+        return match stated.entry("stress_rows") {
+            Some(_) => Err(problem("stress_rows", "it names rows of `stress`, which is missing".to_owned())
+                .help("add stress = \"blade_stress.mtx\", or remove `stress_rows`")),
+            None => Ok(None),
+        };
+    };
+    let path = folder.join(&of.path);
+    let refuse = |key: &'static str, path: &Path, error: formats::Error| {
+        let (message, help) = message_and_help(error, path);
+        problem(key, message).help(help)
+    };
+    let matrix = formats::read(&path, of.format.as_deref(), of.name.as_deref());
+    let matrix = matrix.map_err(|error| refuse("stress", &path, error))?;
+    if matrix.columns() != rows {
+        let message = format!(
+            "the matrix of stresses has {} columns, but the stiffness matrix has {rows} rows",
+            matrix.columns()
+        );
+        let help = "each column belongs to a row of the stiffness matrix, in its order; transpose the matrix if its \
+                    rows belong to them";
+        return Err(problem("stress", message).help(help));
+    }
+    let mut names = match file(stated, "stress_rows") {
+        Some(of) => {
+            let path = folder.join(&of.path);
+            names::read(&path, matrix.rows()).map_err(|error| refuse("stress_rows", &path, error))?
+        }
+        None => vec![String::new(); matrix.rows()],
+    };
+    for (number, name) in names.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
+        *name = (number + 1).to_string();
+    }
+    let mut new = vec![None; rows];
+    kept.iter().enumerate().for_each(|(at, row)| new[*row] = Some(at));
+    // the unit of pressure per unit of displacement
+    let unit = units.stiffness() / (units.length * units.length);
+    let mut weights = vec![Vec::new(); matrix.rows()];
+    for entry in matrix.both_triangles() {
+        if let Some(at) = new[entry.column as usize] {
+            weights[entry.row as usize].push((at, entry.value * unit));
+        }
+    }
+    Ok(Some(StressMatrix { names, rows: weights }))
 }
 
 /// Returns message and help for an error of the file formats.

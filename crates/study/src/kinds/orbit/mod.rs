@@ -1,6 +1,7 @@
 //! Orbits over one period, in time.
 
 mod figure;
+mod stress;
 
 use super::shared::contact_states::contact_word;
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
@@ -18,6 +19,7 @@ use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
 use crate::syntax::key::{ValueType, default};
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Orbit, Sample, Symmetry};
+use stress::{STRESS, Stresses};
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -41,7 +43,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: true,
         needs: no_requirements,
         adapts: false,
-        tables: &["orbit", "orbits", "multipliers", FIELDS],
+        tables: &["orbit", "orbits", "multipliers", FIELDS, STRESS],
     },
     unit_size: orbit_sweep::grain,
     size,
@@ -64,6 +66,7 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
             TableShape { numbers: orbits.numbers + 4.0, ..orbits },
             TableShape { rows: multipliers, numbers: inputs.varied + 5.0, words: 0.0 },
             fields,
+            stress::size(inputs, points),
         ],
         // the panels beyond the limit are also built; all fields are held until they are written
         drawn: rows * (inputs.places + inputs.joints) + fields.rows,
@@ -75,9 +78,10 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let mut part = UnitResult::default();
     let (mut motion, mut summary, mut multipliers) =
         (TableBuilder::default(), TableBuilder::default(), TableBuilder::default());
-    let mut of_nodes = TableBuilder::default();
+    let (mut of_nodes, mut of_stresses) = (TableBuilder::default(), TableBuilder::default());
     let prepared = work.case();
     let nodes = fields::Fields::new(work.study, prepared, &mut part);
+    let stresses = Stresses::new(work.study, prepared, &mut part);
     for (orbit, stable) in orbit_sweep::converged_orbits(work, &mut part)? {
         let omega = orbit.omega;
         continuum_note(prepared, &orbit).into_iter().for_each(|note| note.merge_into(&mut part.notes));
@@ -123,8 +127,11 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         if let Some(nodes) = &nodes {
             nodes.write_orbit(prepared, &orbit, &mut of_nodes);
         }
+        if let Some(stresses) = &stresses {
+            stresses.write(prepared, &orbit, &mut of_stresses);
+        }
     }
-    part.tables = vec![motion, summary, multipliers, of_nodes];
+    part.tables = vec![motion, summary, multipliers, of_nodes, of_stresses];
     Ok(part)
 }
 

@@ -215,7 +215,7 @@ impl Fields {
 }
 
 /// Returns the displacements (m) and the velocities (m/s) of the places with imposed motions.
-fn imposed(system: &System, omega: f64, time: f64) -> [Vec<f64>; 2] {
+pub(in crate::kinds) fn imposed(system: &System, omega: f64, time: f64) -> [Vec<f64>; 2] {
     let at = |derivative: i32| {
         let part = |(harmonic, amplitude): &(u32, Complex64)| {
             let rate = f64::from(*harmonic) * omega;
