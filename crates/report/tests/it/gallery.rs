@@ -16,7 +16,7 @@ const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test it gallery";
 
 /// The studies in the order of the page.
-const STUDIES: [&str; 32] = [
+const STUDIES: [&str; 33] = [
     "underplatform_damper",
     "best_slip_force",
     "damper_map",
@@ -35,6 +35,7 @@ const STUDIES: [&str; 32] = [
     "amplification",
     "bolted_joint",
     "friction_rig",
+    "lap_joint",
     "ring_down",
     "nonlinear_modes",
     "loops_against_blade",
