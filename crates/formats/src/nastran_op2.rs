@@ -4,7 +4,8 @@
 //! in the next record, or a mark if it is zero or negative. Integers have four bytes, or eight in
 //! 64-bit files. After an optional label, each data block has its name, a trailer with its sizes,
 //! the name again, and its contents up to the key 0. The contents of a matrix are its columns. Each
-//! record in a column begins with the row of its first number. Symmetric matrices are complete.
+//! record in a column begins with the row of its first number. Symmetric matrices are complete. A
+//! second matrix of the same name is listed as `KAA#2`.
 //!
 //! Source: NX Nastran DMAP Programmer's Guide, module OUTPUT2; the trailer as in module MATMOD.
 
@@ -155,7 +156,11 @@ fn open(bytes: &[u8]) -> Result<Vec<Item<'_>>, Error> {
     let mut items = Vec::new();
     loop {
         let location = file.bytes.clone();
-        let Some((name, trailer, is_matrix)) = file.block()? else { break };
+        let Some((mut name, trailer, is_matrix)) = file.block()? else { break };
+        let earlier = items.iter().filter(|item: &&Item| item.variable.name.split('#').next() == Some(&name)).count();
+        if earlier > 0 {
+            name = format!("{name}#{}", earlier + 1);
+        }
         let start = file.clone();
         file.contents(|_, _, _| Ok(()))?;
         if !is_matrix {

@@ -11,7 +11,7 @@ use crate::syntax::suggest::{excerpt, suggest};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use stickslip::model::{
-    Disk, DiskPart, Element, MIN_SECTORS, MistunedProperty, Model, deviation_error, normal_deviations,
+    Disk, DiskPart, Element, MIN_SECTORS, MistunedProperty, Model, NEXT, deviation_error, normal_deviations,
 };
 use stickslip::structure::{Boundary, Component, CoordinateAxis, FacesError, NodeCoordinates, Reduction, SectorFaces};
 
@@ -106,10 +106,11 @@ fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, secto
         };
     }
     // only names are known
+    let touching = nodes_of_joints_across(sector);
     let Some(substructure) = &mut sector.substructure else { return Ok(()) };
     let axis = table.text("axis").and_then(coordinate_axis);
     let component = &substructure.component;
-    let pairs = pairs(disk, component, axis, sectors)?;
+    let pairs = pairs(disk, (component, &touching), axis, sectors)?;
     let boundary =
         Boundary::of_nodes(component.rows(), &pairs, axis).map_err(|error| problem("boundary", error.to_string()))?;
     let nodes = disk.blade.as_deref();
@@ -132,13 +133,26 @@ fn tie_sectors(structure: &SourceModel, disk: &DiskSource, sectors: usize, secto
     Ok(())
 }
 
+/// Returns the nodes at both ends of the joints with the next sector.
+fn nodes_of_joints_across(sector: &Model) -> HashSet<String> {
+    let Some(substructure) = &sector.substructure else { return HashSet::new() };
+    let names = substructure.component.rows();
+    let across = sector.joints.iter().filter(|joint| joint.between.iter().any(|end| end.starts_with(NEXT)));
+    let ends: HashSet<&str> =
+        across.flat_map(|joint| &joint.between).map(|end| end.strip_prefix(NEXT).unwrap_or(end)).collect();
+    let places = sector.places.iter().filter(|place| place.view_of.is_none() && ends.contains(place.name.as_str()));
+    let rows = places.flat_map(|place| place.rows.iter().flatten());
+    rows.filter_map(|(row, _)| Some(names.get(*row)?.rsplit_once('.')?.0.to_owned())).collect()
+}
+
 /// Returns the node pairs of both sides of a sector.
 ///
 /// Named pairs are checked against the node coordinates if these are known. Without named
-/// pairs, the coordinates determine them.
+/// pairs, the coordinates determine them. Nodes `touching` the next sector by a joint may coincide
+/// with its nodes without being tied to them.
 fn pairs<'a>(
     disk: &'a DiskSource,
-    component: &Component,
+    (component, touching): (&Component, &HashSet<String>),
     axis: Option<CoordinateAxis>,
     sectors: usize,
 ) -> Result<Cow<'a, [(String, String)]>, Problem> {
@@ -159,6 +173,7 @@ fn pairs<'a>(
     };
     // a fixed node or a centre of rotation has no rows and cannot be tied
     let moving = component.rows().iter().filter_map(|row| Some(row.rsplit_once('.')?.0));
+    let moving = moving.filter(|node| !touching.contains(*node));
     let named = disk.boundary.iter().flatten().flat_map(|(low, high)| [low.as_str(), high.as_str()]);
     let counts: HashSet<&str> = moving.chain(named).collect();
     let missing: Vec<NodeCoordinates> =

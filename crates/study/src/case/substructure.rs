@@ -448,6 +448,12 @@ fn row_help(component: &Component, name: &str) -> String {
             alternatives(same).replace(" or ", ", ")
         );
     }
+    let is_named = |row: &String| row.contains('.');
+    if name.contains('.') && !rows.iter().any(is_named) {
+        return "the rows of the matrices have no names; add to [structure] dofs = \"blade.dof\", the file with their \
+                names"
+            .to_owned();
+    }
     // Number of rows that are searched for a similar name; each takes a microsecond.
     match suggest(name, rows.iter().take(200_000).map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`?"),
@@ -455,7 +461,12 @@ fn row_help(component: &Component, name: &str) -> String {
             let first = rows.iter().take(max_listed_rows).map(|row| format!("`{row}`")).collect::<Vec<_>>().join(", ");
             match rows.last() {
                 Some(last) if rows.len() > max_listed_rows => {
-                    format!("its {} rows are {first}, … `{last}`", rows.len())
+                    let node = if name.contains('.') {
+                        format!(", and node {} is constrained or absent", excerpt(node))
+                    } else {
+                        String::new()
+                    };
+                    format!("its {} rows are {first}, … `{last}`{node}", rows.len())
                 }
                 _ => format!("its rows are {first}"),
             }

@@ -70,7 +70,10 @@ pub(crate) fn undamped_resonance(cases: &[SurveyedCase]) -> Option<String> {
     // the warning must be true for every case
     let all = cases.iter().map(found).collect::<Option<Vec<f64>>>()?;
     let hertz = format_significant(all.first()? / TAU, 6);
-    let advice = "add `damping` or damping_ratio = \"0.5 %\" to a spring";
+    let advice = match &cases[0].case.model.substructure {
+        Some(_) => "add modal_damping = \"0.5 %\" to [structure]",
+        None => "add `damping` or damping_ratio = \"0.5 %\" to a spring",
+    };
     Some(match cases[0].survey.system().joints().is_empty() {
         true => format!("the resonance at {hertz} Hz is undamped: the response has no bound there; {advice}"),
         false => format!(

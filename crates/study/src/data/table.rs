@@ -118,6 +118,13 @@ impl DataTable {
         Ok(found.column.values.iter().map(|value| value * factor).collect())
     }
 
+    /// Returns whether a column states its unit.
+    pub fn has_unit(&self, role: &str) -> bool {
+        self.find(role).is_some_and(|found| {
+            !found.unit.is_empty() || !found.column.unit.is_empty() || split_name(&found.column.name).is_some()
+        })
+    }
+
     /// Returns the values of a column as they stand in the file.
     ///
     /// # Errors

@@ -181,9 +181,14 @@ fn contacts_with_a_body_are_the_joints_of_its_points() {
     check_equal(&found, &dataset(folder.path(), &[&head, study, body, &joints]), 1e-9);
     let summary = ModelSummary::new(&read(folder.path(), &[HEAD, study, body, &contact]).unwrap()).unwrap().to_string();
     assert!(summary.contains("pad: 9 joints of PADS on slab, area 4 of 4 mm^2"), "{summary}");
+    let exchanged = contact.replace("[\"PADS\", \"slab\"]", "[\"slab\", \"PADS\"]");
+    let error = read(folder.path(), &[HEAD, study, body, &exchanged]).unwrap_err();
+    let said = format!("{error} {}", error.help_text().unwrap_or_default());
+    assert!(said.contains("must be a set") && said.contains("[\"PADS\", \"slab\"]"), "{said}");
     for (from, to, words) in [
         ("position = [\"1.1 mm\", \"0.9 mm\", \"2 mm\"]\n", "", "position of the body `slab` is unknown"),
         ("\"1.1 mm\"", "\"mu*1 mm\"", "a parameter cannot change the position"),
+        ("[\"x\", \"y\", \"z\"]", "[\"x\", \"z\"]", "does not move along all of them"),
     ] {
         let error = read(folder.path(), &[HEAD, study, &body.replace(from, to), &contact]).unwrap_err().to_string();
         assert!(error.contains(words), "{words}: {error}");
@@ -394,6 +399,8 @@ fn wrong_preloads_of_a_static_step_are_refused() {
         (text("force_N,pressure_MPa", good), &["`pressure` and a column `force`", "rename"]),
         (text("pressure_N", good), &["`pressure_N`", "has the unit"]),
         (text("pressure", good), &["Pa or MPa", "pressure [UNIT]"]),
+        (text("pressure_MPa,gap", good), &["`gap`", "has no unit", "[mm]"]),
+        (text("pressure_MPa", "data = \"static\", scale = -1"), &["`scale`"]),
         (
             text("pressure_MPa", "data = \"static\", total = \"2 kN\""),
             &["sum to 18.75 N", "`total` is 2000 N", "1 rows"],
@@ -876,6 +883,11 @@ fn contacts_with_the_next_sector_are_the_joints_of_their_nodes() {
         .unwrap();
     }
     check_equal(&found, &dataset(folder.path(), &[SECTOR, &joints]), 1e-9);
+    // faces in contact coincide after rotation, too, but coordinates do not tie them
+    for boundary in ["boundary = \"pairs.csv\"\nnodes = \"sector.inp\"\n", "nodes = \"sector.inp\"\n"] {
+        let study = SECTOR.replace("boundary = \"pairs.csv\"\n", boundary);
+        check_equal(&dataset(folder.path(), &[&study, contact]), &found, 1e-12);
+    }
     let summary = ModelSummary::new(&read(folder.path(), &[SECTOR, contact]).unwrap()).unwrap().to_string();
     assert!(summary.contains("shroud: 9 joints of HIGH on next.LOW, area 4 of 4 mm^2"), "{summary}");
     // preloads of a static step are balanced on both sides of the shroud

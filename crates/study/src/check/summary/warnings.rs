@@ -2,6 +2,7 @@
 
 use crate::case::linear_reference::LinearReference;
 use crate::case::study::{Study, evaluate};
+use crate::check::summary::structure::{DIRECTIONS, mass_along};
 use crate::check::summary::text::joint_of_direction;
 use crate::check::survey::SurveyedCase;
 use crate::compile::compiled::{CompiledTable, Environment};
@@ -223,6 +224,7 @@ const PLAUSIBLE_FREQUENCIES: (f64, f64) = (0.1, 2e5);
 fn structure(case: &SurveyedCase) -> Vec<String> {
     let system = case.survey.system();
     let mut found = system.reduced().map_or_else(Vec::new, coordinates);
+    found.extend(implausible_mass(case));
     let Some(reduction) = system.reduction_evidence() else { return found };
     let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
     // Error of a reduction above which it is visible in a response.
@@ -244,6 +246,17 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
         ));
     }
     found
+}
+
+/// Warns of a mass that no vibrating part has: the units of the files are probably others.
+fn implausible_mass(case: &SurveyedCase) -> Option<String> {
+    let component = &case.case.model.substructure.as_ref()?.component;
+    let (mass, ..) = component.matrices();
+    let along = DIRECTIONS.iter().filter_map(|along| mass_along(component.rows(), mass, along));
+    let largest = along.fold(None, |largest: Option<f64>, mass| Some(largest.map_or(mass, |other| other.max(mass))))?;
+    // from a tenth of a gram to a hundred tonnes
+    (!(1e-4..=1e5).contains(&largest))
+        .then(|| format!("the mass of the structure is {} kg; check `units`", format_significant(largest, 4)))
 }
 
 /// Warns of implausible frequencies of a reduced model.

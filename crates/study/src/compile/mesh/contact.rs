@@ -108,8 +108,18 @@ pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Resu
     let preload = data.map(|data| NodalPreload::new(contact, data)).transpose()?.flatten();
     let (sets, location) = between(contact)?;
     let patch = |set: &str| source.mesh.patch(set).map_err(|error| set_problem(error, "between", location));
-    let body = bodies.iter().find(|body| body.name() == Some(&sets[1])).map(|body| ContactBody::new(body, location));
-    let body = body.transpose()?;
+    let find = |name: &str| bodies.iter().find(|body| body.name() == Some(name));
+    if find(&sets[0]).is_some() {
+        let message = format!("`{}` is a body, but the first side must be a set of the mesh", sets[0]);
+        let help = format!("write between = [\"{}\", \"{}\"]", sets[1], sets[0]);
+        return Err(Problem::new(location, "between", message).help(help));
+    }
+    let body = find(&sets[1]).map(|body| ContactBody::new(body, source, location)).transpose()?;
+    if let (None, Some(next)) = (&body, sets[0].strip_prefix(NEXT)) {
+        let message = "the first side must be a set of the sector itself, except in a contact with a body";
+        let help = format!("write between = [\"{}\", \"{NEXT}{next}\"]", sets[1].trim_start_matches(NEXT));
+        return Err(Problem::new(location, "between", message).help(help));
+    }
     let next_set = if body.is_some() { sets[0].strip_prefix(NEXT) } else { sets[1].strip_prefix(NEXT) };
     let first = patch(if body.is_some() { next_set.unwrap_or(&sets[0]) } else { &sets[0] })?;
     let rotation = match (next_set, rotation) {
@@ -219,9 +229,25 @@ struct ContactBody {
 }
 
 impl ContactBody {
-    fn new(body: &CompiledTable, location: &Location) -> Result<ContactBody, Problem> {
+    fn new(body: &CompiledTable, source: &MeshSource, location: &Location) -> Result<ContactBody, Problem> {
         let name = body.name().unwrap_or_default().to_owned();
         let refuse = |message: String, help: &str| Err(Problem::new(location, "between", message).help(help));
+        if source.mesh.sets().iter().any(|set| set.name == name) {
+            return refuse(format!("`{name}` is a body and a set of the mesh"), "rename the body");
+        }
+        let directions = match body.entry("directions").map(|entry| &entry.value) {
+            Some(CompiledValue::Names(names)) => names.iter().map(|(name, _)| name.as_str()).collect(),
+            Some(CompiledValue::Fixed(ResolvedValue::Names(names))) => names.iter().map(String::as_str).collect(),
+            _ => Vec::new(),
+        };
+        if !["x", "y", "z"].iter().all(|along| directions.contains(along)) {
+            return refuse(
+                format!(
+                    "the face of a mesh has three directions, but the body `{name}` does not move along all of them"
+                ),
+                "write directions = [\"x\", \"y\", \"z\"] in its [[body]], and springs for those in which it is held",
+            );
+        }
         let position =
             body.entry("position").map(|entry| entry.value.evaluate("position", &NO_PARAMETERS, &mut Vec::new()));
         match position {

@@ -8,7 +8,7 @@
 //! count from there: constant forces on both places of a joint balance its preload. They stand for
 //! the loads of the static step. Without them the structure would relax and lose contact force.
 
-use super::{entry, fixed_number, table_of_node};
+use super::{Expected, NO_PARAMETERS, entry, fixed_number, table_of_node};
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue};
 use crate::data::{ColumnError, DataTable};
@@ -57,6 +57,13 @@ impl NodalPreload {
         let Some(CompiledValue::Table(stated)) = contact.entry(LAW_KEY).map(|entry| &entry.value) else {
             return Ok(None);
         };
+        if let Some(entry) = stated.entry("scale")
+            && let CompiledValue::Quantity { quantity, dimension, within, example } = &entry.value
+            && quantity.expression.parameters().next().is_none()
+        {
+            let expected = Expected { dimension: *dimension, within: *within };
+            quantity.number("scale", expected, example, &NO_PARAMETERS)?;
+        }
         let scale = stated.entry("scale").map(|entry| &entry.value);
         let (Some(name), Some(CompiledValue::Quantity { quantity: scale, .. })) = (stated.text("data"), scale) else {
             return Ok(None);
@@ -83,6 +90,10 @@ impl NodalPreload {
         let (role, dimension) =
             if self.is_force { ("force", Dimension::FORCE) } else { ("pressure", Dimension::PRESSURE) };
         let (nodes, values) = (table.plain_values("node")?, table.values(role, dimension)?);
+        if table.has("gap") && !table.has_unit("gap") {
+            let message = format!("the column `gap` of `{name}` has no unit");
+            return Err(error(message, "state it in [[data]]: columns = { gap = \"NAME [mm]\" }"));
+        }
         let gaps = if table.has("gap") { table.values("gap", Dimension::LENGTH)? } else { Vec::new() };
         if nodes.len() != values.len() {
             let (nodes, values) = (nodes.len(), values.len());
@@ -168,6 +179,12 @@ impl NodalPreload {
                 .filter(|(node, value)| **value > 0.0 && !nodes.contains(node))
                 .count(),
         };
+        if summary.joints_without_row == nodes.len() {
+            let message = "no row of the data belongs to a node of the contact";
+            return Err(Problem::new(&self.location, LAW_KEY, message).help(
+                "check the column `node`: the numbers of nodes in the static step and in the mesh must be equal",
+            ));
+        }
         if let Some(stated) = self.total.filter(|stated| (total / stated - 1.0).abs() > LARGEST_DIFFERENCE) {
             let number = |force: f64| format_significant(force, 4);
             let message =

@@ -41,6 +41,10 @@ pub(in crate::kinds) fn check(values: &Values, model: &Model) -> Result<(), KeyE
     let refuse = |message: &str, help: &str| Err(KeyError::new("fields", message, help));
     match &model.substructure {
         None => refuse("only a structure given by matrices has the displacements of nodes", "remove `fields`"),
+        Some(own) if !own.component.rows().iter().any(|name| node_and_axis(name).is_some()) => refuse(
+            "the rows of the matrices do not name nodes, as in `17.y`",
+            "add to [structure] dofs = \"blade.dof\", the names of the rows; a reduced model has no nodes",
+        ),
         Some(own) if own.disk.as_ref().is_some_and(|disk| disk.boundary.axis().is_none()) => refuse(
             "the displacements of all nodes of a disk need its axis",
             "add axis = \"z\" to [disk], or remove `fields`",
