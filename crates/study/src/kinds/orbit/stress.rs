@@ -5,8 +5,7 @@ use crate::case::study::Study;
 use crate::case::values::hertz;
 use crate::check::size::{SizeInputs, TableShape};
 use crate::compile::source_model::StressMatrix;
-use crate::kinds::shared::fields::imposed;
-use crate::results::notes::Note;
+use crate::kinds::shared::fields::{displacement_field, imposed};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{PreparedCase, UnitResult};
 use std::sync::Arc;
@@ -49,14 +48,7 @@ impl Stresses {
     /// Prepares the stresses; `None` if the study has no matrix of stresses.
     pub fn new(study: &Study, prepared: &PreparedCase, part: &mut UnitResult) -> Option<Stresses> {
         let matrix = of_study(study)?.clone();
-        match DisplacementField::new(&prepared.case.model) {
-            Ok(field) => Some(Stresses { field, matrix }),
-            Err(error) => {
-                let text = format!("the stresses are unknown: {error}.");
-                Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
-                None
-            }
-        }
+        Some(Stresses { field: displacement_field(prepared, part)?, matrix })
     }
 
     /// Writes a row for every stress of an orbit.

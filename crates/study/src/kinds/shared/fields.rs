@@ -16,7 +16,7 @@ use crate::syntax::key::{Key, ValueType, optional};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
-use stickslip::model::{DisplacementField, Model, System};
+use stickslip::model::{DisplacementField, Model, Place, System};
 use stickslip::orbit::{JointSample, Orbit};
 
 /// The key `fields`.
@@ -101,14 +101,7 @@ impl Fields {
         let (case, model) = (&prepared.case, &prepared.case.model);
         let instants = case.values.count("fields")? as usize;
         let component = &model.substructure.as_ref()?.component;
-        let field = match DisplacementField::new(model) {
-            Ok(field) => field,
-            Err(error) => {
-                let text = format!("the displacements of all nodes are unknown: {error}.");
-                Note::for_case(&case.label(), text).merge_into(&mut part.notes);
-                return None;
-            }
-        };
+        let field = displacement_field(prepared, part)?;
         let mut nodes: BTreeMap<u64, [Option<usize>; 3]> = BTreeMap::new();
         for (row, name) in component.rows().iter().enumerate() {
             if let Some((node, axis)) = node_and_axis(name) {
@@ -116,21 +109,21 @@ impl Fields {
             }
         }
         let node_of = |name: &str| {
-            let place = model.places.iter().find(|place| place.name == name && place.view_of.is_none())?;
+            let of_name = |place: &&Place| place.name == name && place.view_of.is_none();
+            let (index, place) = model.places.iter().enumerate().find(|(_, place)| of_name(place))?;
             let single = |row: &Vec<(usize, f64)>| matches!(row[..], [(_, 1.0)]);
             let (row, _) = *place.rows.first()?.first()?;
-            place.rows.iter().all(single).then(|| node_and_axis(&component.rows()[row])).flatten()
+            let node = place.rows.iter().all(single).then(|| node_and_axis(&component.rows()[row])).flatten();
+            // places are stored sector by sector
+            Some((index * field.sectors() / model.places.len(), node?.0))
         };
         let with_faces = model.joints.iter().enumerate().filter(|(_, joint)| joint.law.has_faces());
         let areas = &study.structure.mesh.areas;
-        let sectors = model.ring.map_or(1, |ring| ring.sectors);
-        let each = (model.joints.len() / sectors).max(1);
         let joints = with_faces.filter_map(|(index, joint)| {
-            let sector = index / each;
             let stated = if model.ring.is_some() { joint.name.rsplit_once('_')?.0 } else { &joint.name };
             let area = areas.get(stated).copied();
-            let node = node_of(&joint.between[0])?.0;
-            Some(((sector, node), JointOfNode { index, area, normal: joint.law.normal() }))
+            let normal = joint.law.normal();
+            Some((node_of(&joint.between[0])?, JointOfNode { index, area, normal }))
         });
         let joints = joints.collect();
         Some(Fields { field, instants, nodes, joints })
@@ -216,6 +209,19 @@ impl Fields {
             }
         }
     }
+}
+
+/// Returns the displacements of all rows of a case; `None` with a note if they are unknown.
+pub(in crate::kinds) fn displacement_field(
+    prepared: &PreparedCase,
+    part: &mut UnitResult,
+) -> Option<DisplacementField> {
+    let field = DisplacementField::new(&prepared.case.model);
+    let unknown = |error| {
+        let text = format!("the displacements of all nodes are unknown: {error}.");
+        Note::for_case(&prepared.case.label(), text).merge_into(&mut part.notes);
+    };
+    field.map_err(unknown).ok()
 }
 
 /// Returns the displacements (m) and the velocities (m/s) of the places with imposed motions.
