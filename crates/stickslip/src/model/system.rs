@@ -722,6 +722,15 @@ impl System {
         &self.moved
     }
 
+    /// Returns the sum of the constant forces on each row, N.
+    pub(crate) fn constant_forces(&self) -> DVector<f64> {
+        let mut load = DVector::zeros(self.dofs());
+        for (_, force) in self.excitation(0.0).iter().filter(|(harmonic, _)| *harmonic == 0) {
+            load += force.map(|f| f.re);
+        }
+        load
+    }
+
     /// Returns the complex force amplitudes at excitation frequency `omega` (rad/s): (harmonic,
     /// length n).
     pub fn excitation(&self, omega: f64) -> Vec<(u32, DVector<Complex64>)> {

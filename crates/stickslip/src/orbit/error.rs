@@ -340,9 +340,11 @@ pub enum ObservedMotion {
         /// The place with the largest drift.
         place: Box<str>,
         /// Number of periods of this drift.
-        periods: usize,
-        /// Its mean speed, m/s.
+        periods: u32,
+        /// Its mean speed, m/s, negative against its direction.
         speed: f64,
+        /// The constant force along its direction, N.
+        load: f64,
         /// Stiffness of a spring that holds it and hardly changes its vibration, N/m: a hundredth
         /// of the mass that moves, times the squared frequency.
         spring: f64,
@@ -385,9 +387,13 @@ impl std::fmt::Display for ObservedMotion {
             ObservedMotion::Repeats { periods } => {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
-            ObservedMotion::Drifts { place, periods, speed, spring, joint, open_fraction } => {
+            ObservedMotion::Drifts { place, periods, speed, load, spring, joint, open_fraction } => {
                 let speed = speed_text(*speed);
-                write!(f, "drifts: `{place}` moves at {speed} over {periods} periods")?;
+                write!(f, "drifts: `{place}` moves at {speed} over {periods} periods, ")?;
+                match *load {
+                    0.0 => write!(f, "pushed by its contacts alone")?,
+                    load => write!(f, "under a constant force of {load:.3} N along it")?,
+                }
                 if *open_fraction >= 1.0 {
                     return write!(
                         f,

@@ -169,18 +169,19 @@ fn classified(
         let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
         let steady =
             halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();
-        (if steady { (halves[0] + halves[1]).abs() } else { 0.0 }, Some((axis, place)))
+        (if steady { halves[0] + halves[1] } else { 0.0 }, Some((axis, place)))
     });
-    let farthest = farthest.fold((0.0, None), |a, b| if b.0 > a.0 { b } else { a });
+    let farthest = farthest.fold((0.0, None), |a: (f64, _), b| if b.0.abs() > a.0.abs() { b } else { a });
     if let (drift, Some((axis, place))) = farthest
-        && drift > settings.drift_distance * swing
+        && drift.abs() > settings.drift_distance * swing
     {
         let squares: f64 = axis.rows().iter().map(|(_, weight)| weight * weight).sum();
         let mass = axis.rows().iter().map(|(row, weight)| weight * weight * system.structure().diagonal_mass(*row));
         let mass = mass.sum::<f64>() / (squares * squares);
         return ObservedMotion::Drifts {
             place: place.as_str().into(),
-            periods: last,
+            periods: last as u32,
+            load: axis.component(system.constant_forces().as_slice()) / squares,
             speed: drift * omega / (last as f64 * TAU),
             spring: 0.01 * mass * omega * omega,
             joint: joint.into(),
@@ -237,11 +238,13 @@ mod tests {
         assert_eq!(classified_motion(&block([2.0, 10.0])).course, ObservedMotion::Settles);
         for (load, along, speed) in [([7.0, 10.0], "x", 2.0 / 60.0), ([0.0, -3.0], "z", 3.0 / 60.0)] {
             let course = classified_motion(&block(load)).course;
-            let ObservedMotion::Drifts { ref place, speed: measured, spring, open_fraction, .. } = course else {
+            let ObservedMotion::Drifts { ref place, speed: measured, load: push, spring, open_fraction, .. } = course
+            else {
                 panic!("{course}")
             };
             assert_eq!(&**place, along);
-            assert!((measured / speed - 1.0).abs() < 1e-3, "{measured} {speed}");
+            assert_eq!(push, load[0] + load[1] - if along == "x" { 10.0 } else { 0.0 });
+            assert!((measured.abs() / speed - 1.0).abs() < 1e-3, "{measured} {speed}");
             // the block has 1 kg
             assert_eq!(spring, 0.01 * OMEGA * OMEGA);
             assert_eq!(open_fraction, if along == "z" { 1.0 } else { 0.0 });

@@ -245,7 +245,7 @@ impl Survey {
     /// Returns the onset of slip of each joint, in the order of the model.
     pub fn first_slip(&self) -> Vec<FirstSlip> {
         let rigid = self.joints.iter().any(|joint| matches!(joint.state, StuckState::Rigid { .. }));
-        let constant = preload::constant_forces(&self.system);
+        let constant = self.system.constant_forces();
         let one = |(joint, carried): (&StuckAxis, &Option<f64>)| {
             let (limit, displacement) = match joint.state {
                 StuckState::Nothing => (0.0, None),

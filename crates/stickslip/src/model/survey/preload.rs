@@ -8,17 +8,8 @@ use super::super::System;
 use super::UnloadedContacts;
 use super::linear_modes::MAX_DOFS;
 use super::stuck_joint::{StuckAxis, StuckState};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
-
-/// Returns the sum of the constant forces on each row, N.
-pub(super) fn constant_forces(system: &System) -> DVector<f64> {
-    let mut load = DVector::zeros(system.dofs());
-    for (_, force) in system.excitation(0.0).iter().filter(|(harmonic, _)| *harmonic == 0) {
-        load += force.map(|f| f.re);
-    }
-    load
-}
 
 /// Returns the force of each preloaded contact in static equilibrium, N, if all contacts stay
 /// closed and stuck.
@@ -32,7 +23,7 @@ pub(super) fn equilibrium_forces(system: &System, joints: &[StuckAxis]) -> Vec<O
     if n > MAX_DOFS || !joints.iter().any(|joint| joint.pressed.is_some_and(|force| force > 0.0)) {
         return unknown();
     }
-    let mut load = constant_forces(system);
+    let mut load = system.constant_forces();
     let mut stiffness = DMatrix::zeros(n, n);
     for (row, column, [.., k]) in system.structure().entries() {
         stiffness[(row, column)] += k;
