@@ -12,7 +12,7 @@ use super::memory_estimate::{MEMORY, check_memory, level_memory};
 use super::newton::SolveError;
 use super::options::{FIRST_HARMONICS, HarmonicBalance, NAME, TOLERANCE};
 use super::settings::WorkSettings;
-use super::static_equilibrium::{SolvedEquilibrium, characteristic_rate, static_equilibrium};
+use super::static_equilibrium::{Regularization, SolvedEquilibrium, static_equilibrium};
 use super::{cost_model, postprocess};
 use crate::method::orbit_search::describing_guess::DescribingGuess;
 use crate::method::orbit_search::evidence::OrbitCheck;
@@ -107,9 +107,12 @@ impl HarmonicBalanceSolver {
         let bytes = level_memory(banded.as_ref(), &ports, &dynamics, (harmonics.len(), samples));
         check_memory(bytes, &ports, harmonics.len(), periods)?;
         let mut static_start = None;
+        let equilibrium =
+            |regularization| static_equilibrium(&system, (&ports, around.as_ref()), &dynamics, regularization);
         if kept.contains(0)
+            // the search for the orbit begins there and has its own springs, so an error is harmless
             && let Some(SolvedEquilibrium { orbit, states }) =
-                static_equilibrium(&system, (&ports, around.as_ref()), &dynamics, characteristic_rate(&system))
+                [Regularization::Robust, Regularization::Exact].into_iter().find_map(equilibrium)
         {
             ports.set_static_states(&states);
             around.iter_mut().for_each(|around| around.set_static_states(&states));

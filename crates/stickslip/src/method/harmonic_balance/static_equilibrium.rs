@@ -38,13 +38,10 @@ const SAMPLES: usize = 8;
 pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
     let (ports, ring_ports) = Ports::for_sector(system).ok()?;
     let system = Arc::new(system.clone());
-    let rate = characteristic_rate(&system);
-    // springs that regularize rigid-body motions are proportional to the square of the rate: with
-    // the lower one the result is exact to rounding, with the higher one such motions are found
-    // also in matrices whose rounding holds them
-    [1e-3 * rate, rate].into_iter().find_map(|rate| {
+    [Regularization::Exact, Regularization::Robust].into_iter().find_map(|regularization| {
+        // whether contacts alone hold a body is decided once, at the rate of the regularization
         let dynamics = LinearDynamics::new(&system, &ports);
-        let found = static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics, rate)?;
+        let found = static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics, regularization)?;
         Some(found.orbit)
     })
 }
@@ -57,15 +54,29 @@ pub(super) struct SolvedEquilibrium {
     pub states: Vec<StaticState>,
 }
 
-/// Returns the static equilibrium. Springs that belong to a small share of the rate `omega` (1/s)
-/// regularize motions that nothing holds. Returns `None` if the iteration finds none, for example
-/// if no joint and no spring carries a constant load.
+/// Springs that regularize rigid-body motions. They are proportional to the square of a rate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Regularization {
+    /// A thousandth of the rate of the structure: the result is exact to rounding.
+    Exact,
+    /// The rate of the structure: such motions are found also in matrices whose rounding holds
+    /// them. In a structure of many small masses on stiff springs, the springs carry some per cent
+    /// of the load, and the iteration may fail.
+    Robust,
+}
+
+/// Returns the static equilibrium. Returns `None` if the iteration finds none, for example if no
+/// joint and no spring carries a constant load.
 pub(super) fn static_equilibrium(
     system: &Arc<System>,
     (ports, ring_ports): (&Ports, Option<&Ports>),
     dynamics: &LinearDynamics,
-    omega: f64,
+    regularization: Regularization,
 ) -> Option<SolvedEquilibrium> {
+    let omega = match regularization {
+        Regularization::Exact => 1e-3 * characteristic_rate(system),
+        Regularization::Robust => characteristic_rate(system),
+    };
     let harmonics = vec![0];
     let banded = BandedForm::new(system, ports, &harmonics);
     let mut discretization = Discretization::new(harmonics, SAMPLES, ports, banded);
@@ -161,7 +172,7 @@ fn solve_static(
 
 /// Returns a rate of the system, 1/s, from its largest stiffness and mass. Equations at rest
 /// need one.
-pub(super) fn characteristic_rate(system: &System) -> f64 {
+fn characteristic_rate(system: &System) -> f64 {
     let [mass, _, stiffness] = system.structure().largest();
     let rate = (stiffness / mass).sqrt();
     if rate.is_finite() && rate > 0.0 { rate } else { 1.0 }
@@ -170,7 +181,7 @@ pub(super) fn characteristic_rate(system: &System) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::FrictionContact;
+    use crate::law::{FrictionContact, Gap};
     use crate::model::Axis;
     use crate::structure::Structure;
     use nalgebra::DMatrix;
@@ -196,7 +207,7 @@ mod tests {
 
     fn equilibrium(system: &Arc<System>) -> Option<SolvedEquilibrium> {
         let ports = Ports::new(system).unwrap();
-        static_equilibrium(system, (&ports, None), &LinearDynamics::new(system, &ports), characteristic_rate(system))
+        static_equilibrium(system, (&ports, None), &LinearDynamics::new(system, &ports), Regularization::Exact)
     }
 
     /// In stick, `z (kn sin² + kt cos²) = Q`. In slip, `z kn (sin² + µ sin cos) = Q`. The
@@ -213,6 +224,29 @@ mod tests {
             assert!((states[0].states[0] / tangential - 1.0).abs() < 1e-9, "{states:?} {tangential}");
             assert!((states[0].displacement[1] / (sine * z) - 1.0).abs() < 1e-9);
         }
+    }
+
+    /// Thirty masses on stiff springs stand on one contact. Springs that regularize their rigid
+    /// motion at the rate of a stiff spring on one mass would carry 3 % of the load.
+    #[test]
+    fn a_body_of_many_stiff_parts_stands_on_its_contact() {
+        let (parts, stiff, load) = (30, 1e14, 500.0);
+        let coupling = |i: usize, j: usize| match i.abs_diff(j) {
+            0 if i == 0 || i == parts - 1 => stiff,
+            0 => 2.0 * stiff,
+            1 => -stiff,
+            _ => 0.0,
+        };
+        let stiffness = DMatrix::from_fn(parts, parts, coupling);
+        let mass = DMatrix::identity(parts, parts) / parts as f64;
+        let names = (0..parts).map(|i| i.to_string()).collect();
+        let structure = Structure::new(names, mass, DMatrix::zeros(parts, parts), stiffness).unwrap();
+        let axes = vec![Axis::new(vec![(parts - 1, 1.0)])];
+        let builder = System::builder(structure).joint("foot", Arc::new(Gap { gap: 0.0, stiffness: NORMAL }), axes);
+        let system = Arc::new(builder.force(parts - 1, 0, Complex64::new(load, 0.0)).build().unwrap());
+        let found = equilibrium(&system).unwrap();
+        let depth = found.states[0].displacement[0];
+        assert!((depth * NORMAL / load - 1.0).abs() < 1e-4, "{}", depth * NORMAL / load);
     }
 
     /// A load that pulls the wedge out has no equilibrium.
