@@ -16,7 +16,7 @@ const UPDATE: &str = "STICKSLIP_UPDATE_BOOK";
 const HINT: &str = "is stale; run: STICKSLIP_UPDATE_BOOK=1 cargo test -p stickslip-report --test it gallery";
 
 /// The studies in the order of the page.
-const STUDIES: [&str; 33] = [
+const STUDIES: [&str; 35] = [
     "underplatform_damper",
     "best_slip_force",
     "damper_map",
@@ -35,6 +35,8 @@ const STUDIES: [&str; 33] = [
     "amplification",
     "bolted_joint",
     "friction_rig",
+    "blade_sweeps",
+    "ring_down_test",
     "lap_joint",
     "ring_down",
     "nonlinear_modes",
@@ -229,6 +231,22 @@ fn the_ring_of_blades_has_the_peak_of_the_closed_form() {
     let at = limits.iter().position(|limit| *limit == 5.6).unwrap();
     // A little viscous damping and higher harmonics lower the peak by 0.5 %.
     close(column(&found, "peaks", "amplitude_m")[at], PI * 5.0 / (4.0 * 1e4 * 0.5), 1e-2);
+}
+
+/// The scripts that made the data integrate models with these parameters.
+#[test]
+fn fits_find_the_parameters_that_made_the_data() {
+    let sweeps: &[(&str, f64)] = &[("k", 170e3), ("c", 3.0), ("kt", 50e3), ("Ft", 12.0)];
+    let record: &[(&str, f64)] = &[("k", 80e3), ("c", 0.8), ("kt", 20e3), ("Ft", 3.0), ("blow", 0.2)];
+    for (study, parameters) in [("blade_sweeps", sweeps), ("ring_down_test", record)] {
+        let found = dataset(study, &text(study));
+        let (values, errors) = (column(&found, "parameters", "value"), column(&found, "parameters", "standard_error"));
+        assert_eq!(values.len(), parameters.len());
+        for (k, (name, truth)) in parameters.iter().enumerate() {
+            let apart = (values[k] - truth) / errors[k];
+            assert!(apart.abs() < 2.5 && errors[k] < 0.25 * truth, "{study}, {name}: {} of {truth}", values[k]);
+        }
+    }
 }
 
 /// While the lap joint sticks, the decay is linear: `ζ = c/(2 √((k + kt) m))`,

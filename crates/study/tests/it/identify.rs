@@ -406,6 +406,14 @@ fn a_bound_is_no_estimate() {
 }
 
 #[test]
+fn forces_of_opposite_sign_are_named() {
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, -f]);
+    let dataset = identify(&csv("displacement_m,force_N", rows), &loop_study(""));
+    let said = dataset.notes.iter().chain(dataset.failures.iter().map(|failure| &failure.reason));
+    assert!(said.clone().any(|text| text.contains("opposite sign of the computed ones")), "{:?}", dataset.notes);
+}
+
+#[test]
 fn rows_that_are_predicted_are_not_fitted() {
     let rows =
         loops(1e3, 1e4, 2.0, 1e-3).into_iter().enumerate().map(|(i, (u, f))| vec![u, f, f64::from(u8::from(i >= 200))]);

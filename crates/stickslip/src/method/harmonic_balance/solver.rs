@@ -110,7 +110,7 @@ impl HarmonicBalanceSolver {
         let equilibrium =
             |regularization| static_equilibrium(&system, (&ports, around.as_ref()), &dynamics, regularization);
         if kept.contains(0)
-            // the search for the orbit begins there and has its own springs, so an error is harmless
+            // the search begins there and has its own springs, so an error is harmless
             && let Some(SolvedEquilibrium { orbit, states }) =
                 [Regularization::Robust, Regularization::Exact].into_iter().find_map(equilibrium)
         {

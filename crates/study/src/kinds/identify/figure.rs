@@ -27,10 +27,23 @@ fn case_panels(table: &Table, case_rows: &CaseRows) -> Vec<Panel> {
             keys.push(key);
         }
     }
+    let several_targets = keys.iter().any(|key| key.0 != keys[0].0);
+    let mut groups: Vec<f64> = Vec::new();
+    for group in numbers(table, "group", case_rows.rows.clone()) {
+        if !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
     let own = |key: &(&str, &str)| {
         let rows = case_rows.rows.clone().filter(|row| (targets[*row].as_str(), quantities[*row].as_str()) == *key);
-        let title = join_title([case_rows.label(), key.0.to_owned()]);
-        panel(table, &rows.collect::<Vec<_>>(), title)
+        // the number of the target, and the name of its data
+        let target = match key.0.split_once(' ') {
+            Some((number, data)) if several_targets => format!("target {number}: {data}"),
+            Some((_, data)) => data.to_owned(),
+            None => key.0.to_owned(),
+        };
+        let title = join_title([case_rows.label(), target]);
+        panel(table, &rows.collect::<Vec<_>>(), &groups, title)
     };
     keys.iter().filter_map(own).collect()
 }
@@ -44,7 +57,8 @@ fn axis_of(name: &str) -> (String, String) {
     (quantity.replace('_', " "), unit)
 }
 
-fn panel(table: &Table, rows: &[usize], title: String) -> Option<Panel> {
+/// Returns the panel of some rows. `all_groups` are the groups of the case; each has its colour.
+fn panel(table: &Table, rows: &[usize], all_groups: &[f64], title: String) -> Option<Panel> {
     let first = *rows.first()?;
     let column = |name: &str| -> Vec<f64> {
         let all = numbers(table, name, Range { start: 0, end: table.rows() });
@@ -68,13 +82,11 @@ fn panel(table: &Table, rows: &[usize], title: String) -> Option<Panel> {
     let (fitted, low, high) = (scaled("fitted"), scaled("fitted_low_95"), scaled("fitted_high_95"));
     let x: Vec<f64> = x.iter().map(|x| x * x_factor).collect();
     let measured: Vec<f64> = measured.iter().map(|value| value * y_factor).collect();
-    let mut distinct: Vec<f64> = groups.clone();
-    distinct.dedup();
     let mut series = Vec::new();
-    for (colour, group) in distinct.iter().enumerate() {
+    for (colour, group) in all_groups.iter().enumerate().filter(|(_, group)| groups.contains(group)) {
         let own: Vec<usize> = (0..rows.len()).filter(|i| groups[*i] == *group).collect();
         let of = |values: &[f64]| -> Vec<f64> { own.iter().map(|i| values[*i]).collect() };
-        let name = |what: &str| if distinct.len() > 1 { format!("{what}, {group}") } else { what.to_owned() };
+        let name = |what: &str| if all_groups.len() > 1 { format!("{what}, {group}") } else { what.to_owned() };
         let model = if is_predicted { "predicted" } else { "fitted" };
         // a band over an abscissa that turns back would cross itself
         if of(&x).is_sorted() {

@@ -137,10 +137,10 @@ pub(super) const KIND: Kind = Kind {
             default(
                 "starts",
                 ValueType::Count(0, 1000),
-                "16",
+                "64",
                 "further starts of the search, spread over the ranges by a Sobol sequence; the best of them are \
                  followed",
-                "32",
+                "128",
             ),
             default(
                 "loss",

@@ -19,6 +19,14 @@ pub(super) enum DerivativesOf {
     AllTargets,
 }
 
+/// The rows that a minimization uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum UsedRows {
+    All,
+    /// The beginning of every motion over time: this number of times its first two cycles.
+    Beginnings(usize),
+}
+
 /// The residuals of a case.
 #[derive(Debug)]
 pub(super) struct FitProblem {
@@ -142,7 +150,7 @@ impl FitProblem {
     }
 
     /// Returns a sentence for each quantity whose measured values differ from the computed ones by
-    /// orders of magnitude, as they do in another unit.
+    /// orders of magnitude, as they do in another unit, or have the opposite sign.
     pub fn scale_differences(&self, fitted: &[Fitted]) -> Vec<String> {
         let mut sentences = Vec::new();
         for (target, fitted) in self.targets.iter().zip(fitted).filter(|(target, _)| !target.is_predicted()) {
@@ -150,7 +158,17 @@ impl FitProblem {
             for (k, name) in names.iter().enumerate() {
                 let measured = target.measured().iter().map(|measured| measured.value).skip(k).step_by(names.len());
                 let computed = fitted.values.iter().copied().skip(k).step_by(names.len());
-                let ratio = (sum_of_squares(measured) / sum_of_squares(computed)).sqrt();
+                let product: f64 = measured.clone().zip(computed.clone()).map(|(a, b)| a * b).sum();
+                let (measured, computed) = (sum_of_squares(measured), sum_of_squares(computed));
+                // Correlation of -0.5: noise and a poor model hardly reach it.
+                if product < -0.5 * (measured * computed).sqrt() {
+                    sentences.push(format!(
+                        "the measured values of `{name}` in `{}` have the opposite sign of the computed ones: reverse \
+                         the sign of their column.",
+                        target.data()
+                    ));
+                }
+                let ratio = (measured / computed).sqrt();
                 // Ratio that a poor model hardly reaches, and that most pairs of units exceed.
                 if ratio.is_finite() && ratio > 0.0 && !(0.01..=100.0).contains(&ratio) {
                     sentences.push(format!(
@@ -162,6 +180,33 @@ impl FitProblem {
             }
         }
         sentences
+    }
+
+    /// Returns the parts of the data that successive minimizations use, from the first cycles of
+    /// the motions over time to all rows. Without such motions, all rows are used at once.
+    pub fn stages(&self) -> Vec<UsedRows> {
+        let fitted = self.targets.iter().filter(|target| !target.is_predicted());
+        let ratio = |target: &dyn Target| Some(target.measured().len() / target.first_cycles()?.max(1));
+        let longest = fitted.filter_map(|target| ratio(&**target)).max().unwrap_or(1);
+        // Three times the cycles: the frequency of the last minimum is accurate enough not to lose
+        // a cycle, and a record of a hundred cycles takes five minimizations.
+        let beginnings =
+            std::iter::successors(Some(1), |cycles| Some(3 * cycles)).take_while(|cycles| *cycles < longest);
+        beginnings.map(UsedRows::Beginnings).chain([UsedRows::All]).collect()
+    }
+
+    /// Tells for every residual whether it is used.
+    pub fn is_used(&self, rows: UsedRows) -> Vec<bool> {
+        let of = |target: &dyn Target| {
+            let count = target.measured().len();
+            let used = match (rows, target.first_cycles()) {
+                // enough rows to determine the parameters
+                (UsedRows::Beginnings(cycles), Some(first)) => (cycles * first).max(4 * self.ranges.len()),
+                _ => count,
+            };
+            (0..count).map(move |row| row < used)
+        };
+        self.targets.iter().filter(|target| !target.is_predicted()).flat_map(|target| of(&**target)).collect()
     }
 
     /// Returns the number of residuals.

@@ -6,7 +6,7 @@
 //! parameter that is bounded on one side only.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), section 5.2.
 
-use super::problem::FitProblem;
+use super::problem::{FitProblem, UsedRows};
 use super::search::{Fixed, Found, SearchSettings, minimize};
 use super::statistics::Statistics;
 
@@ -72,7 +72,10 @@ pub(super) fn profiles(
                     break;
                 }
                 others[k] = x;
-                let Some((cost, best)) = minimize(problem, search, others.clone(), Some(Fixed(k))) else { break };
+                let Some((cost, best)) = minimize(problem, search, others.clone(), Some(Fixed(k)), UsedRows::All)
+                else {
+                    break;
+                };
                 let rise = 2.0 * (cost - found.cost) / statistics.variance;
                 points.push(ProfilePoint { x, rise });
                 others = best;

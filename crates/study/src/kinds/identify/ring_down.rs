@@ -62,6 +62,14 @@ impl Target for RingDown {
         self.predict
     }
 
+    fn first_cycles(&self) -> Option<usize> {
+        let mean = self.measured.iter().map(|row| row.value).sum::<f64>() / self.measured.len() as f64;
+        let above: Vec<bool> = self.measured.iter().map(|row| row.value > mean).collect();
+        // two cycles cross the mean four times
+        let mut crossings = (1..above.len()).filter(|row| above[*row] != above[row - 1]);
+        Some(crossings.nth(3).unwrap_or(above.len()))
+    }
+
     fn fitted(&self, case: &Case, _: &RowStates) -> Result<Fitted, String> {
         let system = case.model.assemble().map_err(|error| error.to_string())?;
         let place = system.places().iter().position(|place| *place == self.place);

@@ -7,7 +7,7 @@
 //! without structure and a model that is nearly linear within them.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
 
-use super::problem::FitProblem;
+use super::problem::{FitProblem, UsedRows};
 use super::search::{Fixed, Found, SearchSettings, minimize};
 use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
@@ -296,7 +296,7 @@ impl Statistics {
             let x = (found.x[k] + sign * distance).clamp(0.0, 1.0);
             others[k] = x;
             problem.forget();
-            match minimize(problem, settings, others.clone(), Some(Fixed(k))) {
+            match minimize(problem, settings, others.clone(), Some(Fixed(k)), UsedRows::All) {
                 Some((cost, best)) if self.rise(cost, found) < self.quantile.powi(2) => {
                     (inside, others) = (distance, best);
                     if distance > UNDETERMINED || x == 0.0 || x == 1.0 {

@@ -63,6 +63,11 @@ pub(super) trait Target: Debug + Send + Sync {
     }
     /// Returns whether the rows are predicted only, not fitted.
     fn is_predicted(&self) -> bool;
+    /// Returns the number of measured rows of the first two cycles, if the rows are one motion over
+    /// time. A search that begins with few cycles cannot end with a cycle too many or too few.
+    fn first_cycles(&self) -> Option<usize> {
+        None
+    }
     /// Computes the numbers of the model.
     ///
     /// # Errors
