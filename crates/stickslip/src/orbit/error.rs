@@ -399,7 +399,7 @@ impl std::fmt::Display for ObservedMotion {
                         f,
                         ", and `{joint}` is separated for all of the last: if a force or a preload should close it, \
                          exchange the two places of its `between`, or reverse the force; otherwise increase the \
-                         normal loads"
+                         normal loads, or hold the body by a weak spring along this direction"
                     );
                 }
                 write!(

@@ -405,6 +405,26 @@ fn a_bound_is_no_estimate() {
     assert!(dataset.notes.iter().any(|note| note.contains("end of its range")), "{:?}", dataset.notes);
 }
 
+/// A run that is stopped ends without a panic, in every stage.
+#[test]
+fn a_fit_can_be_stopped_at_any_time() {
+    let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, f]);
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("data.csv"), csv("displacement_m,force_N", rows)).expect("the data");
+    let name = folder.path().join("study.toml").display().to_string();
+    let study = read_study(&name, &loop_study(""), &[]).expect("a study");
+    for step in 0..40 {
+        let context = Context::without_progress(1);
+        let stop = context.stop.clone();
+        let timer = std::thread::spawn(move || {
+            std::thread::sleep(std::time::Duration::from_millis(3 * step));
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+        run(&study, &context).expect("a dataset");
+        timer.join().expect("the timer");
+    }
+}
+
 #[test]
 fn forces_of_opposite_sign_are_named() {
     let rows = loops(1e3, 1e4, 2.0, 1e-3).into_iter().map(|(u, f)| vec![u, -f]);

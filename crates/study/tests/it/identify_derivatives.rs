@@ -60,7 +60,7 @@ fn rows(target: &str) -> String {
         }
         "ring-down" => {
             text += "time_s,response_m,x,group\n";
-            (0..20).for_each(|i| line(&mut text, [2.3e-3 * f64::from(i), 1e-3, 0.0, 0.0]));
+            (0..20).for_each(|i| line(&mut text, [2.3e-3 * f64::from(i), 1e-3 * f64::from(i).cos(), 0.0, 0.0]));
         }
         "backbone" => {
             text += "amplitude_m,frequency_Hz,damping,group\n";

@@ -171,7 +171,8 @@ fn classified(
             halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();
         (if steady { halves[0] + halves[1] } else { 0.0 }, Some((axis, place)))
     });
-    let farthest = farthest.fold((0.0, None), |a: (f64, _), b| if b.0.abs() > a.0.abs() { b } else { a });
+    // points of a body drift with it; a body comes before its points
+    let farthest = farthest.fold((0.0, None), |a: (f64, _), b| if b.0.abs() > 1.01 * a.0.abs() { b } else { a });
     if let (drift, Some((axis, place))) = farthest
         && drift.abs() > settings.drift_distance * swing
     {

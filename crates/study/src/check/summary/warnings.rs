@@ -65,7 +65,8 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let open = unpressed.first().map(|_| {
         let bodies: Vec<String> = unpressed.iter().flat_map(|one| one.masses.clone()).collect();
         let mut joints: Vec<String> = unpressed.iter().flat_map(|one| one.faces.clone()).collect();
-        joints.dedup();
+        let mut named = BTreeSet::new();
+        joints.retain(|joint| named.insert(joint.clone()));
         let pressed = |slip: &FirstSlip| {
             slip.constant_force > 0.0 && joints.iter().any(|joint| joint == joint_of_direction(&slip.joint))
         };
@@ -142,7 +143,8 @@ fn unbalanced_preload(cases: &[SurveyedCase]) -> Option<String> {
 /// Warns of a model without mass.
 fn massless(one: &SurveyedCase) -> Option<String> {
     let (model, structure) = (&one.case.model, one.survey.system().structure());
-    let none = model.substructure.is_none() && model.masses.iter().all(|mass| mass.mass == 0.0);
+    let is_other = model.substructure.is_some() || !model.bodies.is_empty() || model.masses.is_empty();
+    let none = !is_other && model.masses.iter().all(|mass| mass.mass == 0.0);
     (none && structure.dofs() > 0).then(|| {
         let names: Vec<String> = model.masses.iter().map(|mass| mass.name.clone()).collect();
         let verb = if names.len() == 1 { "is" } else { "are" };

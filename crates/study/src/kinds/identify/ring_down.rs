@@ -29,8 +29,17 @@ impl RingDown {
         let response = input.column("response", quantity.dimension())?;
         let sampling = Column { values: time.clone(), ..Column::default() }.sampling().ok_or_else(|| ColumnError {
             message: format!("the times of `{}` do not increase in equal steps", input.data.name),
-            help: "resample the decay; a record with a gap, or a second record, needs a separate `group`".to_owned(),
+            help: "resample a record with a gap; several records need a column `group` and a target each, with `groups = 1` and \
+                   `groups = 2`"
+                .to_owned(),
         })?;
+        if response.iter().all(|value| *value == response[0]) {
+            let message = format!("the response in `{}` does not change", input.data.name);
+            return Err(ColumnError {
+                message,
+                help: "check the column that `columns` names as `response`".to_owned(),
+            });
+        }
         let deviations = input.deviations(&response, quantity.dimension())?;
         let measured =
             (0..time.len()).map(|i| input.measured(i, time[i] - time[0], response[i], deviations[i])).collect();

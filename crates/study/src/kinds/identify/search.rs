@@ -10,7 +10,8 @@ use crate::case::sample::Design;
 use crate::case::values::Values;
 use basin::{
     BoxBounds, CauchyLoss, ConstraintDescription, ConstraintSet, Constraints, CostFunction, DenseMatrix, Executor,
-    HuberLoss, Jacobian, LossFunction, Residual, RobustLeastSquares, SoftL1Loss, SquaredLoss, TrustRegionReflective,
+    HuberLoss, IncumbentState, Jacobian, LossFunction, Residual, RobustLeastSquares, SoftL1Loss, SquaredLoss,
+    TrustRegionReflective,
 };
 use std::convert::Infallible;
 
@@ -157,7 +158,8 @@ pub(super) fn minimize(
         let solver = TrustRegionReflective::new().with_relative_cost_change_tolerance(settings.tolerance);
         let executor = Executor::from_start(RobustLeastSquares::new(bounded, loss), solver, start);
         let result = executor.max_iter(settings.steps).run().ok()?;
-        Some(with_free(&all, &free, result.best_param()))
+        // there is no best point if the run was stopped before the first one
+        Some(with_free(&all, &free, result.state.incumbent_record()?.param))
     }
     let x = match settings.loss {
         Loss::Squares => run(SquaredLoss, problem, settings, start, fixed, rows),
