@@ -143,8 +143,8 @@ fn unbalanced_preload(cases: &[SurveyedCase]) -> Option<String> {
 /// Warns of a model without mass.
 fn massless(one: &SurveyedCase) -> Option<String> {
     let (model, structure) = (&one.case.model, one.survey.system().structure());
-    let is_other = model.substructure.is_some() || !model.bodies.is_empty() || model.masses.is_empty();
-    let none = !is_other && model.masses.iter().all(|mass| mass.mass == 0.0);
+    let only_masses = model.substructure.is_none() && model.bodies.is_empty() && !model.masses.is_empty();
+    let none = only_masses && model.masses.iter().all(|mass| mass.mass == 0.0);
     (none && structure.dofs() > 0).then(|| {
         let names: Vec<String> = model.masses.iter().map(|mass| mass.name.clone()).collect();
         let verb = if names.len() == 1 { "is" } else { "are" };

@@ -29,8 +29,8 @@ impl RingDown {
         let response = input.column("response", quantity.dimension())?;
         let sampling = Column { values: time.clone(), ..Column::default() }.sampling().ok_or_else(|| ColumnError {
             message: format!("the times of `{}` do not increase in equal steps", input.data.name),
-            help: "resample a record with a gap; several records need a column `group` and a target each, with `groups = 1` and \
-                   `groups = 2`"
+            help: "resample a record with a gap; several records need a column `group` and a target each, with \
+                   `groups = 1` and `groups = 2`"
                 .to_owned(),
         })?;
         if response.iter().all(|value| *value == response[0]) {
