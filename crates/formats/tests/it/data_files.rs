@@ -4,6 +4,8 @@ use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use stickslip_formats::data::{TABLE, read, read_bytes};
 
+use crate::fuzz::{Random, damage, peak_memory};
+
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/measured")
 }
@@ -86,6 +88,41 @@ fn incomplete_results_of_finite_element_programs_are_refused() {
 
 fn files() -> Vec<Vec<u8>> {
     expected().iter().map(|(name, _)| std::fs::read(folder().join(name)).expect("a file")).collect()
+}
+
+/// Reads damaged copies of the files with one ending, `count` of each; returns how many are
+/// still data.
+fn fuzz(ending: &str, seed: u64, count: usize) -> usize {
+    let mut random = Random::new(seed);
+    let mut readable = 0;
+    for (name, _) in expected().iter().filter(|(name, _)| name.ends_with(ending)) {
+        let file = std::fs::read(folder().join(name)).expect("a file");
+        for _ in 0..count {
+            let mut bytes = file.clone();
+            for _ in 0..1 + random.below(4) {
+                damage(&mut bytes, &mut random);
+            }
+            let memory = peak_memory(|| readable += usize::from(read_bytes(&bytes).is_ok()));
+            assert!(memory < (64 << 20) + 1000 * bytes.len() as u64, "{name}: {memory} bytes for {}", bytes.len());
+        }
+    }
+    readable
+}
+
+#[test]
+fn damaged_files_take_memory_in_proportion_to_their_size() {
+    assert!(fuzz("", 0x2468_ace0, 200) > 200);
+}
+
+/// Many damages: `cargo test -p stickslip-formats --test it data_files -- --ignored`.
+/// `STICKSLIP_FUZZ_RUNS` is the number for every file, `STICKSLIP_FUZZ_FORMAT` the ending of the
+/// names, as `uff`.
+#[test]
+#[ignore = "takes minutes"]
+fn many_damaged_data_files() {
+    let count = std::env::var("STICKSLIP_FUZZ_RUNS").ok().and_then(|text| text.parse().ok()).unwrap_or(20_000);
+    let ending = std::env::var("STICKSLIP_FUZZ_FORMAT").unwrap_or_default();
+    fuzz(&ending, 0x1357_9bdf, count);
 }
 
 proptest! {
