@@ -106,6 +106,10 @@ pub enum Command {
         /// 2GB, or the free memory if that is less]
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
+        /// Write a picture of the contacts of the mesh to this PNG file: their nodes, and those
+        /// without a counterpart
+        #[arg(long, value_name = "PNG")]
+        picture: Option<PathBuf>,
     },
     /// Draw stored results again, or several runs in one figure with a table of their
     /// differences

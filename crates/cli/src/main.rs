@@ -65,9 +65,10 @@ fn main() -> ExitCode {
         Command::Merge { folders, out, only, also, open } => {
             merge::merge(&folders, &out, &merge::MergeOptions { only: &only, also: &also, open })
         }
-        Command::Check { files, set, method, memory } => {
-            run::check(&run::Request { files: &files, set: &set, method: method.as_deref(), memory })
-        }
+        Command::Check { files, set, method, memory, picture } => run::check(
+            &run::Request { files: &files, set: &set, method: method.as_deref(), memory },
+            picture.as_deref(),
+        ),
         Command::Plot { folders, overlay, study, out, only, open } => {
             let study = study.as_deref();
             plot::plot(&folders, &plot::PlotOptions { overlay, study, out: out.as_deref(), only: &only, open })

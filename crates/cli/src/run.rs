@@ -16,7 +16,7 @@ use stickslip_report::assemble::{Assembled, Parts, assemble};
 use stickslip_report::journal::{Journal, JournalError};
 use stickslip_report::output::json::write_dataset_json;
 use stickslip_report::stream::{self, Shard, StartMode, StreamError};
-use stickslip_report::{Outputs, check_writable, terminal::Terminal};
+use stickslip_report::{Outputs, check_writable, contact_picture, terminal::Terminal, write_file};
 use stickslip_study::dataset::Dataset;
 use stickslip_study::decimation::MAX_ROWS;
 use stickslip_study::run::{CONVERGED, CheckedStudy, Context, check as check_study};
@@ -91,8 +91,9 @@ pub(crate) fn show(error: &StudyError) {
     complain!("{report:?}");
 }
 
-/// Runs `stickslip check`.
-pub fn check(request: &Request<'_>) -> Exit {
+/// Runs `stickslip check`, and writes a picture of the contacts of the only study if a file is
+/// named for it.
+pub fn check(request: &Request<'_>, picture: Option<&Path>) -> Exit {
     match request.read() {
         Err(exit) => exit,
         Ok(studies) => {
@@ -117,9 +118,32 @@ pub fn check(request: &Request<'_>) -> Exit {
                 let running = Arc::new(AtomicBool::new(false));
                 text.extend(checked.expected_time(&running).map(|time| time.summary_line()));
             }
-            print(&text)
+            let drawn = picture.map(|path| draw_contacts(&studies, path));
+            if let (Some(Ok(())), Some(path)) = (&drawn, picture) {
+                text += &format!("wrote {}\n", path.display());
+            }
+            match (drawn, print(&text)) {
+                (Some(Err(problem)), _) => {
+                    complain!("error: {problem}");
+                    Exit::WrongInput
+                }
+                (_, exit) => exit,
+            }
         }
     }
+}
+
+/// Writes a picture of the contacts of the only study.
+fn draw_contacts(studies: &[CheckedStudy], path: &Path) -> Result<(), String> {
+    let [checked] = studies else {
+        return Err(format!("--picture draws one study, but there are {}; name one file", studies.len()));
+    };
+    let contacts = &checked.summary().contacts;
+    let mesh = checked.study().mesh().filter(|_| !contacts.is_empty());
+    let mesh = mesh.ok_or("--picture draws a [[contact]] of a mesh, but the study has none; remove --picture")?;
+    let name = checked.study().name();
+    let picture = contact_picture(&mesh.mesh, contacts, &format!("contacts of {name}"));
+    write_file(path, &picture.map_err(|error| error.to_string())?).map(|_| ()).map_err(|error| error.to_string())
 }
 
 /// Options of a run.

@@ -60,7 +60,7 @@ pub mod terminal;
 mod samples;
 
 pub use base64::base64;
-pub use figure::{html, mesh_picture::mesh_picture, png, svg};
+pub use figure::{contact_picture::contact_picture, html, mesh_picture::mesh_picture, png, svg};
 pub use output::folder::check_writable;
 pub use output::result_file::{Output, ReportError, write_file};
 pub use output::{Outputs, write_dataset};

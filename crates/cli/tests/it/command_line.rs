@@ -843,6 +843,10 @@ fn inspect_describes_meshes() {
     assert!(code(&drawn) == 0 && bytes.starts_with(b"\x89PNG"), "{}", stderr(&drawn));
     let drawn = stickslip(&meshes, &["inspect", "quadratic.inp", "quadratic.inp", "--picture", path]);
     assert!(code(&drawn) == 2 && stderr(&drawn).contains("name one file with a mesh"), "{}", stderr(&drawn));
+    stickslip(folder.path(), &["new", "element", "element.toml"]);
+    let drawn = stickslip(folder.path(), &["check", "element.toml", "--picture", "contacts.png"]);
+    assert!(code(&drawn) == 2 && stderr(&drawn).contains("the study has none; remove --picture"), "{}", stderr(&drawn));
+    assert!(!folder.path().join("contacts.png").exists());
 }
 
 /// `inspect` treats constrained and massless rows in the same way as a study.

@@ -75,7 +75,7 @@ fn the_commands_of_the_page_run() {
             assert!(text.contains(&line) && text.contains("nothing wrong"), "{text}");
         }
     }
-    for file in ["blade.png", "press.frd", "matrices.sti"] {
+    for file in ["blade.png", "contacts.png", "press.frd", "matrices.sti"] {
         assert!(folder.path().join(file).exists(), "{file}");
     }
     let results = folder.path().join("stickslip-out");

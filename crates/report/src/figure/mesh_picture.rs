@@ -10,16 +10,16 @@ use stickslip_formats::mesh::{Members, Mesh};
 
 /// Settings of the picture.
 #[derive(Debug, Clone, Copy)]
-struct PictureSettings {
+pub(super) struct PictureSettings {
     /// Width and height, pixels. Default 1600 by 1200: half a page in print.
-    size: [f64; 2],
+    pub size: [f64; 2],
     /// Margins at the left, top, right and bottom, pixels. Default: room for the title, the legend
     /// and the axes.
     margins: [f64; 4],
     /// Horizontal and vertical angle of the view, degrees. Default: x points to the right, z up.
     view: [f64; 2],
     /// Largest number of sets in the legend. Default 12: as many as have room.
-    sets: usize,
+    pub sets: usize,
     /// Largest number of characters of a name in the legend. Default 22: the width of the legend.
     name_length: usize,
     /// Number of faces above which edges are thin. Default 5000: faces of about 15 pixels.
@@ -44,7 +44,7 @@ impl Default for PictureSettings {
 }
 
 /// The direction of the view: unit vectors to the right, up, and towards the viewer.
-struct View([[f64; 3]; 3]);
+pub(super) struct View([[f64; 3]; 3]);
 
 impl View {
     fn new(angles: [f64; 2]) -> View {
@@ -52,7 +52,7 @@ impl View {
         View([[-sin, cos, 0.0], [-cos * rise, -sin * rise, level], [cos * level, sin * level, rise]])
     }
 
-    fn of(&self, vector: [f64; 3]) -> [f64; 3] {
+    pub fn of(&self, vector: [f64; 3]) -> [f64; 3] {
         self.0.map(|axis| axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2])
     }
 }
@@ -81,28 +81,107 @@ impl SeenFace {
     }
 }
 
-/// Returns a picture of a mesh with a title.
+/// A picture in progress: the outer faces are drawn.
+pub(super) struct Canvas {
+    pub settings: PictureSettings,
+    pub view: View,
+    pixels: Pixmap,
+    /// Positions of the nodes in the view.
+    seen: Vec<[f64; 3]>,
+    faces: Vec<SeenFace>,
+}
+
+/// An entry of the legend: a name, a number of nodes, and the colour of its marks.
+pub(super) struct LegendEntry {
+    pub name: String,
+    pub count: usize,
+    pub colour: &'static str,
+}
+
+fn failed(reason: &dyn std::fmt::Display) -> ReportError {
+    ReportError::encode("picture of the mesh", reason)
+}
+
+impl Canvas {
+    /// Draws the outer faces of a mesh.
+    pub fn new(mesh: &Mesh) -> Result<Canvas, ReportError> {
+        let settings = PictureSettings::default();
+        let view = View::new(settings.view);
+        let seen: Vec<[f64; 3]> = mesh.nodes().iter().map(|node| view.of(node.position)).collect();
+        let mut pixels = Pixmap::new(settings.size[0] as u32, settings.size[1] as u32)
+            .ok_or_else(|| failed(&"the image has no size"))?;
+        pixels.fill(resvg::tiny_skia::Color::WHITE);
+        let faces = faces(mesh, &seen);
+        let edge = if faces.len() > settings.many_faces { 0.5 } else { 1.2 };
+        let mut canvas = Canvas { settings, view, pixels, seen, faces };
+        let at = canvas.pixels_of(&canvas.seen);
+        for face in &canvas.faces {
+            polygon(&mut canvas.pixels, &at, face, edge);
+        }
+        if canvas.faces.is_empty() {
+            canvas.dots(&at, "#888888", 1.5);
+        }
+        Ok(canvas)
+    }
+
+    /// Returns the pixels of points in the view.
+    pub fn pixels_of(&self, seen: &[[f64; 3]]) -> Vec<[f32; 2]> {
+        let place = placement(&self.seen, self.settings);
+        seen.iter().map(|point| place(point).map(|x| x as f32)).collect()
+    }
+
+    /// Draws a dot at each of these pixels.
+    pub fn dots(&mut self, at: &[[f32; 2]], colour: &str, radius: f32) {
+        for [x, y] in at {
+            let mut path = PathBuilder::new();
+            path.push_circle(*x, *y, radius);
+            let Some(path) = path.finish() else { continue };
+            self.pixels.fill_path(&path, &paint(colour), FillRule::Winding, Transform::identity(), None);
+        }
+    }
+
+    /// Draws a circle around each of these pixels.
+    pub fn circles(&mut self, at: &[[f32; 2]], colour: &str, radius: f32) {
+        for [x, y] in at {
+            let mut path = PathBuilder::new();
+            path.push_circle(*x, *y, radius);
+            self.stroke(path, colour);
+        }
+    }
+
+    /// Draws lines between pairs of pixels.
+    pub fn lines(&mut self, ends: &[[[f32; 2]; 2]], colour: &str) {
+        for [[x, y], [to_x, to_y]] in ends {
+            let mut path = PathBuilder::new();
+            path.move_to(*x, *y);
+            path.line_to(*to_x, *to_y);
+            self.stroke(path, colour);
+        }
+    }
+
+    fn stroke(&mut self, path: PathBuilder, colour: &str) {
+        let Some(path) = path.finish() else { return };
+        let stroke = Stroke { width: 2.5, ..Stroke::default() };
+        self.pixels.stroke_path(&path, &paint(colour), &stroke, Transform::identity(), None);
+    }
+
+    /// Adds title, legend, extent and axes, and returns the picture as PNG.
+    pub fn finish(mut self, mesh: &Mesh, title: &str, legend: &[LegendEntry]) -> Result<Vec<u8>, ReportError> {
+        draw_on(&labels(mesh, title, legend, &self.view, self.settings), &mut self.pixels)?;
+        self.pixels.encode_png().map_err(|error| failed(&error))
+    }
+}
+
+/// Returns a picture of a mesh with its sets and a title.
 ///
 /// # Errors
 /// [`ReportError`] if the picture cannot be drawn.
 pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
-    let failed = |reason: &dyn std::fmt::Display| ReportError::encode("picture of the mesh", reason);
-    let settings = PictureSettings::default();
-    let view = View::new(settings.view);
-    let seen: Vec<[f64; 3]> = mesh.nodes().iter().map(|node| view.of(node.position)).collect();
-    let place = placement(&seen, settings);
-    let at: Vec<[f32; 2]> = seen.iter().map(|point| place(point).map(|x| x as f32)).collect();
-    let mut canvas = Pixmap::new(settings.size[0] as u32, settings.size[1] as u32)
-        .ok_or_else(|| failed(&"the image has no size"))?;
-    canvas.fill(resvg::tiny_skia::Color::WHITE);
-    let faces = faces(mesh, &seen);
-    let edge = if faces.len() > settings.many_faces { 0.5 } else { 1.2 };
-    for face in &faces {
-        polygon(&mut canvas, &at, face, edge);
-    }
+    let mut canvas = Canvas::new(mesh)?;
+    let seen = &canvas.seen;
     // nodes behind the body are hidden
-    let mut visible = vec![faces.is_empty(); seen.len()];
-    faces.iter().flat_map(|face| &face.corners).for_each(|node| visible[*node] = true);
+    let mut visible = vec![canvas.faces.is_empty(); seen.len()];
+    canvas.faces.iter().flat_map(|face| &face.corners).for_each(|node| visible[*node] = true);
     let shown: Vec<(String, Vec<usize>)> = mesh
         .sets()
         .iter()
@@ -110,20 +189,26 @@ pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
         .map(|set| (set.name.clone(), mesh.nodes_of(&set.name).unwrap_or_default()))
         .filter(|(_, nodes)| !nodes.is_empty() && nodes.len() < seen.len())
         .collect();
-    if faces.is_empty() {
-        let all: Vec<usize> = (0..seen.len()).collect();
-        dots(&mut canvas, &at, &all, "#888888", 1.5);
-    }
     let extent = seen.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let count: usize = shown.iter().map(|(_, nodes)| nodes.len()).sum();
-    let tested = &faces[..if count * faces.len() <= settings.tests { faces.len() } else { 0 }];
-    let is_hidden = |node: usize| tested.iter().any(|face| face.hides(&seen[node], &seen, 1e-6 * extent));
-    for (number, (_, nodes)) in shown.iter().enumerate().take(settings.sets) {
-        let nodes: Vec<usize> = nodes.iter().copied().filter(|node| visible[*node] && !is_hidden(*node)).collect();
-        dots(&mut canvas, &at, &nodes, colour(number), 5.0);
+    let is_tested = count * canvas.faces.len() <= canvas.settings.tests;
+    let tested = &canvas.faces[..if is_tested { canvas.faces.len() } else { 0 }];
+    let is_hidden = |node: usize| tested.iter().any(|face| face.hides(&seen[node], seen, 1e-6 * extent));
+    let unhidden = |(_, nodes): &(String, Vec<usize>)| {
+        let nodes = nodes.iter().filter(|node| visible[**node] && !is_hidden(**node));
+        canvas.pixels_of(&nodes.map(|node| seen[*node]).collect::<Vec<_>>())
+    };
+    let dots: Vec<Vec<[f32; 2]>> = shown.iter().take(canvas.settings.sets).map(unhidden).collect();
+    for (number, at) in dots.iter().enumerate() {
+        canvas.dots(at, colour(number), 5.0);
     }
-    draw_on(&labels(mesh, title, &shown, &view, settings), &mut canvas)?;
-    canvas.encode_png().map_err(|error| failed(&error))
+    let entry = |(number, (name, nodes)): (usize, &(String, Vec<usize>))| LegendEntry {
+        name: name.clone(),
+        count: nodes.len(),
+        colour: colour(number),
+    };
+    let legend: Vec<LegendEntry> = shown.iter().enumerate().map(entry).collect();
+    canvas.finish(mesh, title, &legend)
 }
 
 /// Returns the map from the view to pixels.
@@ -192,24 +277,19 @@ fn polygon(canvas: &mut Pixmap, at: &[[f32; 2]], face: &SeenFace, edge: f32) {
     canvas.stroke_path(&path, &paint, &stroke, Transform::identity(), None);
 }
 
-fn dots(canvas: &mut Pixmap, at: &[[f32; 2]], nodes: &[usize], colour: &str, radius: f32) {
+fn paint(colour: &str) -> Paint<'static> {
     let mut paint = Paint { anti_alias: true, ..Paint::default() };
     let [red, green, blue] = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap_or(0));
     paint.set_color_rgba8(red, green, blue, 255);
-    for [x, y] in nodes.iter().map(|node| at[*node]) {
-        let mut path = PathBuilder::new();
-        path.push_circle(x, y, radius);
-        let Some(path) = path.finish() else { continue };
-        canvas.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
-    }
+    paint
 }
 
-fn colour(number: usize) -> &'static str {
+pub(super) fn colour(number: usize) -> &'static str {
     PALETTE[number % PALETTE.len()][0]
 }
 
 /// Returns title, legend, extent and axes as SVG.
-fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View, settings: PictureSettings) -> String {
+fn labels(mesh: &Mesh, title: &str, legend: &[LegendEntry], view: &View, settings: PictureSettings) -> String {
     let PictureSettings { size: [width, height], margins, .. } = settings;
     let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
     let mut svg = format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">");
@@ -229,17 +309,17 @@ fn labels(mesh: &Mesh, title: &str, sets: &[(String, Vec<usize>)], view: &View, 
     text(margins[0] + 150.0, height - 40.0, 22, &format!("{count}; {extent}"));
     let (left, mut y) = (width - margins[2] + 50.0, margins[1] + 20.0);
     let mut marks = String::new();
-    for (number, (name, nodes)) in sets.iter().enumerate().take(settings.sets) {
+    for LegendEntry { name, count, colour } in legend.iter().take(settings.sets) {
         let mut short: String = name.chars().take(settings.name_length).collect();
         if short.len() < name.len() {
             short.push('…');
         }
-        text(left + 24.0, y, 22, &format!("{short} ({})", nodes.len()));
-        let _ = write!(marks, "<circle cx=\"{left}\" cy=\"{}\" r=\"8\" fill=\"{}\"/>", y - 7.0, colour(number));
+        text(left + 24.0, y, 22, &format!("{short} ({count})"));
+        let _ = write!(marks, "<circle cx=\"{left}\" cy=\"{}\" r=\"8\" fill=\"{colour}\"/>", y - 7.0);
         y += 36.0;
     }
-    if sets.len() > settings.sets {
-        text(left, y, 22, &format!("and {} more sets", sets.len() - settings.sets));
+    if legend.len() > settings.sets {
+        text(left, y, 22, &format!("and {} more", legend.len() - settings.sets));
     }
     // the axes at the bottom on the left
     let origin = [margins[0] + 55.0, height - 75.0];

@@ -4,11 +4,13 @@
 //!   ticks; palette and colour scales.
 //! - `clip`, `font`: curves clipped to their panel; text widths in the embedded font.
 //! - `svg`, `png`, `html`: one output each;
-//! - `mesh_picture`: a picture of a mesh.
+//! - `mesh_picture`: a picture of a mesh;
+//! - `contact_picture`: a picture of its contacts.
 
 mod axis;
 mod clip;
 pub(crate) mod colour;
+pub mod contact_picture;
 mod font;
 pub mod html;
 pub mod mesh_picture;

@@ -24,23 +24,52 @@ pub(crate) fn begin_values() -> Vec<(&'static str, &'static str)> {
     ]
 }
 
-/// Checks the names in `start` and `start_velocity`. A place alone does not determine the velocity
-/// of its structure or body, nor its displacement without the equilibrium of the rest.
-pub(crate) fn check_names(values: &Values, model: &Model) -> Result<(), KeyError> {
-    let free = ModelNames::free_displacements(model);
-    for key in ["start", "start_velocity"] {
-        for name in values.by_name(key).into_iter().flat_map(|table| table.keys()) {
-            free.single_label(key, "free mass or place", name)?;
-            let is_place = model.places.iter().any(|place| place.places().contains(name));
-            if is_place && (key != "start" || values.text("begin") == Some(UNLOADED)) {
-                let message =
-                    format!("the place `{name}` alone does not determine the motion of its structure or body");
-                let help = "hold it with `start` and begin = \"equilibrium\", or push it with a [[force]]";
-                return Err(KeyError::new(key, message, help));
+/// The keys that state an initial state.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InitialState<'a> {
+    start: Option<&'a BTreeMap<String, f64>>,
+    start_velocity: Option<&'a BTreeMap<String, f64>>,
+    begin: &'a str,
+}
+
+impl<'a> InitialState<'a> {
+    /// Reads `start`, `start_velocity` and `begin` of `[study]`.
+    pub fn of(values: &'a Values) -> Self {
+        Self::of_record(values, values)
+    }
+
+    /// Reads the initial state of one of several records: its own `start` and `start_velocity`,
+    /// and otherwise those of `[study]`.
+    pub fn of_record(record: &'a Values, study: &'a Values) -> Self {
+        let given = |key: &str| record.by_name(key).or_else(|| study.by_name(key));
+        let (start, start_velocity) = (given("start"), given("start_velocity"));
+        let default = if start.is_some() { EQUILIBRIUM } else { UNLOADED };
+        InitialState { start, start_velocity, begin: study.text("begin").unwrap_or(default) }
+    }
+
+    /// Returns whether something is displaced or moves at the beginning.
+    pub fn moves(&self) -> bool {
+        self.start.is_some() || self.start_velocity.is_some()
+    }
+
+    /// Checks the names in `start` and `start_velocity`. A place alone does not determine the
+    /// velocity of its structure or body, nor its displacement without the equilibrium of the rest.
+    pub fn check_names(&self, model: &Model) -> Result<(), KeyError> {
+        let free = ModelNames::free_displacements(model);
+        for (key, table) in [("start", self.start), ("start_velocity", self.start_velocity)] {
+            for name in table.into_iter().flat_map(BTreeMap::keys) {
+                free.single_label(key, "free mass or place", name)?;
+                let is_place = model.places.iter().any(|place| place.places().contains(name));
+                if is_place && (key != "start" || self.begin == UNLOADED) {
+                    let message =
+                        format!("the place `{name}` alone does not determine the motion of its structure or body");
+                    let help = "hold it with `start` and begin = \"equilibrium\", or push it with a [[force]]";
+                    return Err(KeyError::new(key, message, help));
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 /// The state in which a motion begins.
@@ -56,17 +85,15 @@ pub(crate) struct Start {
 }
 
 impl Start {
-    /// Returns the state of `start`, `start_velocity` and `begin`.
-    pub fn new(system: &System, values: &Values) -> Start {
-        let start = values.by_name("start");
-        let begin = values.text("begin").unwrap_or(if start.is_some() { EQUILIBRIUM } else { UNLOADED });
-        let wanted = begin == EQUILIBRIUM;
-        let held = if wanted { held_equilibrium(system, start) } else { None };
+    /// Returns the state that the keys describe.
+    pub fn new(system: &System, stated: &InitialState<'_>) -> Start {
+        let wanted = stated.begin == EQUILIBRIUM;
+        let held = if wanted { held_equilibrium(system, stated.start) } else { None };
         let (displacement, states) = match &held {
             Some(held) => (held.displacement().to_vec(), held.joint_states().to_vec()),
-            None => (state_vector(system, start), Vec::new()),
+            None => (state_vector(system, stated.start), Vec::new()),
         };
-        let velocity = state_vector(system, values.by_name("start_velocity"));
+        let velocity = state_vector(system, stated.start_velocity);
         Start { displacement, velocity, states, lacks_equilibrium: wanted && held.is_none() }
     }
 }

@@ -104,7 +104,7 @@ impl DataTable {
         }
         let factor = factor(&found, dimension).map_err(|unit| {
             let message = format!(
-                "the column `{}` of `{}` has the unit {unit}, but {} is expected",
+                "the column `{}` of `{}` has {unit}, but {} is expected",
                 excerpt(&found.column.name),
                 self.name,
                 dimension_text(dimension)
@@ -175,24 +175,30 @@ impl FoundColumn<'_> {
     }
 }
 
-/// Returns the factor from the column to SI of this dimension. The error is the unit of the
-/// column in words.
+/// Returns the factor from the column to SI of this dimension. The error says which unit the
+/// column has.
 fn factor(found: &FoundColumn<'_>, dimension: Dimension) -> Result<f64, String> {
     let stated = [found.unit, found.column.unit.as_str()].into_iter().find(|unit| !unit.is_empty());
     if stated == Some("g") && dimension == Dimension::ACCELERATION {
         return Ok(STANDARD_GRAVITY);
     }
     let unit = match stated {
-        Some(text) => Some(parse_title(text).ok_or_else(|| format!("`{}`", excerpt(text)))?),
+        Some(text) => Some(parse_title(text).ok_or_else(|| format!("the unit `{}`", excerpt(text)))?),
         None => split_name(&found.column.name).map(|(_, unit)| unit),
     };
     match unit {
         Some(unit) if unit.dimension == dimension => Ok(unit.si_value("1")),
         // a radian is a pure number to many programs
-        Some(unit) => Err(format!("`{}` ({})", stated.unwrap_or("in its name"), dimension_text(unit.dimension))),
+        Some(unit) => {
+            let dimension = dimension_text(unit.dimension);
+            Err(match stated {
+                Some(stated) => format!("the unit `{stated}` ({dimension})"),
+                None => format!("a unit of {dimension} in its name"),
+            })
+        }
         // a number without unit is ambiguous as a frequency: hertz or rad/s
-        None if dimension == Dimension::FREQUENCY => Err("Hz or rad/s, which it does not state".to_owned()),
-        None if dimension == Dimension::PRESSURE => Err("Pa or MPa, which it does not state".to_owned()),
+        None if dimension == Dimension::FREQUENCY => Err("the unit Hz or rad/s, which it does not state".to_owned()),
+        None if dimension == Dimension::PRESSURE => Err("the unit Pa or MPa, which it does not state".to_owned()),
         None => Ok(1.0),
     }
 }

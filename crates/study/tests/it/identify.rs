@@ -271,6 +271,93 @@ fn a_ring_down_with_an_unknown_start() {
     }
 }
 
+/// Free decay of the oscillator from a displacement and a velocity: closed form.
+fn decay(t: f64, [k, c]: [f64; 2], displacement: f64, velocity: f64) -> f64 {
+    let (m, rate) = (2.0, c / 4.0);
+    let omega = (k / m - rate * rate).sqrt();
+    (-rate * t).exp()
+        * (displacement * (omega * t).cos() + (velocity + rate * displacement) / omega * (omega * t).sin())
+}
+
+/// Three records of one test: pulled, struck, and the one that is predicted.
+#[test]
+fn every_ring_down_has_its_own_start() {
+    let truth = [2e4, 3.0];
+    let rows = [(2.5e-3, 0.0), (0.0, 0.3), (1e-3, 0.1)].into_iter().enumerate().flat_map(|(record, (x0, v0))| {
+        (0..200).map(move |i| {
+            let t = 2e-3 * f64::from(i);
+            vec![record as f64 + 1.0, t, decay(t, truth, x0, v0)]
+        })
+    });
+    let targets = format!(
+        "{FIT}fit.x0 = {{ from = \"0.1 mm\", to = \"10 mm\" }}\nstart = {{ m = \"x0\" }}\ntargets = [\n\
+         {{ data = \"test\", is = \"ring-down\", at = \"m\", groups = 1 }},\n\
+         {{ data = \"test\", is = \"ring-down\", at = \"m\", groups = 2, start = {{ m = 0 }}, \
+         start_velocity = {{ m = \"0.3 m/s\" }} }},\n\
+         {{ data = \"test\", is = \"ring-down\", at = \"m\", groups = 3, start = {{ m = \"0.4*x0\" }}, \
+         start_velocity = {{ m = \"0.1 m/s\" }}, predict = true }}]"
+    );
+    let dataset = identify(&csv("group,time_s,response_m", rows), &oscillator(&targets, ""));
+    for (name, truth) in [("k", truth[0]), ("c", truth[1]), ("x0", 2.5e-3)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < 1e-5, "{name}: {}", found.value);
+    }
+    let targets = table(&dataset, "fit_targets");
+    assert_eq!(targets.texts("use").expect("uses"), ["fit", "fit", "prediction"]);
+    assert_eq!(targets.integers("rows").expect("rows"), [200; 3]);
+    let (measured, fitted) = (targets.numbers("measured_largest"), targets.numbers("fitted_largest"));
+    for (measured, fitted) in measured.expect("measured").iter().zip(fitted.expect("fitted")) {
+        assert!((fitted / measured - 1.0).abs() < 1e-4, "{fitted} {measured}");
+    }
+    assert!(targets.numbers("relative_deviation").expect("deviations").iter().all(|found| *found < 1e-4));
+}
+
+#[test]
+fn a_ring_down_with_the_wrong_sign_or_unit_is_named() {
+    for (factor, words) in [(-1.0, "opposite sign"), (1e3, "about 1e3 times")] {
+        let rows = (0..400).map(|i| {
+            let t = 2e-3 * f64::from(i);
+            vec![t, factor * decay(t, [2e4, 3.0], 1e-3, 0.0)]
+        });
+        let targets =
+            format!("{FIT}start = {{ m = \"x0\" }}\ntargets = [{{ data = \"test\", is = \"ring-down\", at = \"m\" }}]");
+        let dataset = identify(&csv("time_s,response_m", rows), &oscillator(&targets, ""));
+        let said = dataset.notes.iter().cloned().chain(dataset.failures.iter().map(|failure| failure.reason.clone()));
+        let said: Vec<String> = said.collect();
+        assert!(said.iter().any(|text| text.contains(words)), "{factor}: {said:?}");
+    }
+}
+
+/// An exact fit of as many rows as parameters is no evidence for the model.
+#[test]
+fn rows_without_one_to_spare_have_the_errors_of_their_weight() {
+    let targets = "fit.k = { from = \"1e3 N/m\", to = \"1e5 N/m\" }\ntargets = [{ data = \"test\", is = \"response\", \
+                   at = \"m\", weight = \"relative 2 %\" }]";
+    let data = csv("frequency_Hz,force_N,response_m", [vec![1.0, 1.0, 1.0 / 2e4]]);
+    let dataset = identify(&data, &oscillator(targets, FORCE));
+    let (found, omega) = (estimate(&dataset, "k"), TAU);
+    // |X| = F/|k - 2 ω² + 0.1 i ω|
+    let truth = 2.0 * omega * omega + (4e8 - (0.1 * omega).powi(2)).sqrt();
+    assert!((found.value / truth - 1.0).abs() < 1e-6, "{}", found.value);
+    // d|X|/|X| = -dk (k - 2 ω²)/|k - 2 ω² + 0.1 i ω|², 2 % of |X|
+    let error = 0.02 * 4e8 / (truth - 2.0 * omega * omega);
+    assert!((found.error / error - 1.0).abs() < 1e-4, "{} {error}", found.error);
+    let warned = |text: &String| text.contains("1 measured numbers for 1 parameters: nothing tests the model");
+    assert!(dataset.notes.iter().any(warned), "{:?}", dataset.notes);
+}
+
+#[test]
+fn a_column_of_another_quantity_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("data.csv"), "time_s,response_m_per_s2\n0,1\n1,0.5\n2,0.2\n").expect("the data");
+    let targets =
+        format!("{FIT}start = {{ m = \"x0\" }}\ntargets = [{{ data = \"test\", is = \"ring-down\", at = \"m\" }}]");
+    let name = folder.path().join("study.toml").display().to_string();
+    let error = read_study(&name, &oscillator(&targets, ""), &[]).map(|_| ()).unwrap_err();
+    let help = "add quantity = \"acceleration\" to the target";
+    assert!(error.help_text().is_some_and(|found| found.contains(help)), "{error}");
+}
+
 /// The velocity of one point does not determine the motion of its body: it is refused before the
 /// run, as in a transient.
 #[test]

@@ -13,7 +13,7 @@ mod structure;
 mod text;
 mod warnings;
 
-pub use crate::compile::mesh::contact::ContactSummary;
+pub use crate::compile::mesh::contact::{ContactPair, ContactSummary};
 pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 pub(crate) use text::line;
 

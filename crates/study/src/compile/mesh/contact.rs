@@ -37,10 +37,21 @@ pub struct ContactSummary {
     pub gaps: Option<[f64; 2]>,
     /// Largest angle between both faces, rad.
     pub angle: f64,
+    /// The pairs of all joints, for a picture.
+    pub pairs: Vec<ContactPair>,
     /// Nodes of the first face that no face opposes within the distance.
     pub unpaired: Vec<i64>,
     /// The preload from a static step, if it is stated.
     pub preload: Option<PreloadSummary>,
+}
+
+/// A node of the first face and its counterpart, in the coordinates and the unit of the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactPair {
+    /// The node of the first face.
+    pub node: [f64; 3],
+    /// The point of the second face; `None` on the ground and on a body.
+    pub counterpart: Option<[f64; 3]>,
 }
 
 /// The places and joints of a contact.
@@ -171,6 +182,12 @@ pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Resu
         areas: Vec::new(),
         summary: summary(contact, source, &first, &pairs, unpaired),
     };
+    let in_first = |vector: [f64; 3]| rotation.map_or(vector, |rotation| rotation.in_own(vector));
+    let shown = |pair: &Pair| ContactPair {
+        node: source.mesh.nodes()[pair.node.node].position,
+        counterpart: pair.opposite.as_ref().map(|found| in_first(found.point.position)),
+    };
+    expanded.summary.pairs = pairs.iter().map(shown).collect();
     let mut areas = Vec::with_capacity(pairs.len());
     for pair in &pairs {
         let number = source.number(pair.node.node);
@@ -453,6 +470,7 @@ fn summary(
         area: [paired * square, first.area() * square],
         gaps,
         angle: pairs.iter().map(angle).fold(0.0, f64::max),
+        pairs: Vec::new(),
         unpaired,
         preload: None,
     }
@@ -461,7 +479,9 @@ fn summary(
 impl ContactSummary {
     /// Describes the contact in a line.
     pub(crate) fn text(&self) -> String {
-        let Self { name, between: [first, second], joints, area: [paired, all], gaps, angle, unpaired, preload } = self;
+        let Self {
+            name, between: [first, second], joints, area: [paired, all], gaps, angle, unpaired, preload, ..
+        } = self;
         let number = |value: f64| format_significant(value, 4);
         let mut text = format!(
             "{name}: {joints} joint{} of {first} on {second}, area {} of {} mm^2",

@@ -14,8 +14,10 @@
 //! - `search`: starts and the minimization;
 //! - `profile`: profile likelihood;
 //! - `statistics`: covariance, intervals, undetermined directions, structure of the residuals;
+//! - `agreement`: measured and fitted values of every group;
 //! - `tables`, `figure`: results.
 
+mod agreement;
 mod backbone;
 mod figure;
 mod law_path;
@@ -33,7 +35,7 @@ mod tables;
 mod targets;
 mod weight;
 
-use crate::case::initial_state::{self, begin_values};
+use crate::case::initial_state::{InitialState, begin_values};
 use crate::case::study::Study;
 use crate::case::values::Values;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
@@ -106,6 +108,18 @@ const TARGET: &[Key] = &[
         "false",
         "for a loop: true if the rows are one closed cycle, which is computed twice so that its beginning does not matter",
         "true",
+    ),
+    optional(
+        "start",
+        ValueType::ByName(Dimension::LENGTH),
+        "for a ring-down: initial displacements of this record, if they differ from those of other records",
+        "{ blade1 = \"2 mm\" }",
+    ),
+    optional(
+        "start_velocity",
+        ValueType::ByName(Dimension::VELOCITY),
+        "for a ring-down: initial velocities of this record, if they differ from those of other records",
+        "{ blade1 = \"0.2 m/s\" }",
     ),
     default(
         "predict",
@@ -181,7 +195,14 @@ pub(super) const KIND: Kind = Kind {
         uses_method: false,
         needs: |_, _, _| Ok(()),
         adapts: false,
-        tables: &[tables::PARAMETERS, tables::FIT, tables::SUMMARY, tables::CORRELATIONS, tables::PROFILE],
+        tables: &[
+            tables::PARAMETERS,
+            tables::FIT,
+            tables::TARGETS,
+            tables::SUMMARY,
+            tables::CORRELATIONS,
+            tables::PROFILE,
+        ],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -202,6 +223,8 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
         tables: vec![
             shape(parameters, inputs.varied + 6.0, 3.0),
             shape(rows, inputs.varied + 11.0, 4.0),
+            // at most one group for each row
+            shape(rows, inputs.varied + 8.0, 4.0),
             shape(1.0, inputs.varied + 10.0, 1.0),
             shape(parameters * parameters, inputs.varied + 1.0, 2.0),
             // the estimate and eight points on each side of it
@@ -216,7 +239,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     for target in values.tables("targets").unwrap_or_default() {
         targets::check(target, values, model)?;
     }
-    initial_state::check_names(values, model)
+    InitialState::of(values).check_names(model)
 }
 
 /// Warns of parameters whose value in `[parameters]` is outside of their range.
@@ -270,7 +293,10 @@ struct Identification {
 fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let case = &prepared.case;
-    let mut part = UnitResult { tables: (0..5).map(|_| TableBuilder::default()).collect(), ..UnitResult::default() };
+    let mut part = UnitResult {
+        tables: (0..KIND.info.tables.len()).map(|_| TableBuilder::default()).collect(),
+        ..UnitResult::default()
+    };
     let found = targets::build(work.study, case).map_err(|error| error.message).and_then(|targets| {
         let problem = FitProblem::new(work.study, case, targets, &work.context.stop);
         let settings = SearchSettings::of(&case.values);
@@ -296,13 +322,19 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             warnings.extend(statistics.warnings(&problem));
             part.notes
                 .extend(warnings.into_iter().map(|text| Note::for_case(&case.label(), format!("{WARNING}{text}"))));
-            part.notes.extend(
-                tables::predictions(&problem, &fitted).into_iter().map(|text| Note::for_case(&case.label(), text)),
-            );
+            let agreements = agreement::agreements(&problem, &fitted);
+            let predictions = agreement::predictions(&problem, &agreements);
+            part.notes.extend(predictions.into_iter().map(|text| Note::for_case(&case.label(), text)));
             part.tables = tables::write(
                 work,
                 &problem,
-                &tables::FitOutcome { found: &found, statistics: &statistics, fitted: &fitted, profiles: &profiles },
+                &tables::FitOutcome {
+                    found: &found,
+                    statistics: &statistics,
+                    fitted: &fitted,
+                    agreements: &agreements,
+                    profiles: &profiles,
+                },
             );
             part.count(|| case.label(), CONVERGED, None);
         }

@@ -151,31 +151,34 @@ impl FitProblem {
 
     /// Returns a sentence for each quantity whose measured values differ from the computed ones by
     /// orders of magnitude, as they do in another unit, or have the opposite sign.
+    ///
+    /// Motions over time are compared at their beginning, before a wrong frequency matters.
     pub fn scale_differences(&self, fitted: &[Fitted]) -> Vec<String> {
         let mut sentences = Vec::new();
         for (target, fitted) in self.targets.iter().zip(fitted).filter(|(target, _)| !target.is_predicted()) {
             let names = target.quantities();
+            let rows = beginning(&**target);
             for (k, name) in names.iter().enumerate() {
-                let measured = target.measured().iter().map(|measured| measured.value).skip(k).step_by(names.len());
-                let computed = fitted.values.iter().copied().skip(k).step_by(names.len());
+                let measured = target.measured().iter().map(|measured| measured.value).skip(k);
+                let measured = measured.step_by(names.len()).take(rows);
+                let computed = fitted.values.iter().copied().skip(k).step_by(names.len()).take(rows);
                 let product: f64 = measured.clone().zip(computed.clone()).map(|(a, b)| a * b).sum();
                 let (measured, computed) = (sum_of_squares(measured), sum_of_squares(computed));
+                let values = format!("the measured values of `{name}` in `{}`", target.data());
                 // Correlation of -0.5: noise and a poor model hardly reach it.
                 if product < -0.5 * (measured * computed).sqrt() {
                     sentences.push(format!(
-                        "the measured values of `{name}` in `{}` have the opposite sign of the computed ones: reverse \
-                         the sign of their column.",
-                        target.data()
+                        "{values} have the opposite sign of the computed ones: reverse the sign of their column."
                     ));
                 }
                 let ratio = (measured / computed).sqrt();
                 // Ratio that a poor model hardly reaches, and that most pairs of units exceed.
                 if ratio.is_finite() && ratio > 0.0 && !(0.01..=100.0).contains(&ratio) {
-                    sentences.push(format!(
-                        "the measured values of `{name}` in `{}` are about {ratio:.0e} times the computed ones: check \
-                         the unit of their column.",
-                        target.data()
-                    ));
+                    let advice = match target.first_cycles() {
+                        Some(_) => "check the unit of their column, and that its first row is the initial state",
+                        None => "check the unit of their column",
+                    };
+                    sentences.push(format!("{values} are about {ratio:.0e} times the computed ones: {advice}."));
                 }
             }
         }
@@ -322,6 +325,16 @@ impl FitRange {
     pub(super) fn slope(&self, x: f64) -> f64 {
         if self.is_log { self.at(x) * (self.to / self.from).ln() } else { self.to - self.from }
     }
+}
+
+/// Returns the number of rows before which a motion over time has hardly changed: the first row if
+/// it is not much smaller than the others, otherwise a quarter of a cycle. All rows of other
+/// targets.
+fn beginning(target: &dyn Target) -> usize {
+    let Some(two_cycles) = target.first_cycles() else { return usize::MAX };
+    let largest = target.measured().iter().fold(0.0f64, |largest, row| largest.max(row.value.abs()));
+    let first = target.measured()[0].value.abs();
+    if first > 0.25 * largest { 1 } else { (two_cycles / 8).max(1) }
 }
 
 fn sum_of_squares(values: impl Iterator<Item = f64>) -> f64 {

@@ -1,9 +1,10 @@
-//! Free decays in time, from the initial state that `start` and `start_velocity` state.
+//! Free decays in time, from the initial state that `start` and `start_velocity` of the target or
+//! of the study state.
 //!
 //! The first row is the initial instant. The rows have equal distances.
 
 use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
-use crate::case::initial_state::Start;
+use crate::case::initial_state::{InitialState, Start};
 use crate::case::study::Case;
 use crate::data::ColumnError;
 use stickslip::dimension::Dimension;
@@ -14,6 +15,8 @@ use stickslip_formats::data::Column;
 /// Rows of a free decay.
 #[derive(Debug)]
 pub(super) struct RingDown {
+    /// Index of the target, from 0.
+    index: usize,
     data: String,
     place: String,
     quantity: Quantity,
@@ -44,6 +47,7 @@ impl RingDown {
         let measured =
             (0..time.len()).map(|i| input.measured(i, time[i] - time[0], response[i], deviations[i])).collect();
         Ok(RingDown {
+            index: input.index,
             data: input.data.name.clone(),
             place: input.at.to_owned(),
             quantity,
@@ -84,8 +88,9 @@ impl Target for RingDown {
         let place = system.places().iter().position(|place| *place == self.place);
         let along = place.map(|place| system.place_axes()[place].clone());
         let along = along.ok_or_else(|| format!("there is no place `{}`", self.place))?;
-        let values = &case.values;
-        let start = Start::new(&system, values);
+        let targets = case.values.tables("targets").unwrap_or_default();
+        let own = targets.get(self.index).unwrap_or(&case.values);
+        let start = Start::new(&system, &InitialState::of_record(own, &case.values));
         let history = TimeHistory {
             displacement: start.displacement,
             velocity: start.velocity,

@@ -3,7 +3,8 @@
 //!
 //! With the weighted derivatives `J` of the residuals `r` by the scaled parameters, the covariance
 //! is `s² (JᵀJ)⁻¹`, `s² = Σ r² / (n - p)`: the weights state relative sizes of the errors, and the
-//! residuals their common size. Intervals use Student's distribution. They hold for residuals
+//! residuals their common size. As many residuals as parameters tell no size: then the weights
+//! count as absolute standard deviations. Intervals use Student's distribution. They hold for residuals
 //! without structure and a model that is nearly linear within them.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
 
@@ -112,8 +113,9 @@ pub(super) struct Statistics {
     pub quantile: f64,
     /// Variance of the normalized residuals.
     pub variance: f64,
-    /// Number of residuals.
+    /// Number of residuals, and of those beyond the number of free parameters.
     pub count: usize,
+    freedom: usize,
     /// Root mean square of the residuals, in standard deviations.
     pub rms: f64,
     /// Correlation of residuals in neighbouring rows.
@@ -166,8 +168,9 @@ impl Statistics {
         let n = residuals.len();
         let weights: Vec<f64> = residuals.iter().map(|r| loss.weight(*r)).collect();
         let sum: f64 = residuals.iter().zip(&weights).map(|(r, w)| w * r * r).sum();
-        let freedom = n.saturating_sub(free.len()).max(1);
-        let variance = sum / freedom as f64;
+        let freedom = n.saturating_sub(free.len());
+        // without a residual to spare, only the stated weights tell the size of the errors
+        let variance = if freedom > 0 { sum / freedom as f64 } else { 1.0 };
         let normal = |members: &[usize]| NormalEquations::new(&jacobian, &weights, members);
         let mut covariance: DMatrix<f64> = DMatrix::zeros(p, p);
         let mut squared_step = 0.0;
@@ -184,7 +187,7 @@ impl Statistics {
                 gradient.iter().zip(&change).map(|(slope, change)| slope * change).sum::<f64>().powi(2) / value;
         }
         let undetermined = undetermined(&normal(&problem.all()), variance);
-        let quantile = student_quantile(freedom as f64);
+        let quantile = student_quantile(if freedom > 0 { freedom as f64 } else { f64::INFINITY });
         let in_undetermined = |k: usize| undetermined.iter().any(|direction| direction.parameters.contains(&k));
         let estimate = |k: usize| {
             if at_bound[k] {
@@ -222,6 +225,7 @@ impl Statistics {
             quantile,
             variance: variance.max(f64::MIN_POSITIVE),
             count: n,
+            freedom,
             rms: (residuals.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
             autocorrelation: autocorrelation(problem, &residuals),
             aic: likelihood + 2.0 * parameter_count,
@@ -369,6 +373,14 @@ impl Statistics {
                 name(k)
             )
         }));
+        if self.freedom == 0 {
+            warnings.push(format!(
+                "{} measured numbers for {} parameters: nothing tests the model, and the standard errors are only those \
+                 that `weight` states. Add rows.",
+                self.count,
+                self.parameters.len()
+            ));
+        }
         let significant = 3.0 / (self.count as f64).sqrt();
         if self.autocorrelation > significant && self.rms > EXACT {
             warnings.push(format!(

@@ -1,5 +1,6 @@
 //! Tables of an identification.
 
+use super::agreement::Agreement;
 use super::problem::{DerivativesOf, FitProblem};
 use super::profile::Profile;
 use super::search::Found;
@@ -16,6 +17,8 @@ use stickslip::dimension::Dimension;
 pub(super) const PARAMETERS: &str = "parameters";
 /// Measured and fitted values, row by row.
 pub(super) const FIT: &str = "fit";
+/// Agreement in every group of every target.
+pub(super) const TARGETS: &str = "fit_targets";
 /// Quality of the fit.
 pub(super) const SUMMARY: &str = "fit_summary";
 /// Correlations of the parameters.
@@ -29,6 +32,7 @@ pub(super) struct FitOutcome<'a> {
     pub found: &'a Found,
     pub statistics: &'a Statistics,
     pub fitted: &'a [Fitted],
+    pub agreements: &'a [Agreement],
     /// One profile for each parameter; empty if none was requested.
     pub profiles: &'a [Profile],
 }
@@ -63,7 +67,7 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &FitProblem, outcome: &FitOutc
                 |part: usize| -> Vec<f64> { derivatives[number].row(row * per_row + part).iter().copied().collect() };
             for shown in shown_values(&**target, measured, values, &slopes) {
                 fit.varied(case);
-                fit.text("target", &format!("{} {}", number + 1, target.data()));
+                fit.text("target", &label(problem, number));
                 fit.text("quantity", &names[shown.part]);
                 fit.number("group", measured[0].group);
                 fit.integer("row", measured[0].row as u64);
@@ -79,10 +83,28 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &FitProblem, outcome: &FitOutc
                     fit.number("fitted_phase_deg", shown.phases[1]);
                 }
                 fit.number("normalized_residual", shown.residual);
-                fit.text("use", if target.is_predicted() { "prediction" } else { "fit" });
+                fit.text("use", use_of(&**target));
                 fit.end_row();
             }
         }
+    }
+    let mut targets = TableBuilder::default();
+    for found in outcome.agreements {
+        let target = &problem.targets[found.target];
+        targets.varied(case);
+        targets.text("target", &label(problem, found.target));
+        targets.text("quantity", &found.quantity);
+        targets.number("group", found.group);
+        targets.text("use", use_of(&**target));
+        targets.integer("rows", found.rows as u64);
+        targets.number("rms_residual", found.rms_residual);
+        targets.number("relative_deviation", found.deviation);
+        targets.number("measured_largest", found.measured.value);
+        targets.number("fitted_largest", found.fitted.value);
+        targets.text("x_name", target.abscissa());
+        targets.number("measured_largest_x", found.measured.x);
+        targets.number("fitted_largest_x", found.fitted.x);
+        targets.end_row();
     }
     summary.varied(case);
     summary.integer("residuals", statistics.count as u64);
@@ -117,7 +139,16 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &FitProblem, outcome: &FitOutc
             rises.end_row();
         }
     }
-    vec![parameters, fit, summary, correlations, rises]
+    vec![parameters, fit, targets, summary, correlations, rises]
+}
+
+/// Returns the number and the data of a target, as the tables name it.
+fn label(problem: &FitProblem, target: usize) -> String {
+    format!("{} {}", target + 1, problem.targets[target].data())
+}
+
+fn use_of(target: &dyn Target) -> &'static str {
+    if target.is_predicted() { "prediction" } else { "fit" }
 }
 
 fn correlation(correlations: &DMatrix<f64>, k: usize, l: usize) -> f64 {
@@ -136,17 +167,19 @@ fn si_unit(dimension: Option<Dimension>) -> String {
 }
 
 /// A number as the table shows it: a complex number as magnitude and phase.
-struct ShownValue {
-    part: usize,
-    measured: f64,
-    fitted: f64,
+pub(super) struct ShownValue {
+    /// Index of the quantity of the target.
+    pub part: usize,
+    pub measured: f64,
+    pub fitted: f64,
     slopes: Vec<f64>,
     /// Measured and fitted phase, degrees.
     phases: [f64; 2],
-    residual: f64,
+    pub residual: f64,
 }
 
-fn shown_values(
+/// Returns the numbers of a row, with the derivatives that `slopes` gives for each of its parts.
+pub(super) fn shown_values(
     target: &dyn Target,
     measured: &[Measured],
     values: &[f64],
@@ -176,45 +209,4 @@ fn shown_values(
         phases: [given.arg().to_degrees(), found.arg().to_degrees()],
         residual: residual(0).hypot(residual(1)),
     }]
-}
-
-/// Returns sentences about the targets that were predicted: the largest value and its place, group
-/// by group, and the typical deviation.
-pub(super) fn predictions(problem: &FitProblem, fitted: &[Fitted]) -> Vec<String> {
-    let mut sentences = Vec::new();
-    for (target, fitted) in problem.targets.iter().zip(fitted).filter(|(target, _)| target.is_predicted()) {
-        let per_row = target.quantities().len();
-        let shown: Vec<(Measured, f64, f64)> = target
-            .measured()
-            .chunks(per_row)
-            .zip(fitted.values.chunks(per_row))
-            .flat_map(|(measured, values)| {
-                let one = shown_values(&**target, measured, values, &|_| Vec::new());
-                one.into_iter().take(1).map(|shown| (measured[0], shown.measured, shown.fitted)).collect::<Vec<_>>()
-            })
-            .collect();
-        for group in shown.chunk_by(|a, b| a.0.group == b.0.group) {
-            let highest = |of: &dyn Fn(&(Measured, f64, f64)) -> f64| {
-                group.iter().max_by(|a, b| of(a).abs().total_cmp(&of(b).abs())).map(|row| (of(row), row.0.x))
-            };
-            let (Some(measured), Some(predicted)) = (highest(&|row| row.1), highest(&|row| row.2)) else { continue };
-            let squares: f64 = group.iter().map(|row| (row.2 - row.1).powi(2)).sum();
-            let rms = (squares / group.len() as f64).sqrt() / measured.0.abs();
-            sentences.push(format!(
-                "prediction of `{}`, group {}: largest value {:.6} instead of {:.6} ({:+.2} %), at {} {:.6} instead of {:.6} \
-                 ({:+.3} %); the rows deviate by {:.2} % of the largest value.",
-                target.data(),
-                group[0].0.group,
-                predicted.0,
-                measured.0,
-                100.0 * (predicted.0 / measured.0 - 1.0),
-                target.abscissa(),
-                predicted.1,
-                measured.1,
-                100.0 * (predicted.1 / measured.1 - 1.0),
-                100.0 * rms
-            ));
-        }
-    }
-    sentences
 }

@@ -6,6 +6,7 @@ use super::response::ResponseTarget;
 use super::ring_down::RingDown;
 use super::settled::Settled;
 use super::weight::Weight;
+use crate::case::initial_state::InitialState;
 use crate::case::names::ModelNames;
 use crate::case::study::{Case, Study};
 use crate::case::values::Values;
@@ -144,6 +145,8 @@ pub(super) struct TargetError {
 /// Common input of all kinds of targets, with the data in SI.
 #[derive(Debug)]
 pub(super) struct TargetInput<'a> {
+    /// Index in `targets`, from 0.
+    pub index: usize,
     pub data: &'a DataTable,
     pub values: &'a Values,
     pub case: &'a Case,
@@ -160,13 +163,30 @@ impl TargetInput<'_> {
     /// Returns the numbers of a column in the rows of the target.
     pub fn column(&self, role: &str, dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
         let dimension = if self.case.is_torsional { of_rotation(dimension) } else { dimension };
-        let all = self.data.values(role, dimension)?;
+        let all = self.data.values(role, dimension).map_err(|error| self.with_quantity(role, dimension, error))?;
         let missing = self.rows.iter().find(|row| !all.get(**row).is_some_and(|value| value.is_finite()));
         if let Some(row) = missing {
             let message = format!("row {} of `{}` has no number in the column `{role}`", row + 1, self.data.name);
             return Err(ColumnError { message, help: "remove the row, or state `groups` without it".to_owned() });
         }
         Ok(self.rows.iter().map(|row| all[*row]).collect())
+    }
+
+    /// Gives an error of a unit the advice to state the `quantity`, if the column has the unit of
+    /// another one.
+    fn with_quantity(&self, role: &str, dimension: Dimension, error: ColumnError) -> ColumnError {
+        let of = |quantity: &Quantity| match self.case.is_torsional {
+            true => of_rotation(quantity.dimension()),
+            false => quantity.dimension(),
+        };
+        let has_unit = |other: &&Quantity| self.data.has_unit(role) && self.data.values(role, of(other)).is_ok();
+        match QUANTITIES.iter().find(has_unit) {
+            Some(other) if dimension == of(&self.quantity) => {
+                let help = format!("add quantity = \"{}\" to the target, or name another column", other.name);
+                ColumnError { message: error.message, help }
+            }
+            _ => error,
+        }
     }
 
     /// Returns a column if the data have it.
@@ -230,8 +250,11 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
         Some("settled") if model.joints.iter().any(|joint| joint.name == at) => {}
         Some(kind) => {
             ModelNames::places(model).single_label("targets", "place", at)?;
-            let moves = ["start", "start_velocity"].iter().any(|key| values.by_name(key).is_some());
-            if kind == "ring-down" && !moves {
+            let initial = InitialState::of_record(target, values);
+            if kind == "ring-down" {
+                initial.check_names(model)?;
+            }
+            if kind == "ring-down" && !initial.moves() {
                 let help = "add start = { tip = \"1 mm\" }; if the displacement was not measured, write a fitted parameter there";
                 return Err(KeyError::new("start", "a ring-down needs an initial displacement or velocity", help));
             }
@@ -250,7 +273,7 @@ pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, 
     let mut targets = Vec::new();
     for (i, values) in stated.iter().enumerate() {
         let error = |ColumnError { message, help }| TargetError { number: i + 1, message, help };
-        targets.push(build_one(study, case, values).map_err(error)?);
+        targets.push(build_one(study, case, i, values).map_err(error)?);
     }
     if targets.iter().all(|target| target.is_predicted()) {
         let message = "no rows are fitted: every target has predict = true".to_owned();
@@ -262,7 +285,7 @@ pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, 
 /// Largest number of groups that an error lists.
 const MAX_GROUPS: usize = 8;
 
-fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Target>, ColumnError> {
+fn build_one(study: &Study, case: &Case, index: usize, values: &Values) -> Result<Box<dyn Target>, ColumnError> {
     let name = values.text("data").unwrap_or_default();
     let data = DataTable::find_in(&study.data, name)?;
     let all = if data.has("group") { data.plain_values("group")? } else { vec![0.0; data.rows()] };
@@ -288,6 +311,7 @@ fn build_one(study: &Study, case: &Case, values: &Values) -> Result<Box<dyn Targ
     }
     let quantity = Quantity::of(values, "quantity").unwrap_or(QUANTITIES[0]);
     let input = TargetInput {
+        index,
         data,
         values,
         case,

@@ -1,0 +1,80 @@
+//! A picture of the contacts of a mesh as PNG: the nodes of every contact in its colour, lines to
+//! their counterparts, and the nodes without one. Nothing hides them, because most contacts are
+//! inside of the assembly.
+
+use crate::figure::mesh_picture::{Canvas, LegendEntry, colour};
+use crate::output::result_file::ReportError;
+use stickslip_formats::mesh::Mesh;
+use stickslip_study::summary::{ContactPair, ContactSummary};
+
+/// Colour of nodes without a counterpart.
+const UNPAIRED: &str = "#d00000";
+
+/// Returns a picture of the contacts of a mesh with a title.
+///
+/// # Errors
+/// [`ReportError`] if the picture cannot be drawn.
+pub fn contact_picture(mesh: &Mesh, contacts: &[ContactSummary], title: &str) -> Result<Vec<u8>, ReportError> {
+    let mut canvas = Canvas::new(mesh)?;
+    let mut legend = Vec::new();
+    let seen = |canvas: &Canvas, points: &[[f64; 3]]| {
+        let seen: Vec<[f64; 3]> = points.iter().map(|point| canvas.view.of(*point)).collect();
+        canvas.pixels_of(&seen)
+    };
+    for (number, contact) in contacts.iter().enumerate() {
+        let ends = |pair: &ContactPair| pair.counterpart.map(|other| [pair.node, other]);
+        let ends: Vec<[f64; 3]> = contact.pairs.iter().filter_map(ends).flatten().collect();
+        let lines: Vec<_> = seen(&canvas, &ends).chunks_exact(2).map(|ends| [ends[0], ends[1]]).collect();
+        canvas.lines(&lines, "#222222");
+        let nodes: Vec<[f64; 3]> = contact.pairs.iter().map(|pair| pair.node).collect();
+        let at = seen(&canvas, &nodes);
+        canvas.dots(&at, colour(number), 5.0);
+        legend.push(LegendEntry { name: contact.name.clone(), count: contact.joints, colour: colour(number) });
+    }
+    let is_unpaired = |number: &i64| contacts.iter().any(|contact| contact.unpaired.contains(number));
+    let unpaired = mesh.nodes().iter().filter(|node| is_unpaired(&node.number)).map(|node| node.position);
+    let unpaired: Vec<[f64; 3]> = unpaired.collect();
+    if !unpaired.is_empty() {
+        let at = seen(&canvas, &unpaired);
+        canvas.circles(&at, UNPAIRED, 8.0);
+        let entry = LegendEntry { name: "no counterpart".to_owned(), count: unpaired.len(), colour: UNPAIRED };
+        legend.insert(0, entry);
+    }
+    canvas.finish(mesh, title, &legend)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use resvg::tiny_skia::Pixmap;
+    use stickslip_formats::mesh::read_bytes;
+
+    /// Two nodes inside of the assembly have a counterpart below them, and a third has none.
+    #[test]
+    fn nodes_of_contacts_are_seen_through_the_mesh() {
+        let text = "*NODE\n1,0,0,0\n2,2,0,0\n3,2,1,0\n4,0,1,0\n5,0,0,1\n6,2,0,1\n7,2,1,1\n8,0,1,1\n\
+            *ELEMENT,TYPE=C3D8\n1,1,2,3,4,5,6,7,8\n";
+        let mesh = read_bytes(text.as_bytes()).unwrap();
+        let pair = |x: f64| ContactPair { node: [x, 0.5, 0.7], counterpart: Some([x, 0.5, 0.2]) };
+        let contact = ContactSummary {
+            name: "pad".to_owned(),
+            joints: 2,
+            pairs: vec![pair(0.5), pair(1.5)],
+            unpaired: vec![7],
+            ..ContactSummary::default()
+        };
+        let picture = contact_picture(&mesh, &[contact], "contacts").unwrap();
+        let picture = Pixmap::decode_png(&picture).unwrap();
+        let count = |colour: &str| {
+            let rgb = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap());
+            picture.pixels().iter().filter(|p| [p.red(), p.green(), p.blue()] == rgb).count() as f64
+        };
+        // a dot has a radius of 5 pixels, a circle one of 8, the mark in the legend one of 8
+        let (dot, circle, mark) = (25.0, 8.0 * 2.0 * 2.5, 64.0);
+        for (colour, marks) in [(colour(0), 2.0 * dot), (UNPAIRED, circle)] {
+            let expected = std::f64::consts::PI * (marks + mark);
+            let found = count(colour);
+            assert!((0.7 * expected..1.2 * expected).contains(&found), "{colour}: {found} for {expected}");
+        }
+    }
+}
