@@ -83,6 +83,11 @@ impl fmt::Debug for StopFlag {
     }
 }
 
+/// Returns the flag of this thread, for threads that receive work from it.
+pub fn thread_flag() -> Option<StopFlag> {
+    THREAD_FLAG.with_borrow(Clone::clone)
+}
+
 /// Sets or removes the flag of this thread, for threads that receive work from
 /// others. The flag stays until the next call.
 pub fn set_thread_flag(stop: Option<StopFlag>) {
@@ -102,7 +107,7 @@ impl Drop for FlagGuard {
 #[inline]
 pub fn check() {
     // Cloned, not borrowed: `callback` may run a computation that has a flag too.
-    if let Some(stop) = THREAD_FLAG.with_borrow(Clone::clone)
+    if let Some(stop) = thread_flag()
         && (stop.is_set() || stop.0.callback.as_ref().is_some_and(|callback| callback()))
     {
         stop.set();
@@ -114,8 +119,7 @@ pub fn check() {
 ///
 /// Returns normally if the thread has no flag.
 pub fn throw(reason: Box<dyn Any + Send>) {
-    let flag = THREAD_FLAG.with_borrow(Clone::clone);
-    if let Some(stop) = flag {
+    if let Some(stop) = thread_flag() {
         stop.set();
         resume_unwind(reason);
     }

@@ -14,6 +14,7 @@ pub mod golden_section;
 pub mod interrupt;
 pub mod min_norm;
 mod null_space;
+pub mod parallel;
 pub mod quadratic_modes;
 pub mod quadrature;
 pub mod radau;

@@ -25,8 +25,10 @@ use crate::structure::sector::{is_real, wave_entries};
 use crate::structure::sector_boundary::{Blade, symmetrized};
 use crate::structure::{CyclicSector, RingEntry, unit_root};
 use nalgebra::DMatrix;
+use std::borrow::Cow;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
+use stickslip_numerics::parallel::try_map;
 use stickslip_numerics::sparse::multi_vector;
 
 /// Orders of residual vectors, with the relative eigenvalue of the vectors' Gram matrix below
@@ -42,6 +44,15 @@ pub(super) const HALF_WIDTH: f64 = 1e-3;
 /// Largest number of samples in the comparison of a wave; each needs a factorization of twice
 /// the size of a sector.
 const SAMPLES: usize = 5;
+
+/// Largest number of waves that are computed at once, on as many threads: each needs a
+/// factorization, and that of 60,000 rows takes half a gigabyte.
+const WAVES_AT_ONCE: usize = 4;
+
+/// Returns the number of threads for waves.
+fn threads() -> usize {
+    rayon::current_num_threads().min(WAVES_AT_ONCE)
+}
 
 /// The size of a basis of a sector whose error was within its tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,14 +149,14 @@ impl CyclicSector {
         let SectorBasis { extent, order, share, level } = basis;
         let mut waves = WaveCollection { sector: self, seen, blade: None, computed: Vec::new() };
         let taken = self.diameters(level);
-        for &diameter in &taken {
+        waves.computed = try_map(taken.iter().copied(), threads(), |diameter| -> Result<_, ReductionError> {
             let whole = self.wave(diameter, seen)?;
             let modes = whole.modes(extent * up_to)?;
             let mut wave = ComputedWave::new(diameter, whole, (modes, extent), None);
             wave.vectors(order, self.dofs)?;
             wave.whole = None;
-            waves.computed.push(wave);
-        }
+            Ok(wave)
+        })?;
         let reduced = waves.basis(&taken, (order, share), ReductionKind::Rubin)?;
         let unknown = ReductionDeviation { error: f64::NAN, omega: up_to };
         Ok(SectorReduction { basis: Some(basis), ..waves.chosen(reduced, unknown, (up_to, up_to)) })
@@ -170,25 +181,31 @@ impl WaveCollection<'_> {
         taken: &[usize],
     ) -> Result<(), ReductionError> {
         let (sector, seen) = (self.sector, self.seen);
-        for &diameter in diameters {
-            match self.computed.iter_mut().find(|wave| wave.diameter == diameter) {
-                Some(wave) if wave.extent >= extent => {}
-                Some(wave) => {
-                    let modes = wave.whole(|diameter| sector.wave(diameter, seen))?.modes(extent * up_to)?;
-                    wave.set_modes(modes, extent);
-                }
-                None => {
-                    let whole = self.sector.wave(diameter, self.seen)?;
-                    let modes = whole.modes(extent * up_to)?;
-                    let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
-                    self.computed.push(ComputedWave::new(diameter, whole, (modes, extent), Some(reference)));
-                }
-            }
-            // the matrices of all waves at once would be the largest part of the memory
-            for wave in self.computed.iter_mut().filter(|wave| !taken.contains(&wave.diameter)) {
+        let known = |wave: &ComputedWave| diameters.contains(&wave.diameter);
+        let new = diameters.iter().filter(|diameter| self.computed.iter().all(|wave| wave.diameter != **diameter));
+        // the matrices of all waves at once would be the largest part of the memory
+        let dropped = |wave: &mut ComputedWave| {
+            if !taken.contains(&wave.diameter) {
                 wave.whole = None;
             }
-        }
+        };
+        let computed = try_map(new.copied(), threads(), |diameter| -> Result<_, ReductionError> {
+            let whole = sector.wave(diameter, seen)?;
+            let modes = whole.modes(extent * up_to)?;
+            let reference = ReferenceReceptance::with_samples(&whole, &modes, up_to, SAMPLES)?;
+            let mut wave = ComputedWave::new(diameter, whole, (modes, extent), Some(reference));
+            dropped(&mut wave);
+            Ok(wave)
+        })?;
+        let extended = self.computed.iter_mut().filter(|wave| known(wave) && wave.extent < extent);
+        try_map(extended, threads(), |wave| -> Result<(), ReductionError> {
+            let modes = wave.whole(|diameter| sector.wave(diameter, seen))?.modes(extent * up_to)?;
+            wave.set_modes(modes, extent);
+            dropped(wave);
+            Ok(())
+        })?;
+        self.computed.iter_mut().for_each(dropped);
+        self.computed.extend(computed);
         Ok(())
     }
 
@@ -300,21 +317,28 @@ impl WaveCollection<'_> {
         let n = self.sector.dofs;
         let (mut vectors, mut counts): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut modes = 0;
-        let (sector, seen) = (self.sector, self.seen);
-        for wave in self.computed.iter_mut().filter(|wave| diameters.contains(&wave.diameter)) {
-            if !wave.has_vectors(order) || kind == ReductionKind::CraigBampton || self.blade.is_some() {
+        let (sector, seen, blade) = (self.sector, self.seen, self.blade);
+        let taken = self.computed.iter_mut().filter(|wave| diameters.contains(&wave.diameter));
+        let own_vectors = try_map(taken, threads(), |wave| -> Result<_, ReductionError> {
+            if !wave.has_vectors(order) || kind == ReductionKind::CraigBampton || blade.is_some() {
                 wave.whole(|diameter| sector.wave(diameter, seen))?;
             }
-            match kind {
-                ReductionKind::Rubin => vectors.extend(wave.vectors(order, n)?),
-                ReductionKind::CraigBampton => vectors.extend(wave.craig_bampton()?),
+            let of_blade = blade.map(|(blade, up_to)| wave.blade_vectors(blade, up_to, order, n)).transpose()?;
+            let (diameter, modes) = (wave.diameter, wave.modes.count());
+            let mut own = match kind {
+                ReductionKind::Rubin => Cow::Borrowed(wave.vectors(order, n)?),
+                ReductionKind::CraigBampton => Cow::Owned(wave.craig_bampton()?),
+            };
+            if let Some(of_blade) = of_blade {
+                own.to_mut().extend(of_blade);
             }
-            if let Some((blade, up_to)) = self.blade {
-                vectors.extend(wave.blade_vectors(blade, up_to, order, n)?);
-            }
-            modes = modes.max(wave.modes.count());
+            Ok((diameter, modes, own))
+        })?;
+        for (diameter, count, own) in own_vectors {
+            vectors.extend_from_slice(&own);
+            modes = modes.max(count);
             // a vector and its partner split into the same columns
-            let both = kind == ReductionKind::Rubin && !is_real(wave.diameter, sector.sectors);
+            let both = kind == ReductionKind::Rubin && !is_real(diameter, sector.sectors);
             counts.resize(vectors.len() / n.max(1), if both { 2.0 } else { 1.0 });
         }
         let basis = self.independent(&vectors, &counts, share)?;
@@ -405,7 +429,7 @@ impl WaveCollection<'_> {
         up_to: f64,
     ) -> Result<Vec<(usize, ReductionDeviation)>, ReductionError> {
         let waves = self.computed.iter().filter(|wave| diameters.contains(&wave.diameter));
-        let deviation = |wave: &ComputedWave| {
+        try_map(waves, threads(), |wave| {
             let small = reduced.wave(wave.diameter, self.sector.sectors)?;
             let of_ports = wave.reference.as_ref().map(|reference| reference.deviation(&small));
             let own = small.frequencies().unwrap_or_default();
@@ -421,8 +445,7 @@ impl WaveCollection<'_> {
                 ReductionDeviation { error, omega }
             });
             Ok((wave.diameter, largest(shifts.chain(of_ports))))
-        };
-        waves.map(deviation).collect()
+        })
     }
 }
 
@@ -476,9 +499,11 @@ impl ReducedSector {
         // damping by the modes of every wave; C of a sector is the phase-weighted mean over the
         // waves
         let mut between = vec![DMatrix::<f64>::zeros(r, r); sectors];
-        for diameter in 0..=sectors / 2 {
+        let waves = try_map(0..=sectors / 2, threads(), |diameter| {
             let wave = self.wave(diameter, sectors)?;
-            let own = damping(by, &wave.mass, &wave.stiffness, None)?;
+            damping(by, &wave.mass, &wave.stiffness, None)
+        })?;
+        for (diameter, own) in waves.into_iter().enumerate() {
             let real = is_real(diameter, sectors);
             let share = if real { 1.0 } else { 2.0 } / sectors as f64;
             for (shift, sum) in between.iter_mut().enumerate() {
