@@ -43,7 +43,8 @@ pub enum Command {
         /// 2GB, or the free memory if that is less]
         #[arg(long, value_name = "SIZE", value_parser = bytes)]
         memory: Option<u64>,
-        /// Write only these outputs: csv, parquet, json, fitted, svg, png, html (comma-separated)
+        /// Write only these outputs: csv, parquet, json, fitted, vtk, motion, svg, png,
+        /// html (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
         /// Also write these outputs: parquet
@@ -81,7 +82,8 @@ pub enum Command {
         /// Folder of the results; the study gets a subfolder with its name
         #[arg(short, long, default_value = "stickslip-out")]
         out: PathBuf,
-        /// Write only these outputs: csv, parquet, json, fitted, svg, png, html (comma-separated)
+        /// Write only these outputs: csv, parquet, json, fitted, vtk, motion, svg, png,
+        /// html (comma-separated)
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
         /// Also write these outputs: parquet

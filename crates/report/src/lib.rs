@@ -3,6 +3,7 @@
 //! The input is a [`Dataset`]. The outputs are:
 //! - tables (`*.csv`, `*.parquet`) and the record (`record.json`),
 //! - static figures (`figure.svg`, `figure.png`) and an interactive figure (`figure.html`),
+//! - motions of a mesh, for ParaView (`fields.pvd`) and as a page (`motion.html`),
 //! - a summary for the terminal,
 //! - a report page.
 //!
@@ -50,7 +51,9 @@
 
 mod base64;
 pub mod compare;
+mod fields;
 mod figure;
+mod moving_surface;
 pub mod output;
 pub mod page;
 mod run;
@@ -61,6 +64,7 @@ mod samples;
 
 pub use base64::base64;
 pub use figure::{contact_picture::contact_picture, html, mesh_picture::mesh_picture, png, svg};
+pub use moving_surface::moving_surface;
 pub use output::folder::check_writable;
 pub use output::result_file::{Output, ReportError, write_file};
 pub use output::{Outputs, write_dataset};

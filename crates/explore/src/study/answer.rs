@@ -5,7 +5,6 @@ use super::description::cases;
 use super::fit;
 use super::measured;
 use super::response_quantity::ResponseQuantity;
-use super::solid;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use stickslip_report::html;
@@ -46,7 +45,7 @@ pub fn answer(study: &Study, dataset: &Dataset, tables: Tables, quantity: Option
         "cases": cases(study),
         "tables": tables_json(&dataset.tables, tables),
         "fitted": fit::fitted(study, dataset),
-        "solid": (tables == Tables::Motion).then(|| solid::solid(dataset)),
+        "solid": (tables == Tables::Motion).then(|| stickslip_report::moving_surface(dataset)),
         "notes": dataset.notes,
         "failures": dataset.failures.iter().take(NAMED_FAILURES).collect::<Vec<_>>(),
         "failed": dataset.failures.len(),

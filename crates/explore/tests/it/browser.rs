@@ -626,6 +626,41 @@ fn a_structure_with_a_mesh_turns_in_three_dimensions() {
     browser.check_clean();
 }
 
+/// `motion.html` draws the surface of a mesh with its contact nodes, moves, and turns.
+#[test]
+fn a_written_motion_is_drawn_and_turns() {
+    let Some(mut browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = solid::bar(folder.path());
+    let text = std::fs::read_to_string(&file).unwrap();
+    let (model, _) = text.split_once("[study]").unwrap();
+    let text = format!("{model}[study]\nkind = \"orbit\"\nfrequency = \"50 Hz\"\nfields = 8\n");
+    let study = read_study(&file.display().to_string(), &text, &[]).unwrap();
+    let dataset = run(&study, &Context::without_progress(1)).unwrap();
+    let outputs = stickslip_report::Outputs::select(&["motion"]).unwrap();
+    stickslip_report::write_dataset(&dataset, folder.path(), &outputs).unwrap();
+    browser.go(&format!("file://{}", folder.path().join("bar/motion.html").display()));
+    browser.wait_long("document.getElementById('motion')?.data?.length === 2");
+    // ten faces of two triangles, and the five nodes that have a contact
+    assert_eq!(browser.number("document.getElementById('motion').data[0].i.length"), 20.0);
+    assert_eq!(browser.number("document.getElementById('motion').data[1].x.length"), 5.0);
+    let height = "document.getElementById('motion').data[0].z.reduce((sum, z) => sum + z * z, 0)";
+    browser.evaluate("document.getElementById('play').click()");
+    browser.wait("document.getElementById('play').textContent === 'Play'");
+    let still = browser.number(height);
+    browser.evaluate("(() => { const time = document.getElementById('time'); time.value = (Number(time.value) + 0.25) % 1; time.dispatchEvent(new Event('input')); })()");
+    browser.wait(&format!("{height} !== {still}"));
+    let eye = "document.getElementById('motion').layout.scene.camera.eye.x";
+    let before = browser.number(eye);
+    browser.evaluate(
+        "document.getElementById('motion').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' }))",
+    );
+    browser.wait(&format!("Math.abs({eye} - {before}) > 0.01"));
+    assert!(browser.text("document.getElementById('factor').textContent").starts_with("displacements × "));
+    browser.picture("motion");
+    browser.check_clean();
+}
+
 /// A fit starts at the sliders, shows errors, and moves the sliders to its values.
 #[test]
 fn a_fit_moves_the_sliders_to_the_measured_curve() {

@@ -2,7 +2,7 @@
 //! their counterparts, and the nodes without one. Nothing hides them, because most contacts are
 //! inside of the assembly.
 
-use crate::figure::mesh_picture::{Canvas, LegendEntry, colour};
+use crate::figure::mesh_picture::{Canvas, PictureLegendEntry, colour};
 use crate::output::result_file::ReportError;
 use stickslip_formats::mesh::Mesh;
 use stickslip_study::summary::{ContactPair, ContactSummary};
@@ -29,7 +29,7 @@ pub fn contact_picture(mesh: &Mesh, contacts: &[ContactSummary], title: &str) ->
         let nodes: Vec<[f64; 3]> = contact.pairs.iter().map(|pair| pair.node).collect();
         let at = seen(&canvas, &nodes);
         canvas.dots(&at, colour(number), 5.0);
-        legend.push(LegendEntry { name: contact.name.clone(), count: contact.joints, colour: colour(number) });
+        legend.push(PictureLegendEntry { name: contact.name.clone(), count: contact.joints, colour: colour(number) });
     }
     let is_unpaired = |number: &i64| contacts.iter().any(|contact| contact.unpaired.contains(number));
     let unpaired = mesh.nodes().iter().filter(|node| is_unpaired(&node.number)).map(|node| node.position);
@@ -37,7 +37,7 @@ pub fn contact_picture(mesh: &Mesh, contacts: &[ContactSummary], title: &str) ->
     if !unpaired.is_empty() {
         let at = seen(&canvas, &unpaired);
         canvas.circles(&at, UNPAIRED, 8.0);
-        let entry = LegendEntry { name: "no counterpart".to_owned(), count: unpaired.len(), colour: UNPAIRED };
+        let entry = PictureLegendEntry { name: "no counterpart".to_owned(), count: unpaired.len(), colour: UNPAIRED };
         legend.insert(0, entry);
     }
     canvas.finish(mesh, title, &legend)

@@ -92,7 +92,7 @@ pub(super) struct Canvas {
 }
 
 /// An entry of the legend: a name, a number of nodes, and the colour of its marks.
-pub(super) struct LegendEntry {
+pub(super) struct PictureLegendEntry {
     pub name: String,
     pub count: usize,
     pub colour: &'static str,
@@ -166,7 +166,7 @@ impl Canvas {
     }
 
     /// Adds title, legend, extent and axes, and returns the picture as PNG.
-    pub fn finish(mut self, mesh: &Mesh, title: &str, legend: &[LegendEntry]) -> Result<Vec<u8>, ReportError> {
+    pub fn finish(mut self, mesh: &Mesh, title: &str, legend: &[PictureLegendEntry]) -> Result<Vec<u8>, ReportError> {
         draw_on(&labels(mesh, title, legend, &self.view, self.settings), &mut self.pixels)?;
         self.pixels.encode_png().map_err(|error| failed(&error))
     }
@@ -202,12 +202,12 @@ pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
     for (number, at) in dots.iter().enumerate() {
         canvas.dots(at, colour(number), 5.0);
     }
-    let entry = |(number, (name, nodes)): (usize, &(String, Vec<usize>))| LegendEntry {
+    let entry = |(number, (name, nodes)): (usize, &(String, Vec<usize>))| PictureLegendEntry {
         name: name.clone(),
         count: nodes.len(),
         colour: colour(number),
     };
-    let legend: Vec<LegendEntry> = shown.iter().enumerate().map(entry).collect();
+    let legend: Vec<PictureLegendEntry> = shown.iter().enumerate().map(entry).collect();
     canvas.finish(mesh, title, &legend)
 }
 
@@ -289,7 +289,7 @@ pub(super) fn colour(number: usize) -> &'static str {
 }
 
 /// Returns title, legend, extent and axes as SVG.
-fn labels(mesh: &Mesh, title: &str, legend: &[LegendEntry], view: &View, settings: PictureSettings) -> String {
+fn labels(mesh: &Mesh, title: &str, legend: &[PictureLegendEntry], view: &View, settings: PictureSettings) -> String {
     let PictureSettings { size: [width, height], margins, .. } = settings;
     let escaped = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
     let mut svg = format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\">");
@@ -309,7 +309,7 @@ fn labels(mesh: &Mesh, title: &str, legend: &[LegendEntry], view: &View, setting
     text(margins[0] + 150.0, height - 40.0, 22, &format!("{count}; {extent}"));
     let (left, mut y) = (width - margins[2] + 50.0, margins[1] + 20.0);
     let mut marks = String::new();
-    for LegendEntry { name, count, colour } in legend.iter().take(settings.sets) {
+    for PictureLegendEntry { name, count, colour } in legend.iter().take(settings.sets) {
         let mut short: String = name.chars().take(settings.name_length).collect();
         if short.len() < name.len() {
             short.push('…');

@@ -2,12 +2,13 @@
 //!
 //! - `result_file`: a file of results, an output, and the errors of writing.
 //! - `folder`: replaces the results of a run completely or not at all.
-//! - `csv`, `parquet`, `json`, `fitted`, `vtk`: one output each; figures are in `figure`.
+//! - `csv`, `parquet`, `json`, `fitted`, `vtk`, `motion`: one output each; figures are in `figure`.
 
 pub mod csv;
 pub mod fitted;
 pub mod folder;
 pub mod json;
+pub mod motion;
 pub mod parquet;
 pub mod result_file;
 pub mod vtk;
@@ -24,6 +25,7 @@ pub static TABLE: &[Output] = &[
     json::OUTPUT,
     fitted::OUTPUT,
     vtk::OUTPUT,
+    motion::OUTPUT,
     crate::figure::svg::OUTPUT,
     crate::figure::png::OUTPUT,
     crate::figure::html::OUTPUT,

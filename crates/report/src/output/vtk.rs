@@ -9,12 +9,12 @@
 //! Source: VTK file formats, "XML file formats"; ParaView wiki, "ParaView/Data formats", PVD.
 
 use crate::base64::base64;
+use crate::fields::{Fields, contact_state, positions};
 use crate::output::result_file::{File, Output, ReportError};
-use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::ops::Range;
 use stickslip_formats::mesh::{Mesh, vtk_cell_type};
-use stickslip_study::dataset::{Dataset, FIELDS, MeshSource, Table};
+use stickslip_study::dataset::{Dataset, MeshSource};
 
 /// The output `vtk`.
 pub const OUTPUT: Output = Output {
@@ -26,9 +26,7 @@ pub const OUTPUT: Output = Output {
 };
 
 fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
-    let table = dataset.tables.iter().find(|table| table.name == FIELDS);
-    let Some((table, source)) = table.zip(dataset.mesh.as_ref()) else { return Ok(Vec::new()) };
-    let Some(fields) = Fields::new(table) else { return Ok(Vec::new()) };
+    let Some((fields, source)) = Fields::of(dataset) else { return Ok(Vec::new()) };
     let (mut files, orbits) = (Vec::new(), fields.orbits());
     let grid = Grid::new(source, fields.sectors());
     for (number, orbit) in orbits.iter().enumerate() {
@@ -46,72 +44,6 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     Ok(files)
 }
 
-/// The columns of the table.
-struct Fields<'a> {
-    table: &'a Table,
-    time: &'a [f64],
-    /// The sector of a disk.
-    sector: Option<&'a [u64]>,
-    node: &'a [u64],
-    displacement: [&'a [f64]; 3],
-    /// Results of earlier versions have none.
-    velocity: Option<[&'a [f64]; 3]>,
-    /// Shapes of modes have none.
-    contact: Option<&'a [String]>,
-    /// Names and columns of quantities per area; results of earlier versions have none.
-    per_area: Vec<(&'static str, &'a [f64])>,
-}
-
-impl<'a> Fields<'a> {
-    fn new(table: &'a Table) -> Option<Fields<'a>> {
-        let vector = |unit: &str| {
-            let [x, y, z] = ["x", "y", "z"].map(|axis| table.numbers(&format!("{axis}_{unit}")));
-            Some([x?, y?, z?])
-        };
-        Some(Fields {
-            table,
-            time: table.numbers("time_s")?,
-            sector: table.integers("sector"),
-            node: table.integers("node")?,
-            displacement: vector("m")?,
-            velocity: vector("m_per_s"),
-            contact: table.texts("contact"),
-            per_area: [("pressure", "pressure_Pa"), ("friction", "friction_Pa"), ("loss", "loss_J_per_m2")]
-                .into_iter()
-                .filter_map(|(name, column)| Some((name, table.numbers(column)?)))
-                .collect(),
-        })
-    }
-
-    /// Returns the number of sectors.
-    fn sectors(&self) -> usize {
-        let last = self.sector.and_then(|sector| sector.iter().max());
-        last.map_or(1, |last| usize::try_from(*last).map_or(1, |last| last + 1))
-    }
-
-    /// Returns the rows of each orbit: time does not fall within it.
-    fn orbits(&self) -> Vec<Range<usize>> {
-        let frequency = self.table.numbers("frequency_Hz").unwrap_or_default();
-        let begins = |row: &usize| {
-            let row = *row;
-            row == 0 || self.time[row] < self.time[row - 1] || frequency.get(row) != frequency.get(row - 1)
-        };
-        ranges(0..self.time.len(), begins)
-    }
-
-    /// Returns the rows of each instant of an orbit.
-    fn instants(&self, orbit: &Range<usize>) -> Vec<Range<usize>> {
-        ranges(orbit.clone(), |row| *row == orbit.start || self.time[*row] != self.time[*row - 1])
-    }
-}
-
-/// Divides rows into ranges that begin where `begins` says.
-fn ranges(rows: Range<usize>, begins: impl Fn(&usize) -> bool) -> Vec<Range<usize>> {
-    let mut starts: Vec<usize> = rows.clone().filter(begins).collect();
-    starts.push(rows.end);
-    starts.windows(2).map(|pair| pair[0]..pair[1]).collect()
-}
-
 /// The part of the files that does not depend on time.
 struct Grid<'a> {
     mesh: &'a Mesh,
@@ -121,15 +53,9 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn new(source: &'a MeshSource, sectors: usize) -> Grid<'a> {
-        let MeshSource { mesh, length, axis } = source;
+        let mesh = &source.mesh;
         let (nodes, elements) = (mesh.nodes(), mesh.elements());
-        let points = (0..sectors).flat_map(|sector| {
-            let rotation = axis.map(|axis| axis.rotation(TAU * sector as f64 / sectors as f64));
-            nodes.iter().flat_map(move |node| {
-                let own = node.position.map(|x| x * length);
-                rotation.map_or(own, |to| to.map(|row| row[0] * own[0] + row[1] * own[1] + row[2] * own[2]))
-            })
-        });
+        let points = (0..sectors).flat_map(|sector| positions(source, sector, sectors));
         let all = (0..sectors * elements.len()).flat_map(|element| {
             let (sector, element) = (element / elements.len(), element % elements.len());
             let first = (sector * nodes.len()) as u32;
@@ -148,7 +74,7 @@ impl<'a> Grid<'a> {
         );
         head += &format!(
             "<Points>\n{}</Points>\n<Cells>\n",
-            array("Float64", "Points", 3, points.flat_map(f64::to_le_bytes))
+            array("Float64", "Points", 3, points.flatten().flat_map(f64::to_le_bytes))
         );
         head += &array("UInt32", "connectivity", 1, all.flat_map(u32::to_le_bytes));
         head += &array("UInt32", "offsets", 1, ends.flat_map(u32::to_le_bytes));
@@ -178,13 +104,7 @@ impl<'a> Grid<'a> {
         if let Some(states) = fields.contact {
             let mut contact = vec![0u8; count];
             for (row, point) in &points {
-                contact[*point] = match states[*row].as_str() {
-                    "" => 0,
-                    "open" => 1,
-                    "touch" => 2,
-                    "stick" => 3,
-                    _ => 4,
-                };
+                contact[*point] = contact_state(&states[*row]);
             }
             text += &array("UInt8", "contact", 1, contact.into_iter());
         }
@@ -212,7 +132,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
     use stickslip_formats::mesh::read_bytes;
-    use stickslip_study::dataset::{CellValues, Column};
+    use stickslip_study::dataset::{CellValues, Column, Table};
 
     /// Two orbits of two instants on a tetrahedron; the third node is not in the table.
     #[test]
