@@ -26,13 +26,13 @@ pub(crate) fn begin_values() -> Vec<(&'static str, &'static str)> {
 
 /// The keys that state an initial state.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct InitialState<'a> {
+pub(crate) struct StartKeys<'a> {
     start: Option<&'a BTreeMap<String, f64>>,
     start_velocity: Option<&'a BTreeMap<String, f64>>,
     begin: &'a str,
 }
 
-impl<'a> InitialState<'a> {
+impl<'a> StartKeys<'a> {
     /// Reads `start`, `start_velocity` and `begin` of `[study]`.
     pub fn of(values: &'a Values) -> Self {
         Self::of_record(values, values)
@@ -44,7 +44,7 @@ impl<'a> InitialState<'a> {
         let given = |key: &str| record.by_name(key).or_else(|| study.by_name(key));
         let (start, start_velocity) = (given("start"), given("start_velocity"));
         let default = if start.is_some() { EQUILIBRIUM } else { UNLOADED };
-        InitialState { start, start_velocity, begin: study.text("begin").unwrap_or(default) }
+        StartKeys { start, start_velocity, begin: study.text("begin").unwrap_or(default) }
     }
 
     /// Returns whether something is displaced or moves at the beginning.
@@ -86,7 +86,7 @@ pub(crate) struct Start {
 
 impl Start {
     /// Returns the state that the keys describe.
-    pub fn new(system: &System, stated: &InitialState<'_>) -> Start {
+    pub fn new(system: &System, stated: &StartKeys<'_>) -> Start {
         let wanted = stated.begin == EQUILIBRIUM;
         let held = if wanted { held_equilibrium(system, stated.start) } else { None };
         let (displacement, states) = match &held {

@@ -372,12 +372,13 @@ impl StudySize {
             self.rows,
             format_bytes(limit)
         );
-        let lengths = ["samples", "samples_per_cycle", "cycles", "duration", "steps"].into_iter();
+        let lengths = ["samples", "samples_per_cycle", "cycles", "duration", "steps", "fields", "modes"].into_iter();
         let given: Vec<String> =
             lengths.filter(|key| study.study.entry(key).is_some()).map(|key| format!("lower `{key}`, ")).collect();
         let fewer = if study.points() > study.cases() { "use fewer frequencies, " } else { "" };
         let split = if study.cases() > 1 { "split `vary` over several files, " } else { "" };
-        let help = format!("{}{fewer}{split}or allow more with --memory", given.concat());
+        let lower = given.concat() + fewer + split;
+        let help = format!("{lower}{}allow more with --memory", if lower.is_empty() { "" } else { "or " });
         // the error stands at the key that contributes most
         let place = match (study.varied.first(), study.points() / study.cases().max(1)) {
             (Some(varied), frequencies) if study.cases() >= frequencies => &varied.location,

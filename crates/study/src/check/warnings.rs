@@ -259,7 +259,8 @@ fn constant_force(cases: &[SurveyedCase]) -> Option<String> {
     let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
     let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
     Some(format!(
-        "a mode has no forces: the constant force on `{}` is ignored, with its effect on contacts and slip limits",
+        "a mode has no forces: the constant force on `{}` is ignored, with its effect on contacts and slip limits, also \
+         if it balances a preload",
         force.on
     ))
 }

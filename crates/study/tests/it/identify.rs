@@ -249,7 +249,7 @@ fn a_wrong_unit_is_named() {
     let dataset = identify(&data, &oscillator(targets, FORCE));
     let said = dataset.notes.iter().cloned().chain(dataset.failures.iter().map(|failure| failure.reason.clone()));
     let said: Vec<String> = said.collect();
-    assert!(said.iter().any(|text| text.contains("times the computed ones: check the unit")), "{said:?}");
+    assert!(said.iter().any(|text| text.contains("times the computed ones: check the units")), "{said:?}");
 }
 
 #[test]

@@ -397,7 +397,7 @@ fn wrong_preloads_of_a_static_step_are_refused() {
         (text("pressure_MPa", "data = \"statik\""), &["no [[data]] `statik`", "`static`"][..]),
         (text("stress_MPa", good), &["no column `pressure`", "stress_MPa"]),
         (text("force_N,pressure_MPa", good), &["`pressure` and a column `force`", "rename"]),
-        (text("pressure_N", good), &["`pressure_N`", "has the unit"]),
+        (text("pressure_N", good), &["`pressure_N`", "has a unit of force (N) in its name"]),
         (text("pressure", good), &["Pa or MPa", "pressure [UNIT]"]),
         (text("pressure_MPa,gap", good), &["`gap`", "has no unit", "[mm]"]),
         (text("pressure_MPa", "data = \"static\", scale = -1"), &["`scale`"]),

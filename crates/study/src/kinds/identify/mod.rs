@@ -35,7 +35,7 @@ mod tables;
 mod targets;
 mod weight;
 
-use crate::case::initial_state::{InitialState, begin_values};
+use crate::case::initial_state::{StartKeys, begin_values};
 use crate::case::study::Study;
 use crate::case::values::Values;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
@@ -239,7 +239,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     for target in values.tables("targets").unwrap_or_default() {
         targets::check(target, values, model)?;
     }
-    InitialState::of(values).check_names(model)
+    StartKeys::of(values).check_names(model)
 }
 
 /// Warns of parameters whose value in `[parameters]` is outside of their range.

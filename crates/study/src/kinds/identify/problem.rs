@@ -167,16 +167,21 @@ impl FitProblem {
                 let values = format!("the measured values of `{name}` in `{}`", target.data());
                 // Correlation of -0.5: noise and a poor model hardly reach it.
                 if product < -0.5 * (measured * computed).sqrt() {
-                    sentences.push(format!(
-                        "{values} have the opposite sign of the computed ones: reverse the sign of their column."
-                    ));
+                    let advice = match target.first_cycles() {
+                        Some(_) => "reverse the sign of their column or of `start`, or state their `quantity`",
+                        None => "reverse the sign of their column",
+                    };
+                    sentences.push(format!("{values} have the opposite sign of the computed ones: {advice}."));
                 }
                 let ratio = (measured / computed).sqrt();
                 // Ratio that a poor model hardly reaches, and that most pairs of units exceed.
                 if ratio.is_finite() && ratio > 0.0 && !(0.01..=100.0).contains(&ratio) {
                     let advice = match target.first_cycles() {
-                        Some(_) => "check the unit of their column, and that its first row is the initial state",
-                        None => "check the unit of their column",
+                        Some(_) => {
+                            "check the units of their columns, their `quantity`, and that the first row is the initial \
+                             state"
+                        }
+                        None => "check the units of their columns",
                     };
                     sentences.push(format!("{values} are about {ratio:.0e} times the computed ones: {advice}."));
                 }

@@ -4,7 +4,7 @@
 //! The first row is the initial instant. The rows have equal distances.
 
 use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
-use crate::case::initial_state::{InitialState, Start};
+use crate::case::initial_state::{Start, StartKeys};
 use crate::case::study::Case;
 use crate::data::ColumnError;
 use stickslip::dimension::Dimension;
@@ -90,7 +90,7 @@ impl Target for RingDown {
         let along = along.ok_or_else(|| format!("there is no place `{}`", self.place))?;
         let targets = case.values.tables("targets").unwrap_or_default();
         let own = targets.get(self.index).unwrap_or(&case.values);
-        let start = Start::new(&system, &InitialState::of_record(own, &case.values));
+        let start = Start::new(&system, &StartKeys::of_record(own, &case.values));
         let history = TimeHistory {
             displacement: start.displacement,
             velocity: start.velocity,

@@ -4,12 +4,13 @@
 //! With the weighted derivatives `J` of the residuals `r` by the scaled parameters, the covariance
 //! is `s² (JᵀJ)⁻¹`, `s² = Σ r² / (n - p)`: the weights state relative sizes of the errors, and the
 //! residuals their common size. As many residuals as parameters tell no size: then the weights
-//! count as absolute standard deviations. Intervals use Student's distribution. They hold for residuals
-//! without structure and a model that is nearly linear within them.
+//! count as absolute standard deviations. Intervals use Student's distribution. They hold for
+//! residuals without structure and a model that is nearly linear within them.
 //! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
 
 use super::problem::{FitProblem, UsedRows};
 use super::search::{Fixed, Found, SearchSettings, minimize};
+use crate::syntax::format::plural_suffix;
 use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
 /// Weight of a residual that is larger than its standard deviation.
@@ -113,9 +114,8 @@ pub(super) struct Statistics {
     pub quantile: f64,
     /// Variance of the normalized residuals.
     pub variance: f64,
-    /// Number of residuals, and of those beyond the number of free parameters.
+    /// Number of residuals.
     pub count: usize,
-    freedom: usize,
     /// Root mean square of the residuals, in standard deviations.
     pub rms: f64,
     /// Correlation of residuals in neighbouring rows.
@@ -225,7 +225,6 @@ impl Statistics {
             quantile,
             variance: variance.max(f64::MIN_POSITIVE),
             count: n,
-            freedom,
             rms: (residuals.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
             autocorrelation: autocorrelation(problem, &residuals),
             aic: likelihood + 2.0 * parameter_count,
@@ -357,7 +356,16 @@ impl Statistics {
                 ));
             }
         }
-        warnings.extend(self.undetermined.iter().map(|direction| direction.text(problem)));
+        // further combinations tell little more
+        let listed = self.undetermined.len().min(3);
+        warnings.extend(self.undetermined[..listed].iter().map(|direction| direction.text(problem)));
+        if self.undetermined.len() > listed {
+            let more = self.undetermined.len() - listed;
+            warnings.push(format!(
+                "the data do not determine {more} more combination{} of the parameters.",
+                plural_suffix(more)
+            ));
+        }
         let name = |k: &usize| &problem.ranges[*k].name;
         warnings.extend(self.unbounded.iter().map(|k| {
             format!(
@@ -373,10 +381,10 @@ impl Statistics {
                 name(k)
             )
         }));
-        if self.freedom == 0 {
+        if self.count <= self.parameters.len() {
             warnings.push(format!(
-                "{} measured numbers for {} parameters: nothing tests the model, and the standard errors are only those \
-                 that `weight` states. Add rows.",
+                "{} measured numbers for {} parameters: nothing tests the model, and standard errors are only those that \
+                 `weight` states. Add rows.",
                 self.count,
                 self.parameters.len()
             ));
@@ -492,7 +500,9 @@ impl Undetermined {
                     let word = if percent > 0.0 { "raised" } else { "lowered" };
                     format!("{} {word} by {:.2} {unit}", name(k), percent.abs())
                 };
-                let changes: Vec<String> = several.iter().map(said).collect();
+                // changes that round to zero
+                let changes: Vec<String> =
+                    several.iter().filter(|k| (change(k) / unity).abs() >= 0.005).map(said).collect();
                 format!(
                     "the data do not determine {} separately: {} changes no residual noticeably. Fix one of them, or add data.",
                     names.join(" and "),

@@ -6,7 +6,7 @@ use super::response::ResponseTarget;
 use super::ring_down::RingDown;
 use super::settled::Settled;
 use super::weight::Weight;
-use crate::case::initial_state::InitialState;
+use crate::case::initial_state::StartKeys;
 use crate::case::names::ModelNames;
 use crate::case::study::{Case, Study};
 use crate::case::values::Values;
@@ -250,18 +250,31 @@ pub(super) fn check(target: &Values, values: &Values, model: &Model) -> Result<(
         Some("settled") if model.joints.iter().any(|joint| joint.name == at) => {}
         Some(kind) => {
             ModelNames::places(model).single_label("targets", "place", at)?;
-            let initial = InitialState::of_record(target, values);
             if kind == "ring-down" {
-                initial.check_names(model)?;
-            }
-            if kind == "ring-down" && !initial.moves() {
-                let help = "add start = { tip = \"1 mm\" }; if the displacement was not measured, write a fitted parameter there";
-                return Err(KeyError::new("start", "a ring-down needs an initial displacement or velocity", help));
+                check_start(at, target, values, model)?;
             }
         }
         None => {}
     }
     Ok(())
+}
+
+/// Checks the initial state of a ring-down.
+fn check_start(at: &str, target: &Values, values: &Values, model: &Model) -> Result<(), KeyError> {
+    let initial = StartKeys::of_record(target, values);
+    // an error of the target's own keys is in the list of targets
+    let in_target = |error: KeyError| match target.by_name(error.key) {
+        Some(_) => KeyError { key: "targets", ..error },
+        None => error,
+    };
+    initial.check_names(model).map_err(in_target)?;
+    if initial.moves() {
+        return Ok(());
+    }
+    let help = format!(
+        "add start = {{ \"{at}\" = \"1 mm\" }}; if the displacement was not measured, write a fitted parameter there"
+    );
+    Err(KeyError::new("targets", format!("the ring-down of `{at}` needs an initial displacement or velocity"), help))
 }
 
 /// Builds the targets of a case. Stored results have no data and so no targets.

@@ -8,7 +8,7 @@ mod signal;
 
 use super::orbit::write_sample;
 use super::shared::keys::MAX_SAMPLES;
-use crate::case::initial_state::{InitialState, Start, begin_values};
+use crate::case::initial_state::{Start, StartKeys, begin_values};
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::motion_warnings;
@@ -182,7 +182,7 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
 fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     // Largest number of samples of one transient.
     let max_steps = 1e7;
-    InitialState::of(values).check_names(model)?;
+    StartKeys::of(values).check_names(model)?;
     let unknown =
         values.names("also").unwrap_or_default().iter().find(|name| !further_tables::ALL.contains(&name.as_str()));
     if let Some(name) = unknown {
@@ -249,7 +249,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         None => vec![None],
     };
     let mut part = UnitResult::default();
-    let start = Start::new(&prepared.system, &InitialState::of(values));
+    let start = Start::new(&prepared.system, &StartKeys::of(values));
     if start.lacks_equilibrium {
         let reason = "no static equilibrium was found to begin with: hold every body by a spring, a contact or \
             `start`, or use begin = \"unloaded\"";
