@@ -248,21 +248,9 @@ fn narrowest_of(
     })
 }
 
-/// Warnings of a nonlinear mode: its amplitudes end before any joint slips, or a constant force
-/// acts on the structure.
+/// Warnings of a nonlinear mode: its amplitudes end before any joint slips.
 pub(crate) fn mode_warnings(cases: &[SurveyedCase]) -> Vec<String> {
-    no_slip_warning(cases).into_iter().chain(constant_force(cases)).collect()
-}
-
-/// Warns of constant forces: a mode is a motion without any forces.
-fn constant_force(cases: &[SurveyedCase]) -> Option<String> {
-    let mut forces = cases.iter().flat_map(|one| &one.case.model.forces);
-    let force = forces.find(|force| force.harmonic == 0 && force.amplitude != 0.0)?;
-    Some(format!(
-        "a mode has no forces: the constant force on `{}` is ignored, with its effect on contacts and slip limits, also \
-         if it balances a preload",
-        force.on
-    ))
+    no_slip_warning(cases).into_iter().collect()
 }
 
 fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {

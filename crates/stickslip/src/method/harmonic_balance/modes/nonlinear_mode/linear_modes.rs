@@ -133,7 +133,7 @@ impl ModeEquations<'_> {
     pub fn linear_state(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
         let (n, nh) = (self.system.dofs(), self.aft.harmonics.len());
         let omega = mode.squared_frequency.sqrt();
-        let mut x = vec![ZERO; nh * n];
+        let mut x = self.at_rest();
         for i in 0..n {
             x[self.first * n + i] = a * mode.shape[i];
         }
@@ -182,8 +182,7 @@ impl ModeEquations<'_> {
             found = Some((shape, whole.im / (2.0 * square)));
         }
         let (shape, damping) = found?;
-        let nh = self.aft.harmonics.len();
-        let mut x = vec![ZERO; nh * n];
+        let mut x = self.at_rest();
         x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
         Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
     }

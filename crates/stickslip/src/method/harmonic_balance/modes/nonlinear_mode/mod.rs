@@ -1,6 +1,7 @@
-//! Equations of a nonlinear mode: periodic motion without excitation.
+//! Equations of a nonlinear mode: periodic motion without excitation, about an equilibrium under
+//! the constant forces F₀.
 //!
-//! `M x'' + (C - 2 ζ ω M) x' + K x + Σ W f = 0`
+//! `M x'' + (C - 2 ζ ω M) x' + K x + Σ W f = F₀`
 //!
 //! Friction and damping let a free motion decay. The artificial negative damping `2 ζ ω M`
 //! makes it periodic, and ζ is the equivalent damping ratio. At ζ = 0 the motion is a
@@ -27,6 +28,7 @@ use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
 use crate::method::harmonic_balance::equations::contact_parameter::contact_parameter;
 use crate::method::harmonic_balance::equations::regularization::{LEAST_EPSILON_RATIO, force_regularization};
 use crate::method::harmonic_balance::line_search::LineSearch;
+use crate::method::harmonic_balance::static_equilibrium::static_equilibrium_of;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -77,6 +79,10 @@ pub(crate) struct ModeEquations<'a> {
     pub(super) aft: FrequencyTime,
     /// Index of the first harmonic.
     first: usize,
+    /// Constant forces on the places, N.
+    constant: DVector<f64>,
+    /// Displacements under them, m, where a mode begins.
+    equilibrium: DVector<f64>,
     /// True if motions may be mixtures of two modes of equal frequency, so that the equations
     /// may be singular.
     pub may_be_singular: bool,
@@ -129,7 +135,13 @@ impl<'a> ModeEquations<'a> {
                 contacts.push(PlacedPort { port, directions: w });
             }
         }
-        let odd = system.joints().iter().all(|joint| joint.law().is_odd());
+        let constant = system.constant_forces();
+        let equilibrium = match constant.amax() > 0.0 {
+            true => static_equilibrium_of(system).map(|orbit| orbit.initial_state[..system.dofs()].to_vec()),
+            false => None,
+        };
+        let equilibrium = equilibrium.map_or_else(|| DVector::zeros(system.dofs()), DVector::from_vec);
+        let odd = constant.amax() == 0.0 && system.joints().iter().all(|joint| joint.law().is_odd());
         let list: Vec<usize> = if odd { (1..=harmonics).step_by(2).collect() } else { (0..=harmonics).collect() };
         let mut aft = FrequencyTime::new(list, samples);
         aft.by_frequency = Some(Vec::new());
@@ -139,6 +151,8 @@ impl<'a> ModeEquations<'a> {
             force_ports: contacts,
             aft,
             first: usize::from(!odd),
+            constant,
+            equilibrium,
             may_be_singular: false,
         })
     }
@@ -161,6 +175,16 @@ impl<'a> ModeEquations<'a> {
     /// Returns the number of axes of the force ports.
     pub(crate) fn force_axes(&self) -> usize {
         self.force_ports.last().map_or(0, |last| last.port.first_axis + last.port.axes)
+    }
+
+    /// Returns the harmonics of the places in an equilibrium.
+    fn at_rest(&self) -> Vec<Complex64> {
+        let n = self.system.dofs();
+        let mut x = vec![ZERO; self.aft.harmonics.len() * n];
+        if self.first > 0 {
+            x.iter_mut().zip(&self.equilibrium).for_each(|(x, mean)| x.re = *mean);
+        }
+        x
     }
 
     /// Returns the first harmonic of the places.
@@ -236,6 +260,9 @@ impl<'a> ModeEquations<'a> {
             for i in 0..n {
                 let row = 2 * (k * n + i);
                 let (mut sum, mut by_omega, mut by_zeta) = (ZERO, ZERO, ZERO);
+                if harmonics[k] == 0 {
+                    sum.re -= self.constant[i];
+                }
                 for l in 0..n {
                     let (m, c, s) = (
                         self.system.structure().mass()[(i, l)],
@@ -439,7 +466,9 @@ impl<'a> ModeEquations<'a> {
         let settings = ModeSettings::default();
         let size = self.size();
         let mut start = start.clone();
-        start.x.iter_mut().for_each(|x| *x *= a / before);
+        // constant forces keep the mean
+        let moving = if self.constant.amax() > 0.0 { self.first * self.system.dofs() } else { 0 };
+        start.x[moving..].iter_mut().for_each(|x| *x *= a / before);
         let mut state = start.clone();
         let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
         let scale = self.units(&start, a);
@@ -500,7 +529,7 @@ fn scaled_norm(units: &[f64], residual: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::law::{Coulomb, CoulombArctan, Cubic, Dahl, Gap, Jenkins, JenkinsArctan, LuGre, SharedLaw};
-    use crate::model::{GROUND, Joint, Mass, Model, Spring};
+    use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
     use std::sync::Arc;
 
     /// Returns a row of masses with a joint of every law.
@@ -646,6 +675,27 @@ mod tests {
         }
         let first = equations.places(&state)[0].norm();
         (state, first)
+    }
+
+    /// A constant force shifts the motion to `x + f(x) = F₀`, about which small motions have
+    /// `ω² = 1 + f'(x)`: on a cubic spring, and on a stop that the force closes.
+    #[test]
+    fn a_constant_force_shifts_the_mean() {
+        let laws: [(SharedLaw, f64, f64, f64); 2] = [
+            (Arc::new(Cubic { stiffness: 0.5 }), 1.2 + 0.5 * 1.728, 1.2, 1.0 + 1.5 * 1.44),
+            (Arc::new(Gap { gap: 0.1, stiffness: 1.25 }), 0.5 + 1.25 * 0.4, 0.5, 2.25),
+        ];
+        for (law, amplitude, mean, slope) in laws {
+            let mut model = Model::default();
+            let between = || ["m".to_owned(), GROUND.to_owned()];
+            model.masses.push(Mass::new("m", 1.0));
+            model.springs.push(Spring { between: between(), stiffness: 1.0, damping: 0.0 });
+            model.joints.push(Joint { name: "j".into(), between: between(), law });
+            model.forces.push(Force { on: "m".into(), amplitude, phase: 0.0, harmonic: 0 });
+            let (state, first) = mode(&model.assemble().unwrap(), 3, &[1e-2, 1e-4]);
+            assert!((state.x[0].re - mean).abs() < 1e-7 && (first - 1e-4).abs() < 1e-12, "{:?}", state.x);
+            assert!((state.omega / slope.sqrt() - 1.0).abs() < 1e-7, "{} {slope}", state.omega);
+        }
     }
 
     /// With one harmonic, Duffing's oscillator has `ω² = 1 + ¾ b a²` and no damping.
