@@ -14,14 +14,15 @@ function start(data) {
   for (let corner = 0; corner < corners.length; corner += 1) { sides[corner % 3].push(sharp ? corner : corners[corner]); }
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
-  // The mean over the period is not drawn.
+  // The mean over the period is not drawn; a single instant has none.
   const motions = data.motions.map((motion) => {
     const moves = new Float32Array(bytes(motion.displacements));
     let largest = 0;
     for (let i = 0; i < 3 * count; i += 1) {
       let sum = 0;
       for (let k = 0; k < motion.instants; k += 1) { sum += moves[3 * count * k + i]; }
-      for (let k = 0; k < motion.instants; k += 1) { moves[3 * count * k + i] -= sum / motion.instants; }
+      const mean = motion.instants > 1 ? sum / motion.instants : 0;
+      for (let k = 0; k < motion.instants; k += 1) { moves[3 * count * k + i] -= mean; }
     }
     for (let i = 0; i < moves.length; i += 3) { largest = Math.max(largest, Math.hypot(moves[i], moves[i + 1], moves[i + 2])); }
     return { moves, instants: motion.instants, states: new Uint8Array(bytes(motion.contact)), largest: largest || 1 };
