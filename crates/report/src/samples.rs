@@ -29,6 +29,26 @@ fn record(points: &[(&str, u64)]) -> Record {
     }
 }
 
+/// Two orbits of two instants on a tetrahedron; its second and third node are not in the table.
+pub(crate) fn motions_of_a_tetrahedron() -> Dataset {
+    let deck = "*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n";
+    let mesh = stickslip_formats::mesh::read_bytes(deck.as_bytes()).unwrap();
+    let table = Table {
+        name: FIELDS.to_owned(),
+        columns: vec![
+            Column::numbers("frequency_Hz", [[10.0; 4], [20.0; 4]].concat()),
+            Column::numbers("time_s", [0.0, 0.0, 0.5, 0.5].repeat(2)),
+            Column { name: "node".to_owned(), values: CellValues::Integer([1, 4].repeat(4)) },
+            Column::numbers("x_m", (0..8).map(f64::from).collect()),
+            Column::numbers("y_m", vec![0.0; 8]),
+            Column::numbers("z_m", vec![0.0; 8]),
+            text("contact", &["", "slip+"].repeat(4)),
+        ],
+    };
+    let source = MeshSource { mesh, length: 1e-3, axis: None };
+    Dataset { tables: vec![table], mesh: Some(std::sync::Arc::new(source)), ..Dataset::default() }
+}
+
 pub(crate) fn all() -> Vec<Dataset> {
     vec![
         response(),

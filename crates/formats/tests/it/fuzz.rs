@@ -61,7 +61,7 @@ const NUMBERS: [u64; 10] =
     [0, 1, 2, 0x7f, 0x7fff_ffff, 0xffff_ffff, 0x8000_0000, 0x7fff_ffff_ffff_ffff, u64::MAX, 0x1_0000];
 
 /// Applies one random damage.
-pub(crate) fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
+fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     let at = random.below(bytes.len());
     let Some(&byte) = bytes.get(at) else { return };
     match random.below(8) {
@@ -97,6 +97,20 @@ pub(crate) fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
+/// Returns a copy of a file with one to four damages.
+pub(crate) fn damaged(file: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = file.to_vec();
+    for _ in 0..1 + random.below(4) {
+        damage(&mut bytes, random);
+    }
+    bytes
+}
+
+/// Returns the number that an environment variable sets.
+pub(crate) fn number_of_variable(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
 /// Reads all matrices of a file and returns their number.
 fn read_all(bytes: &[u8], format: &str) -> usize {
     let Ok(variables) = list_bytes(bytes, Some(format)) else { return 0 };
@@ -130,10 +144,7 @@ fn fuzz(format: &str, seed: u64, count: usize) -> (usize, usize) {
     let (mut runs, mut matrices) = (0, 0);
     for _ in 0..count {
         for file in &files {
-            let mut bytes = file.clone();
-            for _ in 0..1 + random.below(4) {
-                damage(&mut bytes, &mut random);
-            }
+            let bytes = damaged(file, &mut random);
             let memory = peak_memory(|| matrices += read_all(&bytes, format));
             runs += 1;
             if memory > BASE_MEMORY + MEMORY_PER_BYTE * bytes.len() as u64 {
@@ -163,8 +174,8 @@ fn damaged_files_of_every_format() {
 #[test]
 #[ignore = "takes minutes for every format"]
 fn many_damaged_files_of_every_format() {
-    let number = |name: &str, default| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default);
-    let (count, seed) = (number("STICKSLIP_FUZZ_RUNS", 50_000), number("STICKSLIP_FUZZ_SEED", 0x1234_5678_9abc_def1));
+    let count = number_of_variable("STICKSLIP_FUZZ_RUNS", 50_000);
+    let seed = number_of_variable("STICKSLIP_FUZZ_SEED", 0x1234_5678_9abc_def1);
     let only = std::env::var("STICKSLIP_FUZZ_FORMAT").ok();
     for format in TABLE.iter().filter(|format| only.as_ref().is_none_or(|only| only == format.name)) {
         let (runs, matrices) = fuzz(format.name, seed.max(1), count as usize);

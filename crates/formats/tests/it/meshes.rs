@@ -1,6 +1,6 @@
 //! Meshes of other programs, read as the same solid; and damaged ones.
 
-use crate::fuzz::{Random, damage, peak_memory};
+use crate::fuzz::{Random, damaged, number_of_variable, peak_memory};
 use std::path::{Path, PathBuf};
 use stickslip_formats::mesh::{self, Face, Mesh, MeshReport, TABLE};
 
@@ -78,10 +78,7 @@ fn fuzz(names: &[String], seed: u64, count: usize) -> usize {
     for name in names {
         let file = std::fs::read(folder().join(name)).expect("a file");
         for _ in 0..count {
-            let mut bytes = file.clone();
-            for _ in 0..1 + random.below(4) {
-                damage(&mut bytes, &mut random);
-            }
+            let bytes = damaged(&file, &mut random);
             let memory = peak_memory(|| {
                 if let Ok(mesh) = mesh::read_bytes(&bytes) {
                     let _ = MeshReport(&mesh).to_string();
@@ -104,6 +101,6 @@ fn damaged_meshes_are_read_or_refused() {
 #[test]
 #[ignore = "takes minutes"]
 fn many_damaged_meshes() {
-    let count = std::env::var("STICKSLIP_FUZZ_RUNS").ok().and_then(|text| text.parse().ok()).unwrap_or(20_000);
+    let count = number_of_variable("STICKSLIP_FUZZ_RUNS", 20_000) as usize;
     fuzz(&names(), 0x0246_8ace, count);
 }

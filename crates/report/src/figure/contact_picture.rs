@@ -46,15 +46,13 @@ pub fn contact_picture(mesh: &Mesh, contacts: &[ContactSummary], title: &str) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use resvg::tiny_skia::Pixmap;
+    use crate::figure::mesh_picture::tests::{BRICK, pixels};
     use stickslip_formats::mesh::read_bytes;
 
     /// Two nodes inside of the assembly have a counterpart below them, and a third has none.
     #[test]
     fn nodes_of_contacts_are_seen_through_the_mesh() {
-        let text = "*NODE\n1,0,0,0\n2,2,0,0\n3,2,1,0\n4,0,1,0\n5,0,0,1\n6,2,0,1\n7,2,1,1\n8,0,1,1\n\
-            *ELEMENT,TYPE=C3D8\n1,1,2,3,4,5,6,7,8\n";
-        let mesh = read_bytes(text.as_bytes()).unwrap();
+        let mesh = read_bytes(BRICK.as_bytes()).unwrap();
         let pair = |x: f64| ContactPair { node: [x, 0.5, 0.7], counterpart: Some([x, 0.5, 0.2]) };
         let contact = ContactSummary {
             name: "pad".to_owned(),
@@ -64,16 +62,11 @@ mod tests {
             ..ContactSummary::default()
         };
         let picture = contact_picture(&mesh, &[contact], "contacts").unwrap();
-        let picture = Pixmap::decode_png(&picture).unwrap();
-        let count = |colour: &str| {
-            let rgb = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap());
-            picture.pixels().iter().filter(|p| [p.red(), p.green(), p.blue()] == rgb).count() as f64
-        };
         // a dot has a radius of 5 pixels, a circle one of 8, the mark in the legend one of 8
         let (dot, circle, mark) = (25.0, 8.0 * 2.0 * 2.5, 64.0);
         for (colour, marks) in [(colour(0), 2.0 * dot), (UNPAIRED, circle)] {
             let expected = std::f64::consts::PI * (marks + mark);
-            let found = count(colour);
+            let found = pixels(&picture, colour);
             assert!((0.7 * expected..1.2 * expected).contains(&found), "{colour}: {found} for {expected}");
         }
     }

@@ -339,28 +339,32 @@ fn labels(mesh: &Mesh, title: &str, legend: &[PictureLegendEntry], view: &View, 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use stickslip_formats::mesh::read_bytes;
 
-    const BRICK: &str = "*NODE\n1,0,0,0\n2,2,0,0\n3,2,1,0\n4,0,1,0\n5,0,0,1\n6,2,0,1\n7,2,1,1\n8,0,1,1\n\
+    /// Returns the number of pixels of a PNG that have exactly a colour.
+    pub fn pixels(png: &[u8], colour: &str) -> f64 {
+        let picture = Pixmap::decode_png(png).unwrap();
+        let rgb = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap());
+        picture.pixels().iter().filter(|p| [p.red(), p.green(), p.blue()] == rgb).count() as f64
+    }
+
+    pub const BRICK: &str = "*NODE\n1,0,0,0\n2,2,0,0\n3,2,1,0\n4,0,1,0\n5,0,0,1\n6,2,0,1\n7,2,1,1\n8,0,1,1\n\
         *ELEMENT,TYPE=C3D8\n1,1,2,3,4,5,6,7,8\n*NSET,NSET=TOP\n5,6,7,8\n*NSET,NSET=BOTTOM\n1,2,3,4\n";
 
     /// The top is seen, the bottom is behind the body, and every face has its shade.
     #[test]
     fn visible_nodes_of_sets_are_coloured() {
         let mesh = read_bytes(BRICK.as_bytes()).unwrap();
-        let picture = Pixmap::decode_png(&mesh_picture(&mesh, "brick <1>").unwrap()).unwrap();
-        let count = |colour: &str| {
-            let rgb = [1, 3, 5].map(|from| u8::from_str_radix(&colour[from..from + 2], 16).unwrap());
-            picture.pixels().iter().filter(|p| [p.red(), p.green(), p.blue()] == rgb).count()
-        };
+        let picture = mesh_picture(&mesh, "brick <1>").unwrap();
+        let count = |colour: &str| pixels(&picture, colour);
         // a dot has a radius of 5 pixels, the mark in the legend one of 8
         let (dot, mark) = (25.0 * std::f64::consts::PI, 64.0 * std::f64::consts::PI);
-        let top = count(colour(0)) as f64;
+        let top = count(colour(0));
         assert!(top > 4.0 * dot * 0.7 + mark * 0.8 && top < 4.0 * dot * 1.2 + mark * 1.2, "{top}");
         // one corner of the bottom is hidden
-        let bottom = count(colour(1)) as f64;
+        let bottom = count(colour(1));
         assert!(bottom > 3.0 * dot * 0.7 + mark * 0.8 && bottom < 3.0 * dot * 1.2 + mark * 1.2, "{bottom}");
     }
 

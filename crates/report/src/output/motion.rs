@@ -77,12 +77,12 @@ fn files(dataset: &Dataset) -> Result<Vec<File>, ReportError> {
     let colours = STATES.map(|(_, index)| PALETTE[index]);
     data["states"] = json!(colours);
     let has_contact = fields.contact.is_some_and(|states| states.iter().any(|state| !state.is_empty()));
-    let page = page(dataset, &data, (all.len() - orbits.len(), has_contact));
+    let page = page(dataset, &data, all.len() - orbits.len(), has_contact);
     Ok(vec![File::new("motion.html", page), File::shared(script_name(), script())])
 }
 
 /// Returns the page; `left_out` motions are too many for it.
-fn page(dataset: &Dataset, data: &serde_json::Value, (left_out, has_contact): (usize, bool)) -> String {
+fn page(dataset: &Dataset, data: &serde_json::Value, left_out: usize, has_contact: bool) -> String {
     let title = escape(&dataset.figure.title);
     let key: String = STATES
         .iter()
@@ -116,29 +116,15 @@ fn page(dataset: &Dataset, data: &serde_json::Value, (left_out, has_contact): (u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
-    use stickslip_formats::mesh::read_bytes;
-    use stickslip_study::dataset::{CellValues, Column, MeshSource, Table};
+    use crate::samples;
+    use stickslip_study::dataset::Column;
 
     /// Two motions of a tetrahedron; a title with a tag cannot close the script.
     #[test]
     fn a_page_has_all_motions_and_their_labels() {
-        let deck = "*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n";
-        let source = MeshSource { mesh: read_bytes(deck.as_bytes()).unwrap(), length: 1e-3, axis: None };
-        let table = Table {
-            name: "fields".to_owned(),
-            columns: vec![
-                Column::texts("case", ["a</script>", "b"].map(|name| vec![name.to_owned(); 4]).concat()),
-                Column::numbers("frequency_Hz", [[10.0; 4], [20.0; 4]].concat()),
-                Column::numbers("time_s", [0.0, 0.0, 0.5, 0.5].repeat(2)),
-                Column { name: "node".to_owned(), values: CellValues::Integer([1, 4].repeat(4)) },
-                Column::numbers("x_m", (0..8).map(f64::from).collect()),
-                Column::numbers("y_m", vec![0.0; 8]),
-                Column::numbers("z_m", vec![0.0; 8]),
-                Column::texts("contact", ["", "slip+"].repeat(4).into_iter().map(str::to_owned).collect()),
-            ],
-        };
-        let dataset = Dataset { tables: vec![table], mesh: Some(Arc::new(source)), ..Dataset::default() };
+        let mut dataset = samples::motions_of_a_tetrahedron();
+        let case = Column::texts("case", ["a</script>", "b"].map(|name| vec![name.to_owned(); 4]).concat());
+        dataset.tables[0].columns.insert(0, case);
         let files = files(&dataset).unwrap();
         let page = String::from_utf8(files[0].content.clone()).unwrap();
         assert_eq!(files[0].name, "motion.html");

@@ -130,29 +130,12 @@ fn array(kind: &str, name: &str, components: usize, bytes: impl Iterator<Item = 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
+    use crate::samples;
     use stickslip_formats::mesh::read_bytes;
-    use stickslip_study::dataset::{CellValues, Column, Table};
 
-    /// Two orbits of two instants on a tetrahedron; the third node is not in the table.
     #[test]
     fn a_list_for_every_orbit_and_a_file_for_every_instant() {
-        let deck = "*NODE\n1,0,0,0\n2,2,0,0\n3,0,3,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n";
-        let source = MeshSource { mesh: read_bytes(deck.as_bytes()).unwrap(), length: 1e-3, axis: None };
-        let repeat = |one: &[f64]| [one, one].concat();
-        let table = Table {
-            name: "fields".to_owned(),
-            columns: vec![
-                Column::numbers("frequency_Hz", [[10.0; 4], [20.0; 4]].concat()),
-                Column::numbers("time_s", repeat(&[0.0, 0.0, 0.5, 0.5])),
-                Column { name: "node".to_owned(), values: CellValues::Integer([1, 4].repeat(4)) },
-                Column::numbers("x_m", (0..8).map(f64::from).collect()),
-                Column::numbers("y_m", vec![0.0; 8]),
-                Column::numbers("z_m", vec![0.0; 8]),
-                Column::texts("contact", ["", "slip+"].repeat(4).into_iter().map(str::to_owned).collect()),
-            ],
-        };
-        let dataset = Dataset { tables: vec![table], mesh: Some(Arc::new(source)), ..Dataset::default() };
+        let dataset = samples::motions_of_a_tetrahedron();
         let files = files(&dataset).unwrap();
         let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
         let expected = [
