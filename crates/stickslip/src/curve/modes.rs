@@ -10,7 +10,8 @@
 //! The requested points are solved from neighbouring states of the continuation.
 //! If the curve ends above the smallest amplitude, a second continuation proceeds upwards from
 //! the smallest amplitude. It begins at the mode of the same number with all joints linearized
-//! for small motion.
+//! for small motion. Under constant forces only this second continuation is used, because they
+//! may press bodies together that have no large motion.
 //!
 //! Friction can bring two frequencies together, so that two modes nearly coalesce:
 //! [`Mode::coalescences`]. Below this amplitude there are two modes again, with other shapes.
@@ -190,12 +191,14 @@ impl ModeBranches {
     fn new(equations: &mut ModeEquations<'_>, request: ModeRequest) -> Self {
         let (low, high) = request.range;
         // A single mode has the same number at both ends. For a law with memory, large motions
-        // are expensive, so the branch from small amplitudes is tried first.
-        let rising = match equations.is_single_dof_with_memory() {
+        // are expensive, so the branch from small amplitudes is tried first. Constant forces press
+        // bodies together that would fly apart in a large motion.
+        let rising = match equations.is_single_dof_with_memory() || equations.has_constant_forces() {
             true => ModeCurve::from_small_amplitude(equations, request.mode, request.range.0, request.range.1),
             false => None,
         };
-        if rising.as_ref().is_some_and(|rising| rising.largest_amplitude() >= high) {
+        let reached = |rising: &ModeCurve| rising.largest_amplitude() >= high;
+        if rising.as_ref().is_some_and(|rising| reached(rising) || equations.has_constant_forces()) {
             return ModeBranches { falling: None, rising };
         }
         let falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
@@ -218,36 +221,39 @@ impl ModeBranches {
     /// Returns amplitude and cause of the end of the mode, if it ends above the smallest
     /// amplitude. Amplitudes above `high` are not considered.
     fn ended(&self, high: f64) -> Option<ModeEnd> {
-        let falling = self.falling.as_ref()?;
+        let Some(falling) = &self.falling else { return self.rising.as_ref()?.ended };
         let ended = falling.ended?;
         match &self.rising {
             Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
-            Some(rising) if ended.reason == ModeEndCause::NoStart => {
-                Some(ModeEnd { at: rising.largest_amplitude(), reason: ModeEndCause::FromSmallAmplitudes })
-            }
+            Some(rising) if ended.reason == ModeEndCause::NoStart => rising.ended,
             _ => Some(ended),
         }
     }
 }
 
 /// Returns the modal amplitude (m √kg) at which the place with the largest motion has an
-/// amplitude of 1 m, in mode `index` of the structure without its joints. `None` if there is no
-/// such mode, or if it moves no place.
+/// amplitude of 1 m, in mode `index` of the structure without its joints, or of small motions
+/// about the equilibrium under constant forces. `None` if there is no such mode, or if it moves
+/// no place.
 ///
 /// # Errors
 /// See [`nonlinear_mode`].
 pub fn unit_amplitude(system: &System, index: usize) -> Result<Option<f64>, MethodError> {
-    let equations = equations(system, 1, 8)?;
+    let mut equations = equations(system, 1, 8)?;
     let size = |x: &[Complex64]| x.iter().fold(0.0, |most: f64, x| most.max(x.norm()));
     let displacements = |x: Vec<Complex64>| -> Vec<Complex64> {
         x.into_iter().zip(system.place_axes()).filter(|(_, place)| !place.is_rotation()).map(|(x, _)| x).collect()
     };
-    Ok(equations.linear_modes().get(index).and_then(|linear| {
-        let shape = linear.shape.as_slice();
-        let largest = size(&displacements(equations.at_places(shape)));
+    let small = match equations.has_constant_forces() {
+        true => equations.small_amplitude_mode(index, 1.0).map(|state| equations.first_harmonic(&state).to_vec()),
+        false => None,
+    };
+    let shape = small.or_else(|| Some(equations.linear_modes().get(index)?.shape.as_slice().to_vec()));
+    Ok(shape.and_then(|shape| {
+        let largest = size(&displacements(equations.at_places(&shape)));
         // Displacements of places below this fraction of a mode's largest coordinate are
         // rounding.
-        (largest > 1e-12 * size(shape)).then(|| 1.0 / largest)
+        (largest > 1e-12 * size(&shape)).then(|| 1.0 / largest)
     }))
 }
 
@@ -305,7 +311,7 @@ fn point(equations: &ModeEquations<'_>, amplitude: f64, state: &ModeState) -> Mo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Coulomb, Cubic, Jenkins, Stribeck};
+    use crate::law::{Coulomb, Cubic, FrictionContact, Jenkins, Stribeck};
     use crate::method::{Method, event_driven::EventDriven};
     use crate::model::{Force, GROUND, Joint, Mass, Model, Spring, example};
     use std::f64::consts::PI;
@@ -453,6 +459,42 @@ mod tests {
                     point.amplitude,
                     point.omega
                 );
+            }
+        }
+    }
+
+    /// A block on a spring, or on none, is pressed with N against a spring contact and slides along
+    /// it. Its mode begins at the stuck contact, and has the closed form of a Jenkins element with
+    /// limit `µ N`, as in [`the_waves_of_a_tuned_ring_have_the_closed_form_at_every_diameter`].
+    #[test]
+    fn the_mode_of_a_pressed_block_begins_at_the_stuck_contact() {
+        let (m, kt, kn, pressing) = (0.5, 2e5, 9e5, 40.0);
+        for k in [0.0, 3e4] {
+            let mut model = Model::default();
+            model.masses.push(Mass::new("m", m).along(&["x", "z"]));
+            let law = FrictionContact { tangential: kt, normal: kn, friction: 0.3, preload: 0.0, tangents: 1 };
+            let between = ["m".to_owned(), GROUND.to_owned()];
+            model.joints.push(Joint { name: "j".into(), between, law: std::sync::Arc::new(law) });
+            model.forces.push(Force { on: "m.z".into(), amplitude: pressing, phase: 0.0, harmonic: 0 });
+            if k > 0.0 {
+                let between = ["m.x".to_owned(), GROUND.to_owned()];
+                model.springs.push(Spring { between, stiffness: k, damping: 0.0 });
+            }
+            let system = model.assemble().unwrap();
+            assert!((unit_amplitude(&system, 0).unwrap().unwrap() / m.sqrt() - 1.0).abs() < 1e-9);
+            let slips = 0.3 * pressing / kt;
+            let range = (1e-3 * slips * m.sqrt(), 3.0 * slips * m.sqrt());
+            let request = ModeRequest { mode: 0, range, points: 9, harmonics: 1, samples: 1024 };
+            let mode = nonlinear_mode(&system, request).unwrap();
+            assert_eq!((mode.points.len(), mode.ended, &mode.not_found[..]), (9, None, &[][..]), "{k}");
+            for point in &mode.points {
+                let d = point.amplitude / m.sqrt();
+                let psi = (1.0 - 2.0 * slips / d).max(-1.0).acos();
+                let slipping = d > slips;
+                let re = k + if slipping { kt * (psi - psi.sin() * psi.cos()) / PI } else { kt };
+                let im = if slipping { 4.0 * kt * slips * (1.0 - slips / d) / (PI * d) } else { 0.0 };
+                assert!((point.omega * point.omega * m / re - 1.0).abs() < SAMPLED, "{k} {d} {}", point.omega);
+                assert!((point.damping - im / (2.0 * re)).abs() < SAMPLED, "{k} {d} {}", point.damping);
             }
         }
     }

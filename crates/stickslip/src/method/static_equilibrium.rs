@@ -97,7 +97,7 @@ impl StaticEquilibrium {
             orbit,
         };
         if held.is_empty() {
-            return harmonic_balance::static_equilibrium_of(system).map(made);
+            return harmonic_balance::static_equilibrium_of(system).map(|found| made(found.orbit));
         }
         let largest = held.iter().fold(0.0f64, |largest, (_, value)| largest.max(value.abs()));
         let axis_stiffnesses: Vec<f64> = held.iter().map(|(axis, _)| stiffness_along(system, axis)).collect();
@@ -112,7 +112,7 @@ impl StaticEquilibrium {
                 (axis, stiffness, stiffness * target)
             });
             let pulled = system.with_springs(&springs.collect::<Vec<_>>())?;
-            let mut orbit = harmonic_balance::static_equilibrium_of(&pulled)?;
+            let mut orbit = harmonic_balance::static_equilibrium_of(&pulled)?.orbit;
             let displacement = &orbit.initial_state[..system.dofs()];
             let distances: Vec<f64> = held.iter().map(|(axis, value)| value - axis.component(displacement)).collect();
             let farthest = distances.iter().fold(0.0f64, |farthest, distance| farthest.max(distance.abs()));

@@ -45,13 +45,6 @@ pub enum ModeEndCause {
     /// The damping ratio exceeds ten over many steps.
     #[error("its damping ratio exceeds ten there (overdamped), and the continuation stops; choose larger amplitudes")]
     Overdamped,
-    /// The branch from small amplitudes ends there, and no branch from large amplitudes was
-    /// found.
-    #[error(
-        "the branch from small amplitudes ends there (overdamped, or no neighbouring motion was found), and at large \
-         amplitudes no motion was found either"
-    )]
-    FromSmallAmplitudes,
     /// Laws with internal states exceeded their work limit.
     #[error(
         "the continuation reached its work limit, because the internal states of a law change very fast there; choose other amplitudes"
@@ -214,7 +207,7 @@ impl ModeCurve {
         let Some((linear, start)) = start else { return none(Some(linear)) };
         let top = start.amplitude;
         let mut arcs =
-            if equations.is_unbounded() { follow_upwards(equations, &settings, &start, high) } else { Vec::new() };
+            if equations.is_unbounded() { follow_upwards(equations, &settings, &start, high).0 } else { Vec::new() };
         arcs.push(start);
         let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
         let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, ended: None, settings: settings.clone() };
@@ -275,9 +268,8 @@ impl ModeCurve {
         path
     }
 
-    /// Follows mode `index` upwards from the modal amplitude `low`, beginning with all joints
-    /// linearized for small motion. Ends above `high` or when no step succeeds. `None` if no
-    /// motion is found at `low`.
+    /// Follows mode `index` upwards from the modal amplitude `low` to `high`, beginning with all
+    /// joints linearized for small motion. `None` if no motion is found at `low`.
     pub(super) fn from_small_amplitude(
         equations: &mut ModeEquations<'_>,
         index: usize,
@@ -287,13 +279,16 @@ impl ModeCurve {
         let settings = ModeCurveSettings::default();
         equations.may_be_singular = false;
         let guess = equations.small_amplitude_mode(index, low)?;
+        equations.hold_free_bodies(guess.omega);
         let state = equations
             .solve(&guess, low, low)
             .filter(|state| equations.modal_assurance(&guess, state) >= settings.min_mac)?;
         let start = equations.start_curve(&state, low)?;
-        let mut arcs = follow_upwards(equations, &settings, &start, high);
+        let (mut arcs, reason) = follow_upwards(equations, &settings, &start, high);
         arcs.push(start);
-        Some(ModeCurve { linear: None, arcs, sticks: false, ended: None, settings })
+        let mut curve = ModeCurve { linear: None, arcs, sticks: false, ended: None, settings };
+        curve.ended = reason.map(|reason| ModeEnd { at: curve.largest_amplitude(), reason });
+        Some(curve)
     }
 
     /// Returns the largest amplitude on the curve.
@@ -470,41 +465,49 @@ fn try_step(
     ((smooth || corner) && equations.modal_assurance(&now.state, &step.to.state) >= settings.min_mac).then_some(step)
 }
 
-/// Follows the curve upwards from `start` to `high`, or until no step succeeds. Returns the
-/// points in decreasing order of amplitude. It is needed for forces that grow with amplitude,
-/// because the linear mode is then not a useful initial guess.
+/// Follows the curve upwards from `start` to `high`. Returns the points in decreasing order of
+/// amplitude, and the reason if the curve ends below `high`.
+///
+/// It is needed for forces that grow with amplitude, because the linear mode is then not a useful
+/// initial guess.
 fn follow_upwards(
     equations: &mut ModeEquations<'_>,
     settings: &ModeCurveSettings,
     start: &ModeArc,
     high: f64,
-) -> Vec<ModeArc> {
+) -> (Vec<ModeArc>, Option<ModeEndCause>) {
     let mut arcs = Vec::new();
     let (mut now, mut length, mut creeping, begun) =
         (start.reversed(), settings.initial_step, 0, equations.time_steps());
+    let mut ended = Some(ModeEndCause::StepLimit);
     for _ in 0..settings.max_steps {
-        if now.amplitude > high || length <= settings.min_step {
-            break;
-        }
         if now.state.damping > settings.overdamped {
             creeping += equations.resolution();
         }
-        if creeping > settings.overdamped_work || equations.time_steps() - begun > settings.memory_work {
-            break;
-        }
-        match try_step(equations, settings, &now, length) {
-            Some(step) => {
-                if step.iterations <= settings.few_iterations {
-                    length = (1.5 * length).min(settings.max_step);
+        let reason = match () {
+            _ if now.amplitude > high => None,
+            _ if length <= settings.min_step => Some(ModeEndCause::Stalled),
+            _ if creeping > settings.overdamped_work => Some(ModeEndCause::Overdamped),
+            _ if equations.time_steps() - begun > settings.memory_work => Some(ModeEndCause::WorkLimit),
+            _ => {
+                match try_step(equations, settings, &now, length) {
+                    Some(step) => {
+                        if step.iterations <= settings.few_iterations {
+                            length = (1.5 * length).min(settings.max_step);
+                        }
+                        now = step.to;
+                        arcs.push(now.clone());
+                    }
+                    None => length *= 0.5,
                 }
-                now = step.to;
-                arcs.push(now.clone());
+                continue;
             }
-            None => length *= 0.5,
-        }
+        };
+        ended = reason;
+        break;
     }
     arcs.reverse();
-    arcs
+    (arcs, ended)
 }
 
 /// Skips a kink that no step passes, or leaves a curve that does not return. Solves at a smaller

@@ -33,25 +33,24 @@ const FIRST_STIFFNESS: f64 = 1.0;
 /// Number of samples of a constant motion.
 const SAMPLES: usize = 8;
 
-/// Returns the static equilibrium of a system, as an orbit at rest. Returns `None` as
-/// [`static_equilibrium`] does, and for laws that harmonic balance does not take.
-pub(crate) fn static_equilibrium_of(system: &System) -> Option<Orbit> {
+/// Returns the static equilibrium of a system. Returns `None` as [`static_equilibrium`] does, and
+/// for laws that harmonic balance does not take.
+pub(crate) fn static_equilibrium_of(system: &System) -> Option<SolvedEquilibrium> {
     let (ports, ring_ports) = Ports::for_sector(system).ok()?;
     let system = Arc::new(system.clone());
     [Regularization::Exact, Regularization::Robust].into_iter().find_map(|regularization| {
         // whether contacts alone hold a body is decided once, at the rate of the regularization
         let dynamics = LinearDynamics::new(&system, &ports);
-        let found = static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics, regularization)?;
-        Some(found.orbit)
+        static_equilibrium(&system, (&ports, ring_ports.as_ref()), &dynamics, regularization)
     })
 }
 
 /// Static equilibrium of a system.
-pub(super) struct SolvedEquilibrium {
+pub(crate) struct SolvedEquilibrium {
     /// The equilibrium as an orbit at rest.
     pub orbit: Orbit,
     /// Displacements and states of each port.
-    pub states: Vec<StaticState>,
+    pub(super) states: Vec<StaticState>,
 }
 
 /// Springs that regularize rigid-body motions. They are proportional to the square of a rate.

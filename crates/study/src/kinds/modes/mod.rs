@@ -40,7 +40,8 @@ pub(super) const KIND: Kind = Kind {
             required(
                 "amplitude",
                 ValueType::Table(AMPLITUDE),
-                "amplitude of the place that moves most in the mode of the structure without joints",
+                "amplitude of the place that moves most in the mode of the structure without joints; under constant \
+                 forces, in the mode of small motions about equilibrium",
                 "{ from = \"1 um\", to = \"10 mm\" }",
             ),
             default("mode", ValueType::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),

@@ -54,7 +54,6 @@ pub(super) use workspace::{PERIODICITY_TOLERANCE, derivative_batch};
 use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
 use crate::model::{Axis, CyclicSymmetry, System, SystemJoint};
-use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 /// Number of axes from which GMRES may replace elimination. With few axes and many harmonics,
@@ -189,17 +188,6 @@ impl Port {
         kind(self) == kind(other)
             && self.members.len() == other.members.len()
             && self.members.iter().zip(&other.members).all(alike)
-    }
-
-    /// Returns the complex stiffness of small motions about rest at a frequency
-    /// (rad/s), axes × axes, N/m. For motion ports.
-    pub fn small_motion_stiffness(&self, omega: f64) -> DMatrix<Complex64> {
-        match &self.kernel {
-            Kernel::Step(law) | Kernel::Rate(law) => {
-                crate::method::orbit_search::describing_guess::small_motion_stiffness(&**law, omega)
-            }
-            _ => DMatrix::from_diagonal_element(self.axes, self.axes, Complex64::new(self.stiffness(), 0.0)),
-        }
     }
 
     /// Estimates the stiffness at rest along its axes, N/m; zero if the port is rigid.

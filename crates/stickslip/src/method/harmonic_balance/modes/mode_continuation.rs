@@ -160,6 +160,7 @@ impl ModeEquations<'_> {
                 }
             }
         }
+        let axes: usize = self.motion_ports.iter().map(|placed| placed.directions.len()).sum();
         for (placed, w) in
             self.motion_ports.iter().flat_map(|placed| placed.directions.iter().map(move |w| (placed, w)))
         {
@@ -172,7 +173,7 @@ impl ModeEquations<'_> {
             // Relative motion below which its changes do not count, relative to the modal
             // amplitude (1/√kg). It is above rounding.
             let size = square + reach * reach + (1e-6 * at.amplitude).powi(2);
-            let weight = at.amplitude * at.amplitude / size;
+            let weight = at.amplitude * at.amplitude / (size * axes as f64);
             for k in 0..nh {
                 for part in 0..2 {
                     let change = weight * along(k, &|i| direction[2 * i + part]);
@@ -217,7 +218,7 @@ impl ModeEquations<'_> {
         let mut now = evaluate(self, &point, &mut residual, &mut jacobian);
         let mut enough = settings.tolerance;
         let mut iteration = 0;
-        while iteration <= settings.iterations {
+        while iteration <= settings.step_iterations {
             interrupt::check();
             let solved = now <= enough;
             self.border(&point, &scale, &jacobian, row, &mut bordered);

@@ -133,7 +133,7 @@ impl ModeEquations<'_> {
     pub fn linear_state(&self, mode: &LinearMode, a: f64) -> Option<ModeState> {
         let (n, nh) = (self.system.dofs(), self.aft.harmonics.len());
         let omega = mode.squared_frequency.sqrt();
-        let mut x = self.at_rest();
+        let mut x = vec![ZERO; nh * n];
         for i in 0..n {
             x[self.first * n + i] = a * mode.shape[i];
         }
@@ -143,32 +143,28 @@ impl ModeEquations<'_> {
         (omega > 0.0).then(|| ModeState { x, force, omega, damping: dissipated / (2.0 * omega) })
     }
 
-    /// Returns the linear mode number `index`, by rising frequency, with all joints at their
-    /// stiffness at small amplitude, as a motion of amplitude `a`.
+    /// Returns the linear mode number `index`, by rising frequency, of small motions about the
+    /// equilibrium, as a motion of amplitude `a`.
     ///
     /// A mode that begins at its small end starts there. Returns `None` with rigid friction,
     /// which has no stiffness.
-    pub fn small_amplitude_mode(&self, index: usize, a: f64) -> Option<ModeState> {
+    pub fn small_amplitude_mode(&mut self, index: usize, a: f64) -> Option<ModeState> {
         let settings = LinearModeSettings::default();
         if !self.force_ports.is_empty() {
             return None;
         }
         let (n, structure) = (self.system.dofs(), self.system.structure());
-        let mut square = structure.stiffness().amax() / structure.mass().amax();
+        let factor = structure.mass().clone().cholesky()?;
+        let inverse = factor.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+        // any frequency above zero serves as the first one
+        let of_joints = self.motion_ports.iter().map(|placed| placed.port.stiffness()).fold(0.0, f64::max);
+        let mut square = (structure.stiffness().amax() + of_joints) / structure.mass().amax();
         let mut found = None;
         for _ in 0..settings.iterations {
             let omega = square.sqrt();
             let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
             stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
-            for PlacedPort { port, directions: w } in &self.motion_ports {
-                let holds = port.small_motion_stiffness(omega);
-                for (i, v) in w.iter().enumerate() {
-                    for (k, w) in w.iter().enumerate() {
-                        stiffness += (v * w.transpose()).map(|product| holds[(i, k)] * product);
-                    }
-                }
-            }
-            let inverse = structure.mass().clone().cholesky()?.l().solve_lower_triangular(&DMatrix::identity(n, n))?;
+            self.add_equilibrium_stiffness(omega, &mut stiffness);
             let eigen = eigen::symmetric(&inverse * stiffness.map(|k| k.re) * inverse.transpose())?;
             let mut order: Vec<usize> = (0..n).collect();
             order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
@@ -182,9 +178,30 @@ impl ModeEquations<'_> {
             found = Some((shape, whole.im / (2.0 * square)));
         }
         let (shape, damping) = found?;
-        let mut x = self.at_rest();
+        let mut x = vec![ZERO; self.aft.harmonics.len() * n];
         x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
         Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
+    }
+
+    /// Adds the complex stiffness of the joints for small motions about the equilibrium, N/m: the
+    /// derivative of the first harmonic of their forces.
+    fn add_equilibrium_stiffness(&mut self, omega: f64, stiffness: &mut DMatrix<Complex64>) {
+        let (nh, first) = (self.aft.harmonics.len(), self.first);
+        let at_rest = self.absolute(&vec![ZERO; nh * self.system.dofs()]);
+        for placed in &self.motion_ports {
+            let axes = placed.directions.len();
+            let wide = 2 * nh * axes;
+            let (mut force, mut tangent) = (vec![ZERO; nh * axes], vec![0.0; wide * wide]);
+            let c = placed.along(&at_rest, nh);
+            self.aft.motion_port_force(&placed.port, (omega, 1.0), &c, &mut force, Some(&mut tangent));
+            for (a, v) in placed.directions.iter().enumerate() {
+                for (b, w) in placed.directions.iter().enumerate() {
+                    let at = 2 * (a * nh + first) * wide + 2 * (b * nh + first);
+                    let slope = Complex64::new(tangent[at], tangent[at + wide]);
+                    *stiffness += (v * w.transpose()).map(|product| slope * product);
+                }
+            }
+        }
     }
 
     /// Returns the modal amplitude, m √kg, above which friction is weak in the linear mode
