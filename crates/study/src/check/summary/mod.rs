@@ -6,9 +6,11 @@
 //! - `text`: the summary in words;
 //! - `structure`: the summary of a structure given by matrices;
 //! - `bodies`: the rigid bodies in words;
+//! - `mesh_fit`: warns of a mesh that does not belong to the matrices;
 //! - `warnings`: likely mistakes, as sentences.
 
 mod bodies;
+mod mesh_fit;
 mod structure;
 mod text;
 mod warnings;

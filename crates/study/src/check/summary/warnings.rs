@@ -2,6 +2,7 @@
 
 use crate::case::linear_reference::LinearReference;
 use crate::case::study::{Study, evaluate};
+use crate::check::summary::mesh_fit::mesh_misfit;
 use crate::check::summary::structure::{DIRECTIONS, mass_along};
 use crate::check::summary::text::joint_of_direction;
 use crate::check::survey::SurveyedCase;
@@ -27,6 +28,8 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -
     warnings.extend(massless(&cases[0]));
     warnings.extend(overstiff(&cases[0]));
     warnings.extend(structure(&cases[0]));
+    let component = cases[0].case.model.substructure.as_ref().map(|substructure| &substructure.component);
+    warnings.extend(component.zip(study.structure.mesh.source.as_ref()).and_then(|(own, mesh)| mesh_misfit(own, mesh)));
     warnings.extend(unused(study));
     if let Some(environment) = first_values(study) {
         warnings.extend(bare_numbers(study, &environment));
