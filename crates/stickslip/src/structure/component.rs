@@ -8,9 +8,12 @@ use super::reduction::{
     ReducedSector, Reduction, ReductionDeviation, ReductionError, ReductionKind, ReferenceReceptance, RingModes, Row,
     RubinBasis, STEPS, SectorBasis, SectorReduction, StructureDamping,
 };
+use super::reduction_store::{KeptReductions, ReductionStore};
 use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
 use super::{ModalDamping, StructureError, free_vibrations, symmetric};
 use nalgebra::DMatrix;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -53,6 +56,8 @@ struct ComponentData {
     whole: FullStructure,
     /// True if the mass matrix is positive definite.
     definite_mass: bool,
+    /// Reductions that are kept between runs.
+    kept: OnceLock<KeptReductions>,
     /// Stored reductions by request, because the cases of a study repeat requests.
     reductions: Cache<ReductionRequest, ReducedResult>,
     /// Stored shapes of the coordinates of reductions.
@@ -69,6 +74,7 @@ struct ComponentData {
 #[derive(Debug)]
 pub(crate) struct SectorCache {
     pub sector: CyclicSector,
+    kept: Option<KeptReductions>,
     reductions: Cache<ReductionRequest, ReducedResult>,
     sized: Cache<SizedRequest, ReducedResult>,
     blades: Cache<Vec<usize>, KeptBlade>,
@@ -111,7 +117,7 @@ type ShapesResult = Result<Arc<DMatrix<f64>>, ReductionError>;
 type Damped = Result<(f64, ModalDamping), ReductionError>;
 
 /// A reduced component, with its error relative to the full component.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ReducedComponent {
     form: ReducedForm,
     deviation: ReductionDeviation,
@@ -165,13 +171,14 @@ pub struct SectorComponent {
 }
 
 /// The reduced matrices.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) enum ReducedForm {
     /// A single component, without its basis.
     Alone(Arc<ReducedMatrices>),
     /// One sector of a ring.
     Sector(Arc<ReducedSector>),
     /// A ring with different blades.
+    #[serde(skip)]
     Ring(Arc<RingModes>),
 }
 
@@ -213,12 +220,54 @@ impl Component {
             index,
             whole,
             definite_mass,
+            kept: OnceLock::new(),
             reductions,
             shapes,
             damped,
             counts,
             sectors,
         })))
+    }
+
+    /// Keeps all further reductions in a store, and reads them from there, also those of this
+    /// component as a sector with equal blades. A second call has no effect.
+    ///
+    /// # Example
+    /// ```
+    /// use std::collections::HashMap;
+    /// use std::sync::{Arc, Mutex};
+    /// use stickslip::structure::{Component, Reduction, ReductionStore};
+    /// use stickslip_numerics::sparse::SparseMatrix;
+    /// #[derive(Default)]
+    /// struct Memory(Mutex<HashMap<String, Vec<u8>>>);
+    /// impl ReductionStore for Memory {
+    ///     fn load(&self, key: &str) -> Option<Vec<u8>> {
+    ///         self.0.lock().unwrap().get(key).cloned()
+    ///     }
+    ///     fn save(&self, key: &str, bytes: &[u8]) {
+    ///         self.0.lock().unwrap().insert(key.to_owned(), bytes.to_vec());
+    ///     }
+    /// }
+    /// let store = Arc::new(Memory::default());
+    /// let diagonal = |k: f64| SparseMatrix::from_triplets(2, [(0, 0, k), (1, 1, 9.0 * k)]);
+    /// for stiffness in [1.0, 1.0, 2.0] {
+    ///     let (mass, stiffness) = (diagonal(1.0)?, diagonal(stiffness)?);
+    ///     let component = Component::new(vec![String::new(); 2], mass, None, stiffness)?;
+    ///     component.keep_reductions(store.clone());
+    ///     component.reduced(&[vec![(0, 1.0)]], &Reduction::up_to(0.5))?;
+    /// }
+    /// assert_eq!(store.0.lock().unwrap().len(), 2); // the second component equals the first
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn keep_reductions(&self, store: Arc<dyn ReductionStore>) {
+        self.0.kept.get_or_init(|| KeptReductions::new(store, self.matrices()));
+    }
+
+    /// Keeps the reductions of this component where those of another one are kept.
+    pub fn keep_reductions_like(&self, other: &Component) {
+        if let Some(kept) = other.0.kept.get() {
+            self.keep_reductions(kept.store());
+        }
     }
 
     /// Returns the number of rows of the matrices.
@@ -337,7 +386,9 @@ impl Component {
     /// the tolerance.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
         cached(&self.0.reductions, &(seen.to_vec(), *how), || {
-            self.0.whole.with_ports(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
+            load_or_compute(self.0.kept.get(), &(seen, how), || {
+                self.0.whole.with_ports(seen.to_vec()).and_then(|whole| reduce(&whole, how)).map(Arc::new)
+            })
         })
     }
 
@@ -349,8 +400,10 @@ impl Component {
     /// See [`Component::reduced`].
     pub fn shapes(&self, seen: &[Row], how: &Reduction) -> ShapesResult {
         cached(&self.0.shapes, &(seen.to_vec(), *how), || {
-            let whole = self.0.whole.with_ports(seen.to_vec())?;
-            Ok(Arc::new(reduce_whole(&whole, how)?.reduced.scaled_to_metres().columns()))
+            load_or_compute(self.0.kept.get(), &("shapes", seen, how), || {
+                let whole = self.0.whole.with_ports(seen.to_vec())?;
+                Ok(Arc::new(reduce_whole(&whole, how)?.reduced.scaled_to_metres().columns()))
+            })
         })
     }
 
@@ -489,6 +542,7 @@ impl Component {
         let sector = CyclicSector::new(self.matrices(), boundary, sectors);
         let kept = Arc::new(SectorCache {
             sector,
+            kept: self.0.kept.get().map(|kept| kept.with_input(&(boundary, sectors))),
             reductions: Mutex::default(),
             sized: Mutex::default(),
             blades: Mutex::default(),
@@ -517,6 +571,18 @@ fn cached<K: PartialEq + Clone, V: Clone>(known: &Cache<K, V>, asked: &K, comput
     answer
 }
 
+/// Returns the result of a request from the store, if there is one, or computes it.
+fn load_or_compute<T: Serialize + DeserializeOwned>(
+    kept: Option<&KeptReductions>,
+    request: &impl std::fmt::Debug,
+    compute: impl FnOnce() -> Result<Arc<T>, ReductionError>,
+) -> Result<Arc<T>, ReductionError> {
+    match kept {
+        Some(kept) => kept.with_input(request).load_or_compute(compute),
+        None => compute(),
+    }
+}
+
 /// Returns the number of stored results; zero while one is computed.
 fn stored<K, V>(known: &Cache<K, V>) -> usize {
     known.try_lock().map_or(0, |known| known.len())
@@ -533,14 +599,18 @@ impl SectorCache {
 
     /// Returns the reduced sector.
     pub fn reduced(&self, seen: &[Row], how: &Reduction) -> ReducedResult {
-        cached(&self.reductions, &(seen.to_vec(), *how), || self.chosen(seen, how, None))
+        cached(&self.reductions, &(seen.to_vec(), *how), || {
+            load_or_compute(self.kept.as_ref(), &(seen, how), || self.chosen(seen, how, None))
+        })
     }
 
     /// Returns the sector reduced by a basis of this size with modes up to a higher frequency,
     /// rad/s, see [`CyclicSector::reduced_by_size`].
     pub fn reduced_by_size(&self, seen: &[Row], up_to: f64, basis: SectorBasis) -> ReducedResult {
         cached(&self.sized, &(seen.to_vec(), up_to, basis), || {
-            Ok(ReducedComponent::of_sector(self.sector.reduced_by_size(seen, up_to, basis)?))
+            load_or_compute(self.kept.as_ref(), &(seen, up_to, basis), || {
+                Ok(ReducedComponent::of_sector(self.sector.reduced_by_size(seen, up_to, basis)?))
+            })
         })
     }
 

@@ -6,6 +6,7 @@
 //! - `assembled`: the system of the model that was assembled last;
 //! - `disk`: `[disk]`, the ring of a sector, tuned or mistuned;
 //! - `substructure`: `[structure]` and `[[place]]` as parts of a model;
+//! - `reduction_folder`: the folder that keeps reductions between runs;
 //! - `stress_stiffening`: stress stiffening of a rotating structure;
 //! - `names`: names of places and joints that a key may use;
 //! - `sample`: `[sample]`, uncertain parameters drawn at random;
@@ -18,6 +19,7 @@ pub(crate) mod initial_state;
 pub(crate) mod linear_reference;
 pub(crate) mod model_builder;
 pub(crate) mod names;
+pub(crate) mod reduction_folder;
 pub(crate) mod sample;
 pub(crate) mod stress_stiffening;
 pub(crate) mod study;

@@ -56,6 +56,7 @@ impl StressStiffening {
         let stiffness =
             SparseMatrix::from_triplets(rest.n(), rest.entries().chain(more)).map_err(|_| not_finite(share))?;
         let found = Component::new(component.rows().to_vec(), mass.clone(), damping.cloned(), stiffness)?;
+        found.keep_reductions_like(component);
         // Number of components that are kept, one per speed. Reductions belong to a component,
         // and cases at the same speed share it.
         if kept.len() == 16 {

@@ -245,6 +245,13 @@ pub const STRUCTURE: &[Key] = &[
          every `reduction_error`",
         "{ error = 2e-6, up_to = \"5 kHz\" }",
     ),
+    optional(
+        "keep_reductions",
+        ValueType::Text,
+        "folder that keeps every reduction of this structure, except of a disk with unequal blades: later runs read \
+         it, if matrices, places and request are equal; it may be deleted at any time",
+        "\"reduced\"",
+    ),
 ];
 
 /// The keys of an entry for a file that has several matrices, or a format that is not

@@ -25,6 +25,7 @@ use crate::structure::sector::{is_real, wave_entries};
 use crate::structure::sector_boundary::{Blade, symmetrized};
 use crate::structure::{CyclicSector, RingEntry, unit_root};
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
 use stickslip_numerics::eigen;
@@ -55,7 +56,7 @@ fn threads() -> usize {
 }
 
 /// The size of a basis of a sector whose error was within its tolerance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SectorBasis {
     /// Multiple of the frequency of interest up to which it has modes.
     extent: f64,
@@ -68,7 +69,7 @@ pub struct SectorBasis {
 }
 
 /// A reduced sector.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct ReducedSector {
     pub kind: String,
     /// Columns over the remaining rows.

@@ -52,6 +52,7 @@ pub use residual_series::ResidualSeries;
 pub use rubin::RubinBasis;
 
 use nalgebra::{Complex, DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 use stickslip_numerics::dense::{ComplexLu, DenseLu};
@@ -394,7 +395,7 @@ impl FullStructure {
 }
 
 /// A reduced structure.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReducedMatrices {
     /// Description of the reduction.
     pub kind: String,

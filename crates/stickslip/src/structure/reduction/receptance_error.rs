@@ -12,6 +12,7 @@
 
 use super::{FullStructure, ReducedMatrices, ReductionError, ResidualSeries, StructureDamping};
 use nalgebra::{Complex, DMatrix};
+use serde::{Deserialize, Serialize};
 use stickslip_numerics::random::SplitMix64;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
@@ -31,7 +32,7 @@ pub struct ReferenceReceptance {
 }
 
 /// Error of a reduction relative to the whole structure.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReductionDeviation {
     /// Largest relative error of the samples.
     pub error: f64,

@@ -6,6 +6,7 @@
 
 use super::reader::Reader;
 use super::structure_cache::StructureKey;
+use crate::case::reduction_folder::ReductionFolder;
 use crate::case::stress_stiffening::StressStiffening;
 use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
@@ -52,6 +53,19 @@ impl Reader {
         };
         match structure {
             Ok(ReadStructure { component, stress_stiffening, constrained_rows, stress }) => {
+                if let Some(CompiledValue::Fixed(ResolvedValue::Text(path))) =
+                    stated.entry("keep_reductions").map(|entry| &entry.value)
+                {
+                    match ReductionFolder::create(folder.join(path)) {
+                        Ok(kept) => component.keep_reductions(Arc::new(kept)),
+                        Err(error) => {
+                            let message = format!("the folder `{path}` cannot be created: {error}");
+                            let location = stated.location_of("keep_reductions", None);
+                            self.problems.push(Problem::new(location, "keep_reductions", message));
+                            return None;
+                        }
+                    }
+                }
                 let component = Some(component);
                 Some(MatrixSource { table: stated, component, stress_stiffening, constrained_rows, stress })
             }
