@@ -499,6 +499,70 @@ mod tests {
         }
     }
 
+    /// A block that only a pressed contact holds on a mass with a spring. With one harmonic, the
+    /// squared frequency `λ = ω² (1 + 2jζ)` is the lower eigenvalue of both masses with the complex
+    /// stiffness `k(D)` of a Jenkins element at the relative amplitude D. The modal amplitude
+    /// rises, falls and rises again with D, so that the curve turns twice.
+    #[test]
+    fn a_mode_that_rises_reports_its_fold() {
+        let (spring, masses, kt, limit) = (1000.0, [1.0, 0.5], 2000.0, 3.0);
+        let mut model = Model::default();
+        model
+            .masses
+            .extend([("a", masses[0]), ("b", masses[1])].map(|(name, m)| Mass::new(name, m).along(&["x", "z"])));
+        for (along, stiffness) in [("a.x", spring), ("a.z", 2e4)] {
+            let between = [along.to_owned(), GROUND.to_owned()];
+            model.springs.push(Spring { between, stiffness, damping: 0.0 });
+        }
+        let law = FrictionContact { tangential: kt, normal: 5e3, friction: 0.3, preload: 0.0, tangents: 1 };
+        let between = ["b".to_owned(), "a".to_owned()];
+        model.joints.push(Joint { name: "j".into(), between, law: std::sync::Arc::new(law) });
+        model.forces.push(Force { on: "b.z".into(), amplitude: limit / 0.3, phase: 0.0, harmonic: 0 });
+        let system = model.assemble().unwrap();
+        // modal amplitude, frequency and damping by D
+        let slips = limit / kt;
+        let mut before = None;
+        let closed: Vec<[f64; 3]> = (1..4000)
+            .map(|i| {
+                let d = slips * 10f64.powf(2.0 * f64::from(i) / 4000.0);
+                let psi = (1.0 - 2.0 * slips / d).max(-1.0).acos();
+                let k =
+                    Complex64::new(kt * (psi - psi.sin() * psi.cos()) / PI, 4.0 * limit * (1.0 - slips / d) / (PI * d));
+                let (product, sum) = (masses[0] * masses[1], k * (masses[0] + masses[1]) + masses[1] * spring);
+                let root = (sum * sum - k * (4.0 * product * spring)).sqrt();
+                let roots = [-1.0, 1.0].map(|sign| (sum + root * sign) / (2.0 * product));
+                let near = |root: &Complex64| before.map_or(root.norm(), |before: Complex64| (root - before).norm());
+                let lambda = if near(&roots[0]) < near(&roots[1]) { roots[0] } else { roots[1] };
+                before = Some(lambda);
+                let of_a = 1.0 - lambda * masses[1] / k;
+                let scale = d / (1.0 - of_a).norm();
+                let amplitude = scale * (masses[0] * of_a.norm_sqr() + masses[1]).sqrt();
+                [amplitude, lambda.re.sqrt(), lambda.im / (2.0 * lambda.re)]
+            })
+            .collect();
+        let turns: Vec<f64> = closed
+            .windows(3)
+            .filter(|three| (three[1][0] - three[0][0]) * (three[2][0] - three[1][0]) < 0.0)
+            .map(|three| three[1][0])
+            .collect();
+        let [upper, lower] = turns[..] else { panic!("{turns:?}") };
+        let request = ModeRequest { mode: 0, range: (5e-3, 4e-2), points: 25, harmonics: 1, samples: 1024 };
+        let mode = nonlinear_mode(&system, request).unwrap();
+        assert_eq!((mode.points.len(), mode.ended, mode.turns.len()), (25, None, 1));
+        let turn = mode.turns[0];
+        assert!((turn.amplitude / lower - 1.0).abs() < 0.01, "{turn:?} {lower}");
+        assert!((turn.return_amplitude / upper - 1.0).abs() < 0.01, "{turn:?} {upper}");
+        // the first solution from above
+        for point in mode.points.iter().filter(|point| point.amplitude > lower) {
+            let above = closed.iter().rposition(|closed| closed[0] < point.amplitude).unwrap();
+            let [[a, omega, damping], [b, omega_b, damping_b]] = [closed[above], closed[above + 1]];
+            let share = (point.amplitude - a) / (b - a);
+            let (omega, damping) = (omega + share * (omega_b - omega), damping + share * (damping_b - damping));
+            assert!((point.omega / omega - 1.0).abs() < 1e-3, "{} {} {omega}", point.amplitude, point.omega);
+            assert!((point.damping / damping - 1.0).abs() < 1e-3, "{} {} {damping}", point.amplitude, point.damping);
+        }
+    }
+
     /// A mass with rigid friction that falls with velocity does not vibrate if friction is
     /// thousands of times the spring force. The curve ends there after some hundred steps.
     #[test]

@@ -270,10 +270,10 @@ fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {
             (needed, asked) = (slip, to);
         }
     }
-    // Multiple of the largest requested amplitude above which the first slip is due to rounding.
-    // A mode of a symmetric structure that does not move its joints still loads them by the
-    // rounding errors of its shape.
-    if needed > 1e6 * asked {
+    // Amplitude, relative to the requested ones and to 1 m, above which the first slip is due to
+    // rounding. A mode of a symmetric structure that does not move its joints still loads them by
+    // the rounding errors of its shape.
+    if needed > 1e6 * asked.max(1.0) {
         return Some("no joint slips in this mode at any amplitude: its motion does not load the joints".to_owned());
     }
     Some(format!(

@@ -107,6 +107,9 @@ struct ModeCurveSettings {
     /// A step that takes at most this many Newton iterations is followed by a longer one. At
     /// kinks, Newton's method takes more than the usual three without being close to failure.
     few_iterations: usize,
+    /// Step of an upward continuation from which on it tries to skip a kink. Some kinks have many
+    /// short parts.
+    leap_step: f64,
     /// Fractions of a decade in amplitude by which a leap skips a part of the curve that cannot be
     /// followed.
     leaps: [f64; 6],
@@ -145,6 +148,7 @@ impl Default for ModeCurveSettings {
             max_predictor_error: 0.5,
             min_mac: 0.9,
             few_iterations: 8,
+            leap_step: 1e-5,
             leaps: [0.01, 0.03, 0.1, 0.2, 0.4, 0.7],
             merging_collinearity: 1.0 / 3.0,
             refined_steps: 16,
@@ -257,7 +261,7 @@ impl ModeCurve {
                 None => ModeEndCause::Stalled,
             };
             // continue with the same shape at a smaller amplitude
-            let Some(next) = leap(equations, &settings, &path.arcs[lowest]) else {
+            let Some(next) = leap(equations, &settings, &path.arcs[lowest], -1.0) else {
                 path.ended = Some(ModeEnd { at: path.arcs[lowest].amplitude, reason });
                 return path;
             };
@@ -429,8 +433,12 @@ impl ModeCurve {
     }
 
     /// Returns the parts of the curve that turn back and later continue to new, smaller
-    /// amplitudes.
+    /// amplitudes. A curve that goes up may begin within such a part.
     pub(super) fn turns(&self) -> Vec<TurningPart> {
+        let part = |least: f64, up: Option<f64>| {
+            let turn = TurningPart { amplitude: least, return_amplitude: up? };
+            (turn.return_amplitude > (1.0 + self.settings.min_turn) * turn.amplitude).then_some(turn)
+        };
         let mut turns = Vec::new();
         let (mut least, mut up): (f64, Option<f64>) = (f64::INFINITY, None);
         for arc in &self.arcs {
@@ -438,13 +446,11 @@ impl ModeCurve {
             if a > least {
                 up = Some(up.map_or(a, |up| up.max(a)));
             } else {
-                let turn = up.take().map(|up| TurningPart { amplitude: least, return_amplitude: up });
-                turns.extend(
-                    turn.filter(|turn| turn.return_amplitude > (1.0 + self.settings.min_turn) * turn.amplitude),
-                );
+                turns.extend(part(least, up.take()));
                 least = a;
             }
         }
+        turns.extend(part(least, up.filter(|_| self.linear.is_none())));
         turns
     }
 }
@@ -498,7 +504,15 @@ fn follow_upwards(
                         now = step.to;
                         arcs.push(now.clone());
                     }
-                    None => length *= 0.5,
+                    None => {
+                        length *= 0.5;
+                        // once for every kink
+                        let is_kink = length <= settings.leap_step && 2.0 * length > settings.leap_step;
+                        if let Some(next) = is_kink.then(|| leap(equations, settings, &now, 1.0)).flatten() {
+                            (now, length) = (next.reversed(), settings.initial_step);
+                            arcs.push(now.clone());
+                        }
+                    }
                 }
                 continue;
             }
@@ -511,10 +525,10 @@ fn follow_upwards(
 }
 
 /// Skips a kink that no step passes, or leaves a curve that does not return. Solves at a smaller
-/// amplitude for the same shape.
-fn leap(equations: &mut ModeEquations<'_>, settings: &ModeCurveSettings, now: &ModeArc) -> Option<ModeArc> {
+/// amplitude for the same shape, or at a larger one if `sign` is positive.
+fn leap(equations: &mut ModeEquations<'_>, settings: &ModeCurveSettings, now: &ModeArc, sign: f64) -> Option<ModeArc> {
     settings.leaps.iter().find_map(|part| {
-        let amplitude = now.amplitude * 10f64.powf(-part);
+        let amplitude = now.amplitude * 10f64.powf(sign * part);
         let state = equations.solve(&now.state, now.amplitude, amplitude)?;
         (equations.modal_assurance(&now.state, &state) >= settings.min_mac)
             .then(|| equations.start_curve(&state, amplitude))?

@@ -25,7 +25,7 @@ struct MeshFitSettings {
 
 impl Default for MeshFitSettings {
     fn default() -> Self {
-        MeshFitSettings { translation: 1e-6, rotation: 1e-2, disagreeing: 0.1, compared: 10 }
+        MeshFitSettings { translation: 1e-6, rotation: 1e-2, disagreeing: 0.03, compared: 10 }
     }
 }
 

@@ -59,7 +59,10 @@ impl Reader {
                     match ReductionFolder::create(folder.join(path)) {
                         Ok(kept) => component.keep_reductions(Arc::new(kept)),
                         Err(error) => {
-                            let message = format!("the folder `{path}` cannot be created: {error}");
+                            let message = match folder.join(path).exists() {
+                                true => format!("`{path}` is a file, not a folder"),
+                                false => format!("the folder `{path}` cannot be created: {error}"),
+                            };
                             let location = stated.location_of("keep_reductions", None);
                             self.problems.push(Problem::new(location, "keep_reductions", message));
                             return None;

@@ -14,7 +14,7 @@ use crate::results::dataset::FIELDS;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::format::prefixed_unit;
+use crate::syntax::format::format_with_prefix;
 use crate::syntax::key::{Bounds, Key, ValueType, default, required};
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, nonlinear_mode, unit_amplitude};
 use stickslip::dimension::Dimension;
@@ -97,7 +97,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let mass_places = model.masses.iter().map(|mass| mass.places().len());
     let masses = mass_places.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
-        let message = format!("there is no mode {number}: the structure has {masses} degrees of freedom");
+        let message = format!("there is no mode {number}: degrees of freedom of the structure: {masses}");
         return Err(KeyError::new("mode", message, "modes count from 1, by ascending frequency"));
     }
     Ok(())
@@ -202,9 +202,7 @@ fn location_of(prepared: &PreparedCase) -> String {
 /// Returns a modal amplitude in words as the study file states it: the amplitude of the place
 /// that moves most.
 fn amplitude(unit: f64, modal: f64) -> String {
-    let si = modal / unit;
-    let (name, factor) = prefixed_unit(si, "m");
-    format!("{:.3} {name}", si * factor)
+    format_with_prefix(modal / unit, "m")
 }
 
 /// Returns the status of a mode, and the reason if it is incomplete or uncertain.

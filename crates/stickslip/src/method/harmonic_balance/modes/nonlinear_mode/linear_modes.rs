@@ -10,6 +10,9 @@ use stickslip_numerics::eigen;
 struct LinearModeSettings {
     /// Share of the joints' stiffness that separates equal modes of a structure without joints.
     joint_share: f64,
+    /// Squared frequency, relative to that of the joints' share alone, up to which a mode is a
+    /// rigid-body motion.
+    rigid_body: f64,
     /// Relative distance of two squared frequencies up to which modes count as equal. It is well
     /// above `joint_share`.
     equal_frequencies: f64,
@@ -26,6 +29,7 @@ impl Default for LinearModeSettings {
     fn default() -> Self {
         LinearModeSettings {
             joint_share: 1e-9,
+            rigid_body: 2.0,
             equal_frequencies: 1e-7,
             rounding: 64.0 * f64::EPSILON,
             negligible_entry: 1e-6,
@@ -87,16 +91,17 @@ impl ModeEquations<'_> {
         if n == 0 {
             return Vec::new(); // the motion of every place is given
         }
-        let mut stiffness = self.system.structure().stiffness().clone();
         // keep a small share of the joints' stiffness, so that equal blades move with or
         // against each other as the joints couple them
+        let mut of_joints = DMatrix::zeros(n, n);
         for PlacedPort { port, directions: w } in self.motion_ports.iter().chain(&self.force_ports) {
             let kt = port.stiffness();
             let kt = if kt > 0.0 { kt } else { self.system.structure().stiffness().amax() };
             for w in w {
-                stiffness += w * w.transpose() * (settings.joint_share * kt);
+                of_joints += w * w.transpose() * (settings.joint_share * kt);
             }
         }
+        let stiffness = self.system.structure().stiffness() + &of_joints;
         let Some(factor) = self.system.structure().mass().clone().cholesky() else { return Vec::new() };
         let lower = factor.l();
         let Some(inverse) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) else { return Vec::new() };
@@ -105,6 +110,11 @@ impl ModeEquations<'_> {
         let mut modes: Vec<(f64, DVector<f64>)> =
             (0..n).map(|k| (eigen.eigenvalues[k].max(0.0), shapes.column(k).into_owned())).collect();
         modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // the joints' share is the only stiffness of a rigid-body motion
+        let squared = |square: f64, shape: &DVector<f64>| {
+            let share = shape.dot(&(&of_joints * shape));
+            if square <= settings.rigid_body * share { 0.0 } else { square }
+        };
         let rounding = settings.rounding * n as f64 * modes.last().map_or(0.0, |mode| mode.0);
         let equal = |a: &(f64, DVector<f64>), b: &(f64, DVector<f64>)| b.0 - a.0 <= rounding;
         let mut found = Vec::with_capacity(n);
@@ -112,14 +122,14 @@ impl ModeEquations<'_> {
             match group {
                 [(square, one), (_, other)] => {
                     let made = |(shape, stands): (_, &DVector<f64>)| LinearMode {
-                        squared_frequency: *square,
+                        squared_frequency: squared(*square, stands),
                         shape,
                         standing_mode: Some(stands.clone()),
                     };
                     found.extend(waves(one, other).into_iter().zip([one, other]).map(made));
                 }
                 _ => found.extend(group.iter().map(|(square, shape)| LinearMode {
-                    squared_frequency: *square,
+                    squared_frequency: squared(*square, shape),
                     shape: real(shape),
                     standing_mode: None,
                 })),

@@ -49,9 +49,8 @@ pub(crate) struct ModeSettings {
     /// The residual at which a stagnating iteration counts as converged. A stiff joint between
     /// soft springs loses three digits to rounding.
     pub rounded: f64,
-    /// Squared frequency of a rigid-body motion without joints, relative to that of a mode, at
-    /// most. Modes without joints keep 1e-9 of the joints' stiffness.
-    pub free_motion: f64,
+    /// Least motion that the residual is relative to, as a fraction of the static displacements.
+    pub least_motion: f64,
     /// Stiffness of the springs of [`ModeEquations::hold_free_bodies`], relative to the inertia
     /// of the mode. The mean changes by this fraction.
     pub mean_springs: f64,
@@ -64,7 +63,7 @@ impl Default for ModeSettings {
             step_iterations: 20,
             tolerance: 1e-11,
             rounded: 1e-8,
-            free_motion: 1e-8,
+            least_motion: 1e-5,
             mean_springs: 1e-10,
         }
     }
@@ -218,8 +217,7 @@ impl<'a> ModeEquations<'a> {
     /// frequency `omega`. Nothing else determines the mean while such a body slides.
     pub fn hold_free_bodies(&mut self, omega: f64) {
         let settings = ModeSettings::default();
-        let lowest = self.linear_modes().first().map_or(f64::INFINITY, |mode| mode.squared_frequency);
-        let is_free = lowest < settings.free_motion * omega * omega;
+        let is_free = self.linear_modes().first().is_some_and(|mode| mode.squared_frequency == 0.0);
         self.mean_springs = if is_free { settings.mean_springs * omega * omega } else { 0.0 };
     }
 
@@ -503,6 +501,8 @@ impl<'a> ModeEquations<'a> {
     /// amplitude and phase are dimensionless.
     pub(crate) fn units(&self, start: &ModeState, a: f64) -> Vec<f64> {
         let stiffness = self.largest_stiffness(start.omega);
+        // the forces of a motion far below the static displacements have their rounding errors
+        let a = a.max(ModeSettings::default().least_motion * self.equilibrium.amax());
         let mut scale = vec![(stiffness * a).max(f64::MIN_POSITIVE); 2 * start.x.len()];
         let width = 2 * self.aft.harmonics.len();
         scale.extend(self.force_ports.iter().flat_map(|placed| vec![placed.port.scale; width * placed.port.axes]));
