@@ -474,8 +474,8 @@ fn try_step(
 /// Follows the curve upwards from `start` to `high`. Returns the points in decreasing order of
 /// amplitude, and the reason if the curve ends below `high`.
 ///
-/// It is needed for forces that grow with amplitude, because the linear mode is then not a useful
-/// initial guess.
+/// It serves modes that begin at small motions, and forces that grow with amplitude: the linear
+/// mode is then not a useful initial guess.
 fn follow_upwards(
     equations: &mut ModeEquations<'_>,
     settings: &ModeCurveSettings,

@@ -41,7 +41,8 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 pub(crate) struct ModeSettings {
     /// Newton iterations at one amplitude; 2 to 10 are usual.
     pub iterations: usize,
-    /// Newton iterations of a step of the continuation, which a shorter step replaces.
+    /// Newton iterations of a step of the continuation. If they do not suffice, a shorter step is
+    /// taken.
     pub step_iterations: usize,
     /// Residual, relative to the elastic forces and to the slip limits, at which a motion counts
     /// as periodic.
