@@ -4,6 +4,7 @@
 //! neighbours all move along. The rows next to constraints and springs to the ground are those
 //! with a force under a translation.
 
+use crate::check::summary::structure::node_and_axis;
 use crate::compile::mesh::MeshSource;
 use std::collections::HashMap;
 use stickslip::structure::Component;
@@ -82,9 +83,8 @@ fn disagreeing_rows(component: &Component, nodes: &HashMap<i64, [f64; 3]>) -> Op
 
 /// Returns direction and position of a row `17.y`, if the mesh has the node.
 fn position(row: &str, nodes: &HashMap<i64, [f64; 3]>) -> Option<(usize, [f64; 3])> {
-    let (node, along) = row.rsplit_once('.')?;
-    let axis = ["x", "y", "z"].iter().position(|axis| *axis == along)?;
-    Some((axis, *nodes.get(&node.parse().ok()?)?))
+    let (node, axis) = node_and_axis(row)?;
+    Some((axis, *nodes.get(&i64::try_from(node).ok()?)?))
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ mod text;
 mod warnings;
 
 pub use crate::compile::mesh::contact::{ContactPair, ContactSummary};
+pub(crate) use structure::node_and_axis;
 pub use structure::{DIRECTIONS, StructureSummary, mass_along};
 pub(crate) use text::line;
 

@@ -11,6 +11,12 @@ use stickslip_numerics::sparse::SparseMatrix;
 /// Directions for which the mass is stated.
 pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 
+/// Returns the number of a node and the index of a direction for the name of a row, `17.y`.
+pub(crate) fn node_and_axis(name: &str) -> Option<(u64, usize)> {
+    let (node, along) = name.rsplit_once('.')?;
+    Some((node.parse().ok()?, DIRECTIONS.iter().position(|axis| *axis == along)?))
+}
+
 /// A structure given by matrices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureSummary {

@@ -53,21 +53,9 @@ impl Reader {
         };
         match structure {
             Ok(ReadStructure { component, stress_stiffening, constrained_rows, stress }) => {
-                if let Some(CompiledValue::Fixed(ResolvedValue::Text(path))) =
-                    stated.entry("keep_reductions").map(|entry| &entry.value)
-                {
-                    match ReductionFolder::create(folder.join(path)) {
-                        Ok(kept) => component.keep_reductions(Arc::new(kept)),
-                        Err(error) => {
-                            let message = match folder.join(path).exists() {
-                                true => format!("`{path}` is a file, not a folder"),
-                                false => format!("the folder `{path}` cannot be created: {error}"),
-                            };
-                            let location = stated.location_of("keep_reductions", None);
-                            self.problems.push(Problem::new(location, "keep_reductions", message));
-                            return None;
-                        }
-                    }
+                if let Err(problem) = keep_reductions(&stated, folder, &component) {
+                    self.problems.push(problem);
+                    return None;
                 }
                 let component = Some(component);
                 Some(MatrixSource { table: stated, component, stress_stiffening, constrained_rows, stress })
@@ -90,6 +78,23 @@ pub(super) struct ReadStructure {
     pub constrained_rows: usize,
     /// The matrix of stresses, if one is named.
     pub stress: Option<Arc<StressMatrix>>,
+}
+
+/// Keeps the reductions of the structure in the folder of `keep_reductions`, if it is stated.
+fn keep_reductions(stated: &CompiledTable, folder: &Path, component: &Component) -> Result<(), Problem> {
+    const KEY: &str = "keep_reductions";
+    let Some(CompiledValue::Fixed(ResolvedValue::Text(path))) = stated.entry(KEY).map(|entry| &entry.value) else {
+        return Ok(());
+    };
+    let kept = ReductionFolder::create(folder.join(path)).map_err(|error| {
+        let message = match folder.join(path).exists() {
+            true => format!("`{path}` is a file, not a folder"),
+            false => format!("the folder `{path}` cannot be created: {error}"),
+        };
+        Problem::new(stated.location_of(KEY, None), KEY, message)
+    })?;
+    component.keep_reductions(Arc::new(kept));
+    Ok(())
 }
 
 /// Returns what identifies the content of the files; `None` if a file cannot be found.

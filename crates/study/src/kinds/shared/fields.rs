@@ -8,6 +8,7 @@ use super::contact_states::contact_word;
 use crate::case::study::Study;
 use crate::case::values::{Values, hertz};
 use crate::check::size::{SizeInputs, TableShape};
+use crate::check::summary::{DIRECTIONS, node_and_axis};
 use crate::kinds::info::KeyError;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
@@ -30,8 +31,6 @@ pub(in crate::kinds) const KEY: Key = optional(
 
 /// Columns with quantities per area at the nodes of contacts.
 const PER_AREA: [&str; 3] = ["pressure_Pa", "friction_Pa", "loss_J_per_m2"];
-/// Directions of a node, in the names of its rows.
-const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 
 /// Refuses a model without nodes, and a disk whose sectors have no known rotation.
 pub(in crate::kinds) fn check(values: &Values, model: &Model) -> Result<(), KeyError> {
@@ -234,10 +233,4 @@ pub(in crate::kinds) fn imposed(system: &System, omega: f64, time: f64) -> [Vec<
         system.moved_places().iter().map(|place| place.motion.iter().map(part).sum()).collect()
     };
     [at(0), at(1)]
-}
-
-/// Returns the number of a node and the index of a direction for the name of a row, `17.y`.
-fn node_and_axis(name: &str) -> Option<(u64, usize)> {
-    let (node, along) = name.rsplit_once('.')?;
-    Some((node.parse().ok()?, DIRECTIONS.iter().position(|axis| *axis == along)?))
 }
