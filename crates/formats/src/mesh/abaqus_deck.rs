@@ -43,7 +43,7 @@ fn sniff(bytes: &[u8]) -> bool {
 }
 
 /// Content of the data lines below a keyword.
-enum Block {
+enum DataLines {
     Nodes {
         set: Option<String>,
     },
@@ -74,7 +74,7 @@ enum Block {
 /// The state of the reader, across included files.
 struct Deck<'b> {
     builder: &'b mut MeshBuilder,
-    block: Block,
+    data_lines: DataLines,
     /// Name of the part that contains nodes.
     part: Option<String>,
     current_part: String,
@@ -83,7 +83,8 @@ struct Deck<'b> {
 }
 
 fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
-    let mut deck = Deck { builder, block: Block::Other, part: None, current_part: String::new(), element: Vec::new() };
+    let mut deck =
+        Deck { builder, data_lines: DataLines::Other, part: None, current_part: String::new(), element: Vec::new() };
     deck.file(file.bytes, file.folder, 0)
 }
 
@@ -144,7 +145,7 @@ impl Deck<'_> {
         let text = keyword(line).unwrap_or_default();
         let name = text.split(',').next().unwrap_or_default();
         let required = |key: &str| stated(line, key).ok_or_else(|| line.malformed(&format!("{key}=name"), "none"));
-        self.block = match name {
+        self.data_lines = match name {
             "*NODE" => {
                 if parameter(&text, "SYSTEM").is_some_and(|system| system != "R") {
                     let problem = "the coordinates are cylindrical or spherical".to_owned();
@@ -152,13 +153,13 @@ impl Deck<'_> {
                     return Err(Error::new(ErrorKind::Unsupported, line.location(), problem, remedy));
                 }
                 self.enter_part(line)?;
-                Block::Nodes { set: stated(line, "NSET") }
+                DataLines::Nodes { set: stated(line, "NSET") }
             }
             "*ELEMENT" => {
                 let kind = parameter(&text, "TYPE").unwrap_or_default().to_owned();
                 match shape(&kind) {
-                    Some(shape) => Block::Elements { shape, set: stated(line, "ELSET") },
-                    None => Block::OtherElements { kind },
+                    Some(shape) => DataLines::Elements { shape, set: stated(line, "ELSET") },
+                    None => DataLines::OtherElements { kind },
                 }
             }
             "*NSET" | "*ELSET" => {
@@ -172,19 +173,19 @@ impl Deck<'_> {
                     let nodes: Vec<i64> = nodes.flatten().copied().collect();
                     self.builder.add(&set, kind, nodes);
                 }
-                Block::Set { name: set, kind, generate }
+                DataLines::Set { name: set, kind, generate }
             }
             "*SURFACE" => match parameter(&text, "TYPE") {
-                Some("NODE") => Block::NodeSurface { name: required("NAME")? },
-                None | Some("ELEMENT") => Block::Surface { name: required("NAME")? },
-                Some(_) => Block::Other,
+                Some("NODE") => DataLines::NodeSurface { name: required("NAME")? },
+                None | Some("ELEMENT") => DataLines::Surface { name: required("NAME")? },
+                Some(_) => DataLines::Other,
             },
             "*PART" => {
                 self.current_part = stated(line, "NAME").unwrap_or_default();
-                Block::Other
+                DataLines::Other
             }
-            "*INSTANCE" => Block::Instance,
-            _ => Block::Other,
+            "*INSTANCE" => DataLines::Instance,
+            _ => DataLines::Other,
         };
         Ok(())
     }
@@ -201,8 +202,8 @@ impl Deck<'_> {
     }
 
     fn data(&mut self, line: &Line) -> Result<(), Error> {
-        match &self.block {
-            Block::Nodes { set } => {
+        match &self.data_lines {
+            DataLines::Nodes { set } => {
                 let mut parts = line.text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii);
                 let number = line.integer(parts.next().unwrap_or_default())?;
                 let mut position = [0.0; 3];
@@ -214,7 +215,7 @@ impl Deck<'_> {
                     self.builder.add(set, SetKind::Nodes, [number]);
                 }
             }
-            Block::Elements { shape, .. } => {
+            DataLines::Elements { shape, .. } => {
                 let nodes = shape.nodes();
                 for field in fields(line.text) {
                     self.element.push(line.integer(field)?);
@@ -223,13 +224,13 @@ impl Deck<'_> {
                     self.end_element(line)?;
                 }
             }
-            Block::OtherElements { kind } => {
+            DataLines::OtherElements { kind } => {
                 // a line with a comma at its end continues
                 if !line.text.trim_ascii_end().ends_with(b",") {
                     self.builder.leave_out(kind);
                 }
             }
-            Block::Set { name, kind, generate: true } => {
+            DataLines::Set { name, kind, generate: true } => {
                 let numbers = fields(line.text).map(|field| line.integer(field)).collect::<Result<Vec<_>, _>>()?;
                 let (from, to, step) = match numbers[..] {
                     [from, to] => (from, to, 1),
@@ -239,19 +240,19 @@ impl Deck<'_> {
                 self.builder
                     .add_known(name, *kind, |number| (from..=to).contains(&number) && (number - from) % step == 0);
             }
-            Block::Set { name, kind, .. } => {
+            DataLines::Set { name, kind, .. } => {
                 for field in fields(line.text) {
                     let members = self.members(field, *kind);
                     self.builder.add(name, *kind, members);
                 }
             }
-            Block::NodeSurface { name } => {
+            DataLines::NodeSurface { name } => {
                 if let Some(field) = fields(line.text).next() {
                     let members = self.members(field, SetKind::Nodes);
                     self.builder.add(name, SetKind::Nodes, members);
                 }
             }
-            Block::Surface { name } => {
+            DataLines::Surface { name } => {
                 let mut parts = fields(line.text);
                 let elements = self.members(parts.next().unwrap_or_default(), SetKind::Elements);
                 let side = parts.next().map(|side| String::from_utf8_lossy(side).to_uppercase());
@@ -265,12 +266,12 @@ impl Deck<'_> {
                 };
                 self.builder.add_sides(name, side, elements);
             }
-            Block::Instance => {
+            DataLines::Instance => {
                 let problem = "the instance is moved relative to its part".to_owned();
                 let remedy = "write a flat deck, without parts and instances";
                 return Err(Error::new(ErrorKind::Unsupported, line.location(), problem, remedy));
             }
-            Block::Other => {}
+            DataLines::Other => {}
         }
         Ok(())
     }
@@ -289,7 +290,8 @@ impl Deck<'_> {
     /// Adds the element whose lines were read.
     fn end_element(&mut self, line: &Line) -> Result<(), Error> {
         let numbers = std::mem::take(&mut self.element);
-        let (Some((number, nodes)), Block::Elements { shape, set }) = (numbers.split_first(), &self.block) else {
+        let (Some((number, nodes)), DataLines::Elements { shape, set }) = (numbers.split_first(), &self.data_lines)
+        else {
             return Ok(());
         };
         self.builder.element(*number, *shape, nodes, line)?;

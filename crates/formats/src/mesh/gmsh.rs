@@ -62,15 +62,15 @@ fn element_type(code: i64) -> Option<GmshElement> {
 }
 
 /// A group or an entity: dimension and number.
-type Tag = (i64, i64);
+type EntityKey = (i64, i64);
 
 /// The state of the reader.
 struct Gmsh<'a, 'b> {
     lines: Lines<'a>,
     builder: &'b mut MeshBuilder,
-    names: HashMap<Tag, String>,
+    names: HashMap<EntityKey, String>,
     /// The physical groups of each entity.
-    groups: HashMap<Tag, Vec<i64>>,
+    groups: HashMap<EntityKey, Vec<i64>>,
 }
 
 fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
