@@ -8,13 +8,14 @@ use std::f64::consts::TAU;
 use std::fmt::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use stickslip::model::TRANSLATIONS;
 use stickslip::structure::Component;
 use stickslip_formats::mesh::{self, Mesh, MeshReport};
 use stickslip_formats::{self as formats, Error, ErrorKind, Matrix, MatrixReport, align_rows, constrained_rows, names};
 use stickslip_numerics::definiteness::sparse_definite;
 use stickslip_numerics::sparse;
 use stickslip_report::{mesh_picture, write_file};
-use stickslip_study::summary::{DIRECTIONS, mass_along};
+use stickslip_study::summary::mass_along;
 use stickslip_study::unit_sets;
 
 /// Number of frequencies shown for a pair of matrices.
@@ -326,7 +327,7 @@ impl Pair {
         let pair = converted(&stiffness.matrix, &out).zip(converted(&of_mass, &out));
         let (stiffness, mass) = pair.ok_or_else(|| "an entry is not finite".to_owned())?;
         let along = |along| Some((along, mass_along(&names, &mass, along)?));
-        let along = DIRECTIONS.into_iter().filter_map(along).collect();
+        let along = TRANSLATIONS.into_iter().filter_map(along).collect();
         let damping = of_damping.and_then(|damping| converted(&damping, &out));
         let component = Component::new(names, mass, damping, stiffness).map_err(|error| error.to_string());
         let turning = component.as_ref().ok().and_then(|component| component.free_vibration(LOWEST).ok().flatten());

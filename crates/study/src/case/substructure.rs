@@ -8,7 +8,7 @@ use crate::syntax::error::Problem;
 use crate::syntax::suggest::{alternatives, excerpt, suggest};
 use stickslip::method::WIDTH;
 use stickslip::model::{
-    ElementFault, Frame, Mass, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping, View,
+    ElementFault, Frame, Mass, Model, Place, ReductionAccuracy, Substructure, SubstructureDamping, TRANSLATIONS, View,
 };
 use stickslip::structure::reduction::Row;
 use stickslip::structure::{Component, Reduction, ReductionKind};
@@ -18,8 +18,6 @@ use stickslip::structure::{Component, Reduction, ReductionKind};
 const RANGE_WITHOUT_JOINTS: u32 = 5;
 /// Names of the directions of a node with a normal.
 const FRAME_DIRECTIONS: [&str; 3] = ["t1", "t2", "n"];
-/// Names of the rows of a node with a normal.
-const CARTESIAN: [&str; 3] = ["x", "y", "z"];
 
 /// The kinds of reduction: name, summary and kind.
 pub(crate) const REDUCTIONS: [(&str, &str, Option<ReductionKind>); 3] = [
@@ -279,7 +277,7 @@ fn directions(table: &CompiledTable, values: &Values) -> Result<(Vec<String>, Ve
         return Ok(Default::default());
     }
     let count = values.names("dofs").map(<[String]>::len).or(sums);
-    if let Some(count) = count.filter(|count| *count > CARTESIAN.len()) {
+    if let Some(count) = count.filter(|count| *count > TRANSLATIONS.len()) {
         let key = if sums.is_some() { "sum" } else { "dofs" };
         return Err(problem(key, format!("a node has at most three directions, but {count} rows are named"))
             .map_help("for the mean of several nodes use nodes = [\"188\", \"189\"], for a weighted sum sum = { … }"));
@@ -293,12 +291,12 @@ fn directions(table: &CompiledTable, values: &Values) -> Result<(Vec<String>, Ve
             let ends: Vec<&str> = rows.iter().map(|row| row.rsplit_once('.').map_or("", |(_, along)| along)).collect();
             let apart = ends.iter().enumerate().all(|(i, end)| !end.is_empty() && !ends[..i].contains(end));
             let usable = apart && ends.iter().all(|end| stickslip::model::is_identifier(end));
-            if usable { owned(&ends) } else { owned(&CARTESIAN[..rows.len()]) }
+            if usable { owned(&ends) } else { owned(&TRANSLATIONS[..rows.len()]) }
         }
-        (false, None, None) => owned(&CARTESIAN[..sums.unwrap_or(CARTESIAN.len())]),
+        (false, None, None) => owned(&TRANSLATIONS[..sums.unwrap_or(TRANSLATIONS.len())]),
     };
-    let rows = if framed { owned(&CARTESIAN) } else { names.clone() };
-    if framed && count.is_some_and(|count| count != CARTESIAN.len()) {
+    let rows = if framed { owned(&TRANSLATIONS) } else { names.clone() };
+    if framed && count.is_some_and(|count| count != TRANSLATIONS.len()) {
         return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned()).map_help(
             "for a plane structure name the rows in the order tangent, normal and remove the frame, or \
                 rotate them with sum = { … }",
@@ -385,7 +383,7 @@ fn build_place(table: &CompiledTable, values: &Values, component: &Component) ->
     }
     let frame = match values.vector("normal") {
         Some(normal) => {
-            if rows.len() != CARTESIAN.len() {
+            if rows.len() != TRANSLATIONS.len() {
                 return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned())
                     .map_help(
                         "name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]",
@@ -409,12 +407,12 @@ fn build_place(table: &CompiledTable, values: &Values, component: &Component) ->
 /// exactly once.
 fn in_frame_order(names: &[String]) -> Option<Vec<&String>> {
     let end =
-        |name: &String| CARTESIAN.iter().position(|axis| name.rsplit_once('.').is_some_and(|(_, end)| end == *axis));
+        |name: &String| TRANSLATIONS.iter().position(|axis| name.rsplit_once('.').is_some_and(|(_, end)| end == *axis));
     if names.iter().all(|name| end(name).is_none()) {
         return Some(names.iter().collect());
     }
     let along = |axis: usize| names.iter().find(|name| end(name) == Some(axis));
-    (0..CARTESIAN.len()).map(along).collect::<Option<Vec<_>>>().filter(|rows| rows.len() == names.len())
+    (0..TRANSLATIONS.len()).map(along).collect::<Option<Vec<_>>>().filter(|rows| rows.len() == names.len())
 }
 
 /// Returns the row of a node along a direction.

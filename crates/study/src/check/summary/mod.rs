@@ -17,7 +17,7 @@ mod warnings;
 
 pub use crate::compile::mesh::contact::{ContactPair, ContactSummary};
 pub(crate) use structure::node_and_axis;
-pub use structure::{DIRECTIONS, StructureSummary, mass_along};
+pub use structure::{StructureSummary, mass_along};
 pub(crate) use text::line;
 
 use crate::case::study::Study;

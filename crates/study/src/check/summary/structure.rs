@@ -5,16 +5,13 @@ use crate::check::survey::SurveyedCase;
 use crate::syntax::format::{format_significant, plural_suffix};
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
-use stickslip::model::{ReductionAccuracy, Substructure};
+use stickslip::model::{ReductionAccuracy, Substructure, TRANSLATIONS};
 use stickslip_numerics::sparse::SparseMatrix;
-
-/// Directions for which the mass is stated.
-pub const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
 
 /// Returns the number of a node and the index of a direction for the name of a row, `17.y`.
 pub(crate) fn node_and_axis(name: &str) -> Option<(u64, usize)> {
     let (node, along) = name.rsplit_once('.')?;
-    Some((node.parse().ok()?, DIRECTIONS.iter().position(|axis| *axis == along)?))
+    Some((node.parse().ok()?, TRANSLATIONS.iter().position(|axis| *axis == along)?))
 }
 
 /// A structure given by matrices.
@@ -70,7 +67,7 @@ impl StructureSummary {
             rows: component.dofs(),
             constrained_rows: study.structure.matrices.as_ref().map_or(0, |matrices| matrices.constrained_rows),
             entries: [stiffness.len(), mass.len()],
-            mass: DIRECTIONS.map(|along| mass_along(component.rows(), component.matrices().0, along)),
+            mass: TRANSLATIONS.map(|along| mass_along(component.rows(), component.matrices().0, along)),
             earlier_reduction: *earlier_reduction,
             reduced,
         })
@@ -114,7 +111,7 @@ impl StructureSummary {
     /// factor.
     fn mass_words(&self) -> String {
         let known: Vec<(&str, f64)> =
-            DIRECTIONS.iter().zip(self.mass).filter_map(|(along, mass)| Some((*along, mass?))).collect();
+            TRANSLATIONS.iter().zip(self.mass).filter_map(|(along, mass)| Some((*along, mass?))).collect();
         let Some(&(_, first)) = known.first() else {
             return "unknown, because no row name has a direction (449.x); `units` cannot be checked".to_owned();
         };

@@ -3,7 +3,7 @@
 use crate::case::linear_reference::LinearReference;
 use crate::case::study::{Study, evaluate};
 use crate::check::summary::mesh_fit::mesh_misfit;
-use crate::check::summary::structure::{DIRECTIONS, mass_along};
+use crate::check::summary::structure::mass_along;
 use crate::check::summary::text::joint_of_direction;
 use crate::check::survey::SurveyedCase;
 use crate::compile::compiled::{CompiledTable, Environment};
@@ -14,7 +14,7 @@ use crate::syntax::key::DAMPING_RATIO;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
-use stickslip::model::{Axis, FirstSlip, LinearModes, LooseBody};
+use stickslip::model::{Axis, FirstSlip, LinearModes, LooseBody, TRANSLATIONS};
 use stickslip::structure::ReducedComponent;
 
 /// Largest number of names that a warning lists; for more it states the number.
@@ -257,7 +257,7 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
 fn implausible_mass(case: &SurveyedCase) -> Option<String> {
     let component = &case.case.model.substructure.as_ref()?.component;
     let (mass, ..) = component.matrices();
-    let along = DIRECTIONS.iter().filter_map(|along| mass_along(component.rows(), mass, along));
+    let along = TRANSLATIONS.iter().filter_map(|along| mass_along(component.rows(), mass, along));
     let largest = along.fold(None, |largest: Option<f64>, mass| Some(largest.map_or(mass, |other| other.max(mass))))?;
     // from a tenth of a gram to a hundred tonnes
     (!(1e-4..=1e5).contains(&largest))

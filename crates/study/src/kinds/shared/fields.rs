@@ -8,7 +8,7 @@ use super::contact_states::contact_word;
 use crate::case::study::Study;
 use crate::case::values::{Values, hertz};
 use crate::check::size::{SizeInputs, TableShape};
-use crate::check::summary::{DIRECTIONS, node_and_axis};
+use crate::check::summary::node_and_axis;
 use crate::kinds::info::KeyError;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
@@ -17,7 +17,7 @@ use crate::syntax::key::{Key, ValueType, optional};
 use num_complex::Complex64;
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
-use stickslip::model::{DisplacementField, Model, Place, System};
+use stickslip::model::{DisplacementField, Model, Place, System, TRANSLATIONS};
 use stickslip::orbit::{JointSample, Orbit};
 
 /// The key `fields`.
@@ -57,7 +57,7 @@ pub(in crate::kinds) fn size(inputs: &SizeInputs<'_>, motions: f64) -> TableShap
     let instants = inputs.case.values.count("fields").unwrap_or(0) as f64;
     let rows = inputs.case.model.substructure.as_ref().map_or(0, |structure| structure.component.dofs());
     let sectors = inputs.case.model.ring.map_or(1, |ring| ring.sectors);
-    let nodes = (rows.div_ceil(DIRECTIONS.len()) * sectors) as f64;
+    let nodes = (rows.div_ceil(TRANSLATIONS.len()) * sectors) as f64;
     TableShape { rows: motions * instants * nodes, numbers: inputs.varied + 13.0, words: 1.0 }
 }
 
@@ -192,7 +192,7 @@ impl Fields {
                 for (values, unit) in motion.iter().zip(["m", "m_per_s"]) {
                     let own = along.map(|row| row.map_or(0.0, |row| values[row]));
                     let fixed = rotation.map_or(own, |to| to.map(|row| (0..3).map(|i| row[i] * own[i]).sum()));
-                    for (axis, value) in DIRECTIONS.iter().zip(fixed) {
+                    for (axis, value) in TRANSLATIONS.iter().zip(fixed) {
                         rows.number(&format!("{axis}_{unit}"), value);
                     }
                 }
