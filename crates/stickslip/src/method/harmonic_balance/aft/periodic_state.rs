@@ -4,7 +4,8 @@
 //! A step computes states and forces from the previous states and its inputs. The inputs are
 //! linear in the harmonics of the motion. The states `z` at t = 0 are periodic if `z = F(z)`,
 //! with the map `F` over one period. Newton's method solves this with `Π`, the product of the
-//! steps' derivatives; if it does not converge, the integration continues for more periods.
+//! steps' derivatives. A step that does not reduce the change over a period is shortened; if no
+//! short step reduces it, the integration continues for one more period.
 //!
 //! The derivative by a harmonic of the motion follows from `δz = Π δz + δq`. If some state is
 //! never forgotten, as in a permanently stuck contact, `1 - Π` is singular. Along such
@@ -28,6 +29,8 @@ struct PeriodicStateSettings {
     rounded: f64,
     /// Maximum number of periods with derivatives; hysteresis that slips forgets in a few.
     periods: usize,
+    /// Least fraction of a Newton step that is tried.
+    least_fraction: f64,
     /// Maximum number of initial periods without derivatives. A period with derivatives costs as
     /// much as three without.
     plain_periods: usize,
@@ -47,6 +50,7 @@ impl Default for PeriodicStateSettings {
         PeriodicStateSettings {
             rounded: 1e-9,
             periods: 60,
+            least_fraction: 0.1,
             plain_periods: 6,
             slow_ratio: 0.03,
             broyden_reduction: 0.3,
@@ -54,6 +58,16 @@ impl Default for PeriodicStateSettings {
             matrix_harmonics: 16,
         }
     }
+}
+
+/// States from which Newton's method takes a step.
+struct NewtonBase {
+    states: DVector<f64>,
+    /// Change of the states over a period, and its size relative to theirs.
+    change: DVector<f64>,
+    gap: f64,
+    /// The whole Newton step.
+    step: DVector<f64>,
 }
 
 /// A law with memory as a sequence of steps.
@@ -170,22 +184,36 @@ impl FrequencyTime {
                 last = gap;
             }
         }
-        let mut last = f64::INFINITY;
+        let mut best: Option<NewtonBase> = None;
+        let mut fraction = 1.0;
         for _ in 0..settings.periods {
             let (after, product) = self.linear_period(sequence, &z, memory)?;
-            let gap = (&after - &z).amax() / scale;
+            let change = after - &z;
+            let gap = change.amax() / scale;
+            let last = best.as_ref().map_or(f64::INFINITY, |best| best.gap);
             if m == 0 || gap <= self.periodicity_tolerance || (gap <= settings.rounded && gap >= 0.5 * last) {
                 self.state.clear();
                 self.state.extend(z.iter());
                 return Some(product);
             }
-            // Newton step while the change halves, otherwise one more period
-            if gap < 0.5 * last || last.is_infinite() {
-                z += pseudo_inverse(DMatrix::identity(m, m) - product) * (after - &z);
-            } else {
-                z = after;
-            }
-            last = gap;
+            let base = match best.take() {
+                Some(base) if gap > (1.0 - 0.5 * fraction) * base.gap => {
+                    fraction *= 0.5;
+                    if fraction < settings.least_fraction {
+                        z = base.states + base.change;
+                        fraction = 1.0;
+                        continue;
+                    }
+                    base
+                }
+                _ => {
+                    fraction = 1.0;
+                    let step = pseudo_inverse(DMatrix::identity(m, m) - product) * &change;
+                    NewtonBase { states: z, change, gap, step }
+                }
+            };
+            z = &base.states + fraction * &base.step;
+            best = Some(base);
         }
         None
     }

@@ -362,6 +362,50 @@ fn round_a_circle_the_loss_is_the_closed_form() {
     assert!((2.0 * fine - coarse - expected).abs() < 1e-5 * expected, "{coarse} {fine} {expected}");
 }
 
+/// A contact that slips little per period forgets its initial force across the motion slowly. Its
+/// periodic force is that of an integration until nothing changes.
+#[test]
+fn a_slowly_forgotten_force_is_that_of_many_periods() {
+    let ports = ports_of(&(Arc::new(Plane::Masing) as SharedLaw));
+    let samples = 64;
+    // slip begins where the amplitude exceeds the spring's longest stretch
+    for (excess, across) in [(1e-3, 0.05), (3e-3, 0.1), (1e-2, 0.12), (0.1, 0.14)] {
+        let amplitude = (1.0 + excess) * LIMIT / STIFFNESS;
+        let (mean, small) = (Complex64::new(across, 0.0), Complex64::new(0.0, -0.01 * amplitude));
+        let c = [ZERO, Complex64::new(amplitude, 0.0), mean, small];
+        let mut aft = FrequencyTime::new(vec![0, 1], samples);
+        let mut force = [ZERO; 4];
+        aft.motion_port_force(&ports[0], (1.0, 1.0), &c, &mut force, Some(&mut [0.0; 64]));
+        // radial return, from static equilibrium straight to the first sample
+        let at = |i: usize| {
+            let phase = std::f64::consts::TAU * i as f64 / samples as f64;
+            [amplitude * phase.cos(), across + 0.01 * amplitude * phase.sin()]
+        };
+        let (mut before, mut elastic) = ([0.0; 2], [0.0; 2]);
+        let mut advance = |to: [f64; 2]| {
+            let trial = [0, 1].map(|a| elastic[a] + STIFFNESS * (to[a] - before[a]));
+            let shorten = (LIMIT / trial[0].hypot(trial[1])).min(1.0);
+            (before, elastic) = (to, trial.map(|f| f * shorten));
+            elastic
+        };
+        for i in 0..50_000 * samples {
+            advance(at(i % samples));
+        }
+        let mut expected = [ZERO; 4];
+        for i in 0..samples {
+            let now = advance(at(i));
+            let phase = -std::f64::consts::TAU * i as f64 / samples as f64;
+            for a in 0..2 {
+                expected[2 * a] += now[a] / samples as f64;
+                expected[2 * a + 1] += Complex64::from_polar(2.0 * now[a] / samples as f64, phase);
+            }
+        }
+        for (found, expected) in force.iter().zip(&expected) {
+            assert!((found - expected).norm() < 1e-9 * LIMIT, "excess {excess}: {force:?} {expected}");
+        }
+    }
+}
+
 /// Two masses with inertial coupling: the response is `(K + jΩC - Ω²M)⁻¹ F`
 /// with the full mass matrix.
 #[test]
