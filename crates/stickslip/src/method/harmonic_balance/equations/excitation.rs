@@ -123,9 +123,10 @@ impl Discretization {
         Ok(Receptance::Formed(ReceptanceMatrices::new(formed.collect::<Result<_, f64>>()?)))
     }
 
-    /// Returns the initial guess: the solution by describing functions, or the
-    /// motion without friction. If contacts alone hold a body, returns static
-    /// equilibrium, from which one Newton step finds the motion in stick.
+    /// Returns the initial guess: the solution by describing functions, if it is given.
+    /// Otherwise, or if contacts alone hold a body, static equilibrium, from which one Newton
+    /// step finds the motion in stick. Structures with forces as unknowns, and those in banded
+    /// form, begin with the motion without friction.
     pub fn initial_guess(
         &self,
         system: &System,
@@ -135,7 +136,8 @@ impl Discretization {
     ) -> HarmonicSolution {
         let nh = self.harmonics().len();
         let mut motion = self.frictionless_motion();
-        if self.is_held_by_contacts() {
+        let from_rest = guess.is_none() && self.banded.is_none() && !ports.has_forces();
+        if self.is_held_by_contacts() || from_rest {
             return self.static_solution(1.0);
         }
         let Some(guess) = guess else { return motion };

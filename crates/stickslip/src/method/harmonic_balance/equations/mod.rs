@@ -498,10 +498,13 @@ impl Discretization {
     }
 
     /// Returns the static equilibrium times `share`. If it is unknown, returns
-    /// the mean on closed contacts.
+    /// the mean without friction, or on closed contacts if these alone hold a body.
     pub fn static_solution(&self, share: f64) -> HarmonicSolution {
         let nh = self.harmonics().len();
         let mut motion = HarmonicSolution::zero(self.linear.motion.len());
+        if self.harmonics()[0] != 0 {
+            return motion;
+        }
         let known = &self.equilibrium;
         let still = |i: usize| known.get(i / nh).map_or(self.linear.motion[i], |u| Complex64::new(*u, 0.0));
         motion.c.iter_mut().enumerate().step_by(nh).for_each(|(i, c)| *c = still(i) * share);
