@@ -4,7 +4,7 @@ use super::NAME;
 use super::aft::{Ports, derivative_batch};
 use super::dynamics::banded::BandedForm;
 use super::dynamics::linear_dynamics::{CACHED, LinearDynamics};
-use super::linear_solve::newton_krylov;
+use super::linear_solve::{harmonic_preconditioner, newton_krylov};
 use crate::method::MethodError;
 use crate::method::options::PERIOD;
 
@@ -48,7 +48,8 @@ pub(super) fn unbanded_memory(ports: &Ports, dynamics: &LinearDynamics, harmonic
             // the matrices; their copies for products and for the longer series, if they stay
             // in the cache; and the preconditioner
             let each = if ports.count() <= CACHED { 4.0 } else { 2.0 };
-            2.0 * each * harmonics as f64 * axes * axes + newton_krylov::lowest_factor_entries(ports, harmonics) as f64
+            2.0 * each * harmonics as f64 * axes * axes
+                + harmonic_preconditioner::lowest_factor_entries(ports, harmonics) as f64
         }
     };
     // equations that always use the matrix keep it, its factor and the factor of the previous

@@ -27,6 +27,32 @@ impl LinearizedEquations<'_> {
         &self.tangents[tangent_range(self.blocks, p, port, self.harmonics.len())]
     }
 
+    /// Returns the complex mean of a port's tangent at harmonic number `k`,
+    /// between two of its axes.
+    pub fn mean(&self, tangent: &[f64], axes: usize, a: usize, b: usize, k: usize) -> Complex64 {
+        let pair = 2 * self.harmonics.len();
+        let wide = pair * axes;
+        let at = |i: usize, j: usize| tangent[(a * pair + 2 * k + i) * wide + b * pair + 2 * k + j];
+        if self.harmonics[k] == 0 {
+            return Complex64::new(at(0, 0), 0.0);
+        }
+        Complex64::new(at(0, 0) + at(1, 1), at(1, 0) - at(0, 1)) * 0.5
+    }
+
+    /// Multiplies a residual in units by its units.
+    pub fn multiply_by_residual_units(&self, residual: &mut [f64]) {
+        residual.iter_mut().zip(self.units).for_each(|(r, unit)| *r *= unit);
+    }
+
+    /// Divides a step by the units of steps.
+    pub fn divide_by_step_units(&self, step: &mut [f64]) {
+        let pair = 2 * self.harmonics.len();
+        for port in self.ports.iter() {
+            let unit = port.unit(self.length);
+            step[pair * port.first_axis..pair * (port.first_axis + port.axes)].iter_mut().for_each(|d| *d /= unit);
+        }
+    }
+
     /// Assembles the Jacobian of the first `kept` harmonics without the others, row-major and
     /// in units, into `jacobian`. `product` is scratch memory.
     pub fn matrix(

@@ -2,14 +2,8 @@
 //!
 //! GMRES needs only products with the Jacobian `δ r_y - r_u R f_y`, which is not formed.
 //! Laws couple harmonics, the structure couples joints. A product applies the laws and then the
-//! structure. GMRES takes a few tens of products if its preconditioner is close to the Jacobian.
-//! The preconditioner has the equations with the mean stiffness of every joint over the period:
-//! - Receptances as matrices: one complex matrix over the axes per harmonic, with the mean
-//!   stiffness at that harmonic. Rigid friction couples the lowest harmonics by more than their
-//!   mean; these harmonics are factored together.
-//! - Large structures in modes: `R = S + Φ diag(g) Φᵀ`. The residual flexibility S of modes far
-//!   above the harmonics is the same for all harmonics. So is the factor of `1 + S K` with one
-//!   stiffness for all. The other modes enter by Woodbury's formula, with one row per mode.
+//! structure. GMRES takes a few tens of products if its preconditioner is close to the Jacobian,
+//! see `harmonic_preconditioner` and, for large structures in modes, `modal_preconditioner`.
 //!
 //! Preconditioners are kept from step to step, and in modes from frequency to
 //! frequency, for as long as they help.
@@ -17,16 +11,15 @@
 //! Memory: per harmonic two complex matrices over the axes; in modes, two real
 //! matrices over the axes and one over axes and modes.
 
+use super::harmonic_preconditioner::{HarmonicPreconditioner, HarmonicPreconditionerSettings};
 use super::linearization::LinearizedEquations;
+use super::modal_preconditioner::ModalPreconditioner;
 use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Port, Ports};
-use crate::method::harmonic_balance::dynamics::linear_dynamics::CACHED;
-use crate::method::harmonic_balance::dynamics::receptance::{ModalReceptance, Receptance};
+use crate::method::harmonic_balance::dynamics::receptance::Receptance;
 use crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE;
-use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::complex_gemv::ComplexGemv;
-use stickslip_numerics::dense::{ComplexLu, DenseLu, ProductShape, Transpose, multiply_blocked};
+use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
 use stickslip_numerics::gmres::{Gmres, GmresLimits};
 use stickslip_numerics::vector::dot;
 
@@ -46,10 +39,6 @@ struct KrylovSettings {
     /// series are long. Measured: a step of 10 joints with 128 harmonics, 2560 unknowns, takes 80
     /// products, an eighth of its elimination.
     long_series_unknowns: usize,
-    /// Number of unknowns of the lowest harmonics that are factored together to precondition a
-    /// step with long series. Measured: with a quarter of the harmonics a step takes 80 products,
-    /// with an eighth 150. With none, each harmonic by its mean, it does not converge in hundreds.
-    lowest_unknowns: usize,
     /// Relative tolerance of GMRES, as a share of Newton's residual.
     forcing_term: f64,
     /// Upper bound of this tolerance. Derivatives of laws cost as much as tens of products, so
@@ -72,9 +61,6 @@ struct KrylovSettings {
     /// Number of products that later steps may take in total in excess of the step for which a
     /// preconditioner was made. Beyond it, the next step makes a new one, which costs as much.
     excess_products: usize,
-    /// Modes with frequencies above this multiple of the highest harmonic respond almost
-    /// statically.
-    above: f64,
     /// Number of harmonics above which derivatives of laws do not fit in the cache.
     cached_harmonics: usize,
     /// Cost factor of products with the derivatives of unknown forces, whose series are long:
@@ -89,7 +75,6 @@ impl Default for KrylovSettings {
             unknowns: 200,
             unknowns_with_forces: 400,
             long_series_unknowns: 2048,
-            lowest_unknowns: 1000,
             forcing_term: 0.1,
             coarsest: 1e-6,
             coarsest_with_modes: 1e-2,
@@ -99,7 +84,6 @@ impl Default for KrylovSettings {
             useful: 0.1,
             kept_products: 25,
             excess_products: 10,
-            above: 3.0,
             cached_harmonics: 64,
             uncached_cost: 8.0,
         }
@@ -117,7 +101,7 @@ pub(crate) fn uses_krylov(size: usize, ports: &Ports) -> bool {
     size > FORMED_UNKNOWNS || many || (size > settings.long_series_unknowns && ports.has_forces())
 }
 
-/// Residual flexibility of the modes above a bound, from a discarded split.
+/// Residual flexibility of the modes above a bound, from a discarded preconditioner.
 type KeptResidualFlexibility = (f64, Arc<Vec<f64>>);
 
 /// GMRES and the preconditioners that it keeps.
@@ -126,14 +110,38 @@ pub(crate) struct NewtonKrylov {
     gmres: Gmres,
     /// Preconditioner for receptances as matrices, with the derivatives of this
     /// motion or a nearby one.
-    harmonics: Option<BlockPreconditioner>,
-    split: Option<ModalPreconditioner>,
-    above: Option<KeptResidualFlexibility>,
+    harmonics: Option<KeptHarmonics>,
+    modes: Option<ModalPreconditioner>,
+    flexibility: Option<KeptResidualFlexibility>,
     /// Forces of a product, and the motions that they cause.
     force: Vec<Complex64>,
     moved: Vec<Complex64>,
     /// Forces of one port, real and imaginary parts.
     parts: Vec<f64>,
+}
+
+/// A kept preconditioner of the harmonics, and its use.
+#[derive(Debug, Clone)]
+struct KeptHarmonics {
+    preconditioner: HarmonicPreconditioner,
+    /// Products of the step for which it was made, and the total excess of later steps over it.
+    products: usize,
+    excess: usize,
+}
+
+enum Preconditioner<'a> {
+    Harmonics(&'a HarmonicPreconditioner),
+    Modes(&'a ModalPreconditioner),
+}
+
+impl Preconditioner<'_> {
+    /// Replaces a residual in units by a step in units.
+    fn apply(&self, linear: &LinearizedEquations, v: &mut [f64]) {
+        match self {
+            Preconditioner::Harmonics(harmonics) => harmonics.apply(linear, v),
+            Preconditioner::Modes(modes) => modes.apply(linear, v),
+        }
+    }
 }
 
 /// The state in which a Newton step begins.
@@ -154,12 +162,7 @@ impl NewtonKrylov {
     /// Returns the memory of the kept preconditioner, bytes.
     #[cfg(test)]
     pub(crate) fn bytes(&self) -> usize {
-        let Some(BlockPreconditioner { lowest, others, .. }) = &self.harmonics else { return 0 };
-        let of = |answer: &BlockSolver| match answer {
-            BlockSolver::Inverse(inverse) => inverse.bytes(),
-            BlockSolver::Factor(factor) => factor.bytes(),
-        };
-        others.iter().map(of).sum::<usize>() + lowest.transposed.bytes()
+        self.harmonics.as_ref().map_or(0, |kept| kept.preconditioner.bytes())
     }
 
     /// Computes the Newton step. `step` contains the residual in units on
@@ -184,12 +187,12 @@ impl NewtonKrylov {
         let limits = GmresLimits { tolerance: wanted, restart: settings.vectors, products: settings.products };
         let right = step.to_vec();
         let (mut fresh, mut products) = (false, 0);
-        let NewtonKrylov { gmres, harmonics, split, above, force, moved, parts } = self;
+        let NewtonKrylov { gmres, harmonics, modes, flexibility, force, moved, parts } = self;
         // with unknown forces, the samples that slip couple the lowest harmonics
         harmonics.take_if(|_| !near.same_derivatives && linear.ports.has_forces());
         let found = loop {
             let Some(preconditioner) =
-                linear.preconditioner(receptance, (&mut *harmonics, &mut *split, &mut *above), &mut fresh)
+                linear.preconditioner(receptance, (&mut *harmonics, &mut *modes, &mut *flexibility), &mut fresh)
             else {
                 break false;
             };
@@ -217,7 +220,7 @@ impl NewtonKrylov {
             }
             // the stiffness of another motion
             *harmonics = None;
-            *above = split.take().map(|split| (split.bound, split.residual_flexibility));
+            *flexibility = modes.take().map(|modes| (modes.bound, modes.residual_flexibility));
             step.copy_from_slice(&right);
         };
         if !found {
@@ -225,18 +228,6 @@ impl NewtonKrylov {
         }
         (found && step.iter().all(|d| d.is_finite()), products)
     }
-}
-
-/// Returns the number of entries in the factor of the lowest harmonics.
-pub(crate) fn lowest_factor_entries(ports: &Ports, harmonics: usize) -> usize {
-    (2 * ports.count() * lowest_count(ports, harmonics)).pow(2)
-}
-
-/// Returns the number of lowest harmonics that are factored together; zero if it would be one.
-fn lowest_count(ports: &Ports, harmonics: usize) -> usize {
-    let settings = KrylovSettings::default();
-    let count = if ports.has_forces() { settings.lowest_unknowns / (2 * ports.count()) } else { 0 };
-    if count < 2 { 0 } else { count.min(harmonics) }
 }
 
 impl LinearizedEquations<'_> {
@@ -306,25 +297,13 @@ impl LinearizedEquations<'_> {
         }
     }
 
-    /// Returns the complex mean of a port's tangent at harmonic number `k`,
-    /// between two of its axes.
-    fn mean(&self, tangent: &[f64], axes: usize, a: usize, b: usize, k: usize) -> Complex64 {
-        let pair = 2 * self.harmonics.len();
-        let wide = pair * axes;
-        let at = |i: usize, j: usize| tangent[(a * pair + 2 * k + i) * wide + b * pair + 2 * k + j];
-        if self.harmonics[k] == 0 {
-            return Complex64::new(at(0, 0), 0.0);
-        }
-        Complex64::new(at(0, 0) + at(1, 1), at(1, 0) - at(0, 1)) * 0.5
-    }
-
     /// Returns a kept preconditioner, or a new one. `None` if it is singular.
     /// `fresh` becomes true if it belongs to this motion.
     fn preconditioner<'b>(
         &self,
         receptance: &Receptance,
         (harmonics, kept, above): (
-            &'b mut Option<BlockPreconditioner>,
+            &'b mut Option<KeptHarmonics>,
             &'b mut Option<ModalPreconditioner>,
             &mut Option<KeptResidualFlexibility>,
         ),
@@ -334,12 +313,10 @@ impl LinearizedEquations<'_> {
             Receptance::Formed(formed) => {
                 *fresh = harmonics.is_none();
                 if harmonics.is_none() {
-                    let lowest = self.lowest(&formed.matrices)?;
-                    let rest = formed.matrices.iter().enumerate().skip(lowest.count);
-                    let others = rest.map(|(k, matrix)| self.harmonic_block(k, matrix)).collect::<Option<_>>()?;
-                    *harmonics = Some(BlockPreconditioner { lowest, others, products: 0, excess: 0 });
+                    let preconditioner = HarmonicPreconditioner::new(self, &formed.matrices)?;
+                    *harmonics = Some(KeptHarmonics { preconditioner, products: 0, excess: 0 });
                 }
-                harmonics.as_ref().map(Preconditioner::Harmonics)
+                harmonics.as_ref().map(|kept| Preconditioner::Harmonics(&kept.preconditioner))
             }
             Receptance::Modal(modal) => {
                 let (bound, usable) = (ModalPreconditioner::bound(modal), kept.take());
@@ -359,164 +336,9 @@ impl LinearizedEquations<'_> {
                         self.ports,
                     )?,
                 };
-                split.excitation(modal)?;
-                Some(Preconditioner::Split(kept.insert(split)))
+                split.set_frequency(modal)?;
+                Some(Preconditioner::Modes(kept.insert(split)))
             }
-        }
-    }
-
-    /// Factors the equations of the lowest harmonics, if forces are unknown.
-    fn lowest(&self, receptance: &[DMatrix<Complex64>]) -> Option<LowestHarmonicsFactor> {
-        let count = lowest_count(self.ports, self.harmonics.len());
-        let mut matrix = Vec::new();
-        self.matrix(receptance, count, (&mut Vec::new(), &mut matrix));
-        // the matrix is row-major: its transpose is factored
-        let transposed = DenseLu::new(matrix, 2 * count * self.ports.count()).ok()?;
-        Some(LowestHarmonicsFactor { count, transposed })
-    }
-
-    /// Factors the equations of one harmonic with the mean tangents.
-    fn harmonic_block(&self, k: usize, receptance: &DMatrix<Complex64>) -> Option<BlockSolver> {
-        let size = receptance.nrows();
-        let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
-        let mut matrix = vec![ZERO; size * size];
-        // R f_y
-        for (p, port) in self.ports.iter().enumerate() {
-            for b in 0..port.axes {
-                let column = &mut matrix[(port.first_axis + b) * size..][..size];
-                if port.is_force() {
-                    column.copy_from_slice(moved(port.first_axis + b));
-                    continue;
-                }
-                for a in 0..port.axes {
-                    let stiffness = self.mean(self.tangent(p, port), port.axes, a, b, k);
-                    column.iter_mut().zip(moved(port.first_axis + a)).for_each(|(out, r)| *out += r * stiffness);
-                }
-            }
-        }
-        let h = self.harmonics[k];
-        for (p, port) in self.ports.iter().enumerate() {
-            if !port.is_force() {
-                port.range().for_each(|q| matrix[q * size + q] += 1.0);
-                continue;
-            }
-            let penalty = self.penalty[p];
-            let rate = if penalty.is_finite() { Complex64::new(0.0, penalty * h as f64 * self.omega) } else { ZERO };
-            let turn: Vec<Complex64> = (0..port.axes * port.axes)
-                .map(|ab| self.mean(self.tangent(p, port), port.axes, ab / port.axes, ab % port.axes, k))
-                .collect();
-            for column in matrix.chunks_exact_mut(size) {
-                let moved: Vec<Complex64> = port.range().map(|q| column[q] * rate).collect();
-                for (a, q) in port.range().enumerate() {
-                    column[q] = (0..port.axes).map(|b| turn[a * port.axes + b] * moved[b]).sum();
-                }
-            }
-            for (a, q) in port.range().enumerate() {
-                matrix[q * size + q] += 1.0 + self.homotopy.diagonal_term(h);
-                for (b, column) in port.range().enumerate() {
-                    matrix[column * size + q] -= turn[a * port.axes + b];
-                }
-            }
-        }
-        ComplexLu::new(matrix, size).ok().map(|factor| BlockSolver::new(factor, size))
-    }
-}
-
-/// The solver of one harmonic. A matrix that fits in the cache is inverted: the
-/// inverse is exact enough for a preconditioner. It takes a fifth of the time
-/// of triangular solutions, whose rows are too short for blocks.
-#[derive(Debug, Clone)]
-enum BlockSolver {
-    Inverse(ComplexGemv),
-    Factor(ComplexLu),
-}
-
-impl BlockSolver {
-    fn new(factor: ComplexLu, size: usize) -> Self {
-        if size > CACHED {
-            return BlockSolver::Factor(factor);
-        }
-        let mut inverse = vec![ZERO; size * size];
-        inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
-        factor.solve(&mut inverse);
-        BlockSolver::Inverse(ComplexGemv::new(&inverse, size))
-    }
-
-    fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
-        match self {
-            BlockSolver::Inverse(inverse) => inverse.apply(right, memory),
-            BlockSolver::Factor(factor) => factor.solve(right),
-        }
-    }
-}
-
-/// The factor of the lowest harmonics together.
-#[derive(Debug, Clone)]
-struct LowestHarmonicsFactor {
-    count: usize,
-    /// The transposed Jacobian, in units.
-    transposed: DenseLu<f64>,
-}
-
-impl LowestHarmonicsFactor {
-    /// Returns the step of these harmonics alone, from the residual of all; both in units.
-    fn apply(&self, v: &[f64], pair: usize) -> Vec<f64> {
-        let mut own: Vec<f64> = v.chunks_exact(pair).flat_map(|v| &v[..2 * self.count]).copied().collect();
-        self.transposed.solve_adjoint(&mut own);
-        own
-    }
-}
-
-/// Preconditioner with the lowest harmonics together, and the others one by one.
-#[derive(Debug, Clone)]
-struct BlockPreconditioner {
-    lowest: LowestHarmonicsFactor,
-    others: Vec<BlockSolver>,
-    /// Products of the step for which it was made, and the total excess of later steps over it.
-    products: usize,
-    excess: usize,
-}
-
-enum Preconditioner<'a> {
-    Harmonics(&'a BlockPreconditioner),
-    Split(&'a mut ModalPreconditioner),
-}
-
-impl Preconditioner<'_> {
-    /// Replaces a residual in units by a step in units.
-    fn apply(&self, linear: &LinearizedEquations, v: &mut [f64]) {
-        let nh = linear.harmonics.len();
-        let together = match self {
-            Preconditioner::Harmonics(harmonics) => harmonics.lowest.apply(v, 2 * nh),
-            Preconditioner::Split(_) => Vec::new(),
-        };
-        v.iter_mut().zip(linear.units).for_each(|(v, unit)| *v *= unit);
-        match self {
-            Preconditioner::Harmonics(BlockPreconditioner { lowest, others, .. }) => {
-                let (mut column, mut memory) = (vec![ZERO; v.len() / (2 * nh)], Vec::new());
-                for (k, factor) in (lowest.count..).zip(others) {
-                    for (c, v) in column.iter_mut().zip(v.chunks_exact(2 * nh)) {
-                        *c = Complex64::new(v[2 * k], v[2 * k + 1]);
-                    }
-                    factor.apply(&mut column, &mut memory);
-                    for (c, v) in column.iter().zip(v.chunks_exact_mut(2 * nh)) {
-                        (v[2 * k], v[2 * k + 1]) = (c.re, c.im);
-                    }
-                }
-            }
-            Preconditioner::Split(split) => split.apply(v),
-        }
-        for port in linear.ports.iter() {
-            let unit = port.unit(linear.length);
-            v[2 * nh * port.first_axis..2 * nh * (port.first_axis + port.axes)].iter_mut().for_each(|v| *v /= unit);
-        }
-        if let Preconditioner::Harmonics(BlockPreconditioner {
-            lowest: LowestHarmonicsFactor { count: count @ 1.., .. },
-            ..
-        }) = self
-        {
-            let steps = v.chunks_exact_mut(2 * nh).zip(together.chunks_exact(2 * count));
-            steps.for_each(|(v, own)| v[..2 * count].copy_from_slice(own));
         }
     }
 }
@@ -536,170 +358,9 @@ pub(crate) fn product_work(ports: &Ports, harmonics: usize) -> f64 {
 /// unknown forces factored together.
 pub(crate) fn krylov_step_work(ports: &Ports, harmonics: usize) -> f64 {
     let settings = KrylovSettings::default();
-    let together = if ports.has_forces() { settings.lowest_unknowns.min(2 * harmonics * ports.count()) } else { 0 };
+    let lowest = HarmonicPreconditionerSettings::default().lowest_unknowns;
+    let together = if ports.has_forces() { lowest.min(2 * harmonics * ports.count()) } else { 0 };
     settings.vectors as f64 * product_work(ports, harmonics) + (together as f64).powi(3) / 3.0
-}
-
-/// The preconditioner `(1 + R K)⁻¹` with one real K for all harmonics, for a structure in modes.
-#[derive(Debug, Clone)]
-struct ModalPreconditioner {
-    /// Frequency, rad/s, up to which modes are taken individually.
-    bound: f64,
-    /// True if the mean has closed contacts. These already precondition it.
-    closed: bool,
-    /// Numbers of these modes.
-    low_modes: Vec<usize>,
-    /// Residual flexibility S of the other modes, with the springs in series. It does not
-    /// depend on the stiffness of the joints.
-    residual_flexibility: Arc<Vec<f64>>,
-    /// `1 + S K`, factored.
-    factor: DenseLu<f64>,
-    /// `Φᵀ K`, modes × axes, and `(1 + S K)⁻¹ Φ`, axes × modes.
-    modal_stiffness: Vec<f64>,
-    solved_modes: Vec<f64>,
-    /// `Φᵀ K (1 + S K)⁻¹ Φ`.
-    core: Vec<f64>,
-    /// `core` plus the dynamic stiffness of the modes, factored, per harmonic
-    /// at one excitation frequency.
-    harmonics: Vec<ComplexLu>,
-    omega: f64,
-}
-
-impl ModalPreconditioner {
-    /// Returns the bound, rounded up so that nearby frequencies share it.
-    fn bound(modal: &ModalReceptance) -> f64 {
-        let settings = KrylovSettings::default();
-        let top = modal.rates.iter().map(|s| s.im).fold(modal.omega, f64::max);
-        settings.above * top.log2().ceil().exp2()
-    }
-
-    /// Creates the split from `stiffness(p, port, a, b)` of the joints. `above`
-    /// is S, if it is known for this bound.
-    fn new(
-        modal: &ModalReceptance,
-        (bound, above): (f64, Option<Arc<Vec<f64>>>),
-        stiffness: impl Fn(usize, &Port, usize, usize) -> f64,
-        ports: &Ports,
-    ) -> Option<Self> {
-        let structure = &modal.structure;
-        let (p, n) = (structure.axes, structure.modal_coefficients().len());
-        let is_low = |own: &[f64; 3]| own[2] <= bound * bound * own[0];
-        let (low, high): (Vec<usize>, Vec<usize>) = (0..n).partition(|&m| is_low(&structure.modal_coefficients()[m]));
-        let column = |m: usize| &structure.at[m * p..(m + 1) * p];
-        let above = above.unwrap_or_else(|| {
-            let above: Vec<f64> = high.iter().flat_map(|&m| column(m)).copied().collect();
-            let weighted: Vec<f64> = high
-                .iter()
-                .flat_map(|&m| column(m).iter().map(move |a| a / structure.modal_coefficients()[m][2]))
-                .collect();
-            let mut sum = vec![0.0; p * p];
-            multiply_blocked(
-                &weighted,
-                &above,
-                &mut sum,
-                ProductShape { rows: p, inner: high.len(), columns: p },
-                Transpose::Yes,
-            );
-            (0..p).for_each(|q| sum[q * p + q] += modal.series[q]);
-            Arc::new(sum)
-        });
-        let mut matrix = vec![0.0; p * p];
-        let mut pull = vec![0.0; low.len() * p];
-        for (number, port) in ports.iter().enumerate() {
-            for (a, row) in port.range().enumerate() {
-                for (b, q) in port.range().enumerate() {
-                    let k = stiffness(number, port, a, b);
-                    let moved = &above[row * p..(row + 1) * p];
-                    matrix[q * p..(q + 1) * p].iter_mut().zip(moved).for_each(|(out, s)| *out += s * k);
-                    for (pull, &m) in pull[q * low.len()..].iter_mut().zip(&low) {
-                        *pull += structure.at[m * p + row] * k;
-                    }
-                }
-            }
-        }
-        (0..p).for_each(|q| matrix[q * p + q] += 1.0);
-        let factor = DenseLu::new(matrix, p).ok()?;
-        let mut moved: Vec<f64> = low.iter().flat_map(|&m| column(m)).copied().collect();
-        factor.solve(&mut moved);
-        let l = low.len();
-        let mut core = vec![0.0; l * l];
-        multiply_blocked(&pull, &moved, &mut core, ProductShape { rows: l, inner: p, columns: l }, Transpose::No);
-        let closed = modal.closed.is_some();
-        Some(ModalPreconditioner {
-            bound,
-            closed,
-            low_modes: low,
-            residual_flexibility: above,
-            factor,
-            modal_stiffness: pull,
-            solved_modes: moved,
-            core,
-            harmonics: Vec::new(),
-            omega: f64::NAN,
-        })
-    }
-
-    /// Prepares the factors for an excitation frequency.
-    fn excitation(&mut self, modal: &ModalReceptance) -> Option<()> {
-        if self.omega == modal.omega && self.harmonics.len() == modal.rates.len() {
-            return Some(());
-        }
-        let l = self.low_modes.len();
-        self.harmonics.clear();
-        for rate in &modal.rates {
-            let mut matrix: Vec<Complex64> = self.core.iter().map(|x| Complex64::new(*x, 0.0)).collect();
-            for (i, &m) in self.low_modes.iter().enumerate() {
-                matrix[i * l + i] += modal.structure.stiffness(m, *rate, modal.omega).ok()?;
-            }
-            self.harmonics.push(ComplexLu::new(matrix, l).ok()?);
-        }
-        self.omega = modal.omega;
-        Some(())
-    }
-
-    /// Applies the preconditioner to [axis][harmonic]:
-    /// `(1 + R K)⁻¹ v = y - (1 + S K)⁻¹ Φ (1/g + core)⁻¹ Φᵀ K y`, with `y = (1 + S K)⁻¹ v`.
-    fn apply(&self, v: &mut [f64]) {
-        let (nh, l) = (self.harmonics.len(), self.low_modes.len());
-        let wide = 2 * nh;
-        let p = v.len() / wide;
-        let mut columns = vec![0.0; v.len()];
-        for (q, v) in v.chunks_exact(wide).enumerate() {
-            v.iter().enumerate().for_each(|(i, v)| columns[i * p + q] = *v);
-        }
-        self.factor.solve(&mut columns);
-        if l > 0 {
-            let mut pulled = vec![0.0; l * wide];
-            multiply_blocked(
-                &self.modal_stiffness,
-                &columns,
-                &mut pulled,
-                ProductShape { rows: l, inner: p, columns: wide },
-                Transpose::No,
-            );
-            for (k, factor) in self.harmonics.iter().enumerate() {
-                let (re, im) = pulled[2 * k * l..2 * (k + 1) * l].split_at_mut(l);
-                let mut modal: Vec<Complex64> = re.iter().zip(&*im).map(|(re, im)| Complex64::new(*re, *im)).collect();
-                factor.solve(&mut modal);
-                for (i, z) in modal.iter().enumerate() {
-                    (re[i], im[i]) = (z.re, z.im);
-                }
-            }
-            let mut moved = vec![0.0; p * wide];
-            multiply_blocked(
-                &self.solved_modes,
-                &pulled,
-                &mut moved,
-                ProductShape { rows: p, inner: l, columns: wide },
-                Transpose::No,
-            );
-            columns.iter_mut().zip(&moved).for_each(|(c, m)| *c -= m);
-        }
-        for (q, v) in v.chunks_exact_mut(wide).enumerate() {
-            let first = if self.closed { 2 } else { 0 };
-            v.iter_mut().enumerate().skip(first).for_each(|(i, v)| *v = columns[i * p + q]);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -708,13 +369,14 @@ mod tests {
     use crate::law::{Coulomb, Dahl, Jenkins, Jenkins2d, SharedLaw};
     use crate::method::harmonic_balance::budget::WorkShare;
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+    use crate::method::harmonic_balance::dynamics::receptance::ModalReceptance;
     use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
     use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
     use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
     use crate::method::harmonic_balance::settings::WorkSettings;
     use crate::model::{Axis, System};
     use crate::structure::Structure;
-    use std::sync::Arc;
+    use nalgebra::DMatrix;
 
     /// Returns a pseudo-random value between -1 and 1.
     fn noise(i: usize) -> f64 {
@@ -803,6 +465,23 @@ mod tests {
         agree(&system(&contacts), &[0, 1, 2, 3], &[SolverForm::Formed, SolverForm::Modal]);
     }
 
+    /// Contacts that stick, although the motion without them would slip: from rest one step finds
+    /// the motion, and a second one its last digits.
+    #[test]
+    fn contacts_that_stick_are_found_from_rest() {
+        let contacts: Vec<(SharedLaw, usize)> =
+            (0..14).map(|_| (Arc::new(Jenkins2d { stiffness: 100.0, limit: 3.0 }) as SharedLaw, 2)).collect();
+        let system = system(&contacts);
+        let (ports, harmonics, omega) = (Ports::new(&system).unwrap(), vec![0, 1, 2, 3], 0.6);
+        let dynamics = LinearDynamics::new(&system, &ports);
+        let mut discretization = Discretization::new(harmonics, 1024, &ports, None);
+        discretization.set_frequency(&system, &ports, &dynamics, omega).unwrap();
+        let starts = [discretization.initial_guess(&system, &ports, None, omega), discretization.frictionless_motion()];
+        let [rest, frictionless] = starts.map(|start| discretization.solve(&ports, omega, start).unwrap());
+        assert!(rest.force.iter().all(|f| f.norm() < 2.0), "all contacts stick");
+        assert!(rest.iterations <= 2 && frictionless.iterations > 2, "{} {}", rest.iterations, frictionless.iterations);
+    }
+
     /// With a coarse sampling first, the search finds the motion of all
     /// samples, in fewer steps of the laws.
     #[test]
@@ -881,7 +560,7 @@ mod tests {
     /// the lowest harmonics factored together.
     #[test]
     fn factored_lowest_harmonics_precondition_long_series() {
-        let settings = KrylovSettings::default();
+        let settings = HarmonicPreconditionerSettings::default();
         let laws: [SharedLaw; 2] = [Arc::new(Coulomb { limit: 0.3 }), Arc::new(Jenkins { stiffness: 2.0, limit: 0.2 })];
         let joints: Vec<_> = (0..12).map(|i| (laws[usize::from(i % 3 == 2)].clone(), 1)).collect();
         let harmonics: Vec<usize> = (1..128).step_by(2).collect();
