@@ -1,7 +1,7 @@
 //! Arc-length continuation of a nonlinear mode from large amplitudes, and evaluation of its
 //! motions.
 
-use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep};
+use crate::method::harmonic_balance::{LinearMode, ModeArc, ModeEquations, ModeState, ModeStep, SmallMode};
 use std::convert::Infallible;
 use stickslip_numerics::golden_section::golden_section;
 
@@ -160,7 +160,10 @@ impl Default for ModeCurveSettings {
 
 /// The curve of a mode.
 pub(super) struct ModeCurve {
+    /// Linear mode without joints from which the curve goes down; `None` if it goes up.
     linear: Option<LinearMode>,
+    /// True if the mode is one of the two travelling waves of a pair.
+    travels: bool,
     arcs: Vec<ModeArc>,
     /// True if all motions below the last computed one are its multiples, because the joints
     /// stick.
@@ -180,6 +183,7 @@ impl ModeCurve {
             let ended = ModeEnd { at: f64::INFINITY, reason: ModeEndCause::NoStart };
             ModeCurve {
                 linear,
+                travels: false,
                 arcs: Vec::new(),
                 sticks: false,
                 ended: Some(ended),
@@ -214,7 +218,9 @@ impl ModeCurve {
             if equations.is_unbounded() { follow_upwards(equations, &settings, &start, high).0 } else { Vec::new() };
         arcs.push(start);
         let (mut lowest, mut since, mut creeping) = (arcs.len() - 1, 0, 0);
-        let mut path = ModeCurve { linear: Some(linear), arcs, sticks: false, ended: None, settings: settings.clone() };
+        let travels = linear.standing_mode.is_some();
+        let mut path =
+            ModeCurve { linear: Some(linear), travels, arcs, sticks: false, ended: None, settings: settings.clone() };
         let mut length = settings.initial_step;
         for _ in 0..settings.max_steps {
             let now = &path.arcs[path.arcs.len() - 1];
@@ -281,16 +287,21 @@ impl ModeCurve {
         high: f64,
     ) -> Option<Self> {
         let settings = ModeCurveSettings::default();
-        equations.may_be_singular = false;
-        let guess = equations.small_amplitude_mode(index, low)?;
-        equations.hold_free_bodies(guess.omega);
-        let state = equations
-            .solve(&guess, low, low)
-            .filter(|state| equations.modal_assurance(&guess, state) >= settings.min_mac)?;
-        let start = equations.start_curve(&state, low)?;
+        let SmallMode { state, standing } = equations.small_amplitude_mode(index, low)?;
+        // if the joints of a pair of modes are not alike, a travelling wave is not a motion
+        let guesses = [(standing.is_some(), Some(state)), (false, standing)];
+        let (travels, start) = guesses.into_iter().find_map(|(travels, guess)| {
+            let guess = guess?;
+            equations.may_be_singular = travels;
+            equations.hold_free_bodies(guess.omega);
+            let state = equations
+                .solve(&guess, low, low)
+                .filter(|state| equations.modal_assurance(&guess, state) >= settings.min_mac)?;
+            Some((travels, equations.start_curve(&state, low)?))
+        })?;
         let (mut arcs, reason) = follow_upwards(equations, &settings, &start, high);
         arcs.push(start);
-        let mut curve = ModeCurve { linear: None, arcs, sticks: false, ended: None, settings };
+        let mut curve = ModeCurve { linear: None, travels, arcs, sticks: false, ended: None, settings };
         curve.ended = reason.map(|reason| ModeEnd { at: curve.largest_amplitude(), reason });
         Some(curve)
     }
@@ -302,7 +313,7 @@ impl ModeCurve {
 
     /// Tells whether the mode is one of the two travelling waves of a pair.
     pub(super) fn travels(&self) -> bool {
-        self.linear.as_ref().is_some_and(|linear| linear.standing_mode.is_some())
+        self.travels
     }
 
     /// Returns the smallest amplitude on the curve.

@@ -61,7 +61,7 @@ use crate::model::System;
 pub use cost_model::{factor_bytes, orbit_work};
 pub(crate) use modes::branch_equations::BranchEquations;
 pub(crate) use modes::mode_continuation::{ModeArc, ModeStep};
-pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState};
+pub(crate) use modes::nonlinear_mode::{LinearMode, ModeEquations, ModeState, SmallMode};
 pub use options::{HarmonicBalance, NAME};
 use solver::HarmonicBalanceSolver;
 pub(crate) use static_equilibrium::static_equilibrium_of;

@@ -61,6 +61,15 @@ impl LinearMode {
     }
 }
 
+/// Linear mode of small motions about the equilibrium.
+#[derive(Debug, Clone)]
+pub(crate) struct SmallMode {
+    /// The mode as a motion. Of a pair of equal modes, a travelling wave.
+    pub state: ModeState,
+    /// For such a wave, the standing motion of the pair with the same number.
+    pub standing: Option<ModeState>,
+}
+
 fn real(shape: &DVector<f64>) -> DVector<Complex64> {
     shape.map(|x| Complex64::new(x, 0.0))
 }
@@ -158,7 +167,7 @@ impl ModeEquations<'_> {
     ///
     /// A mode that begins at its small end starts there. Returns `None` with rigid friction,
     /// which has no stiffness.
-    pub fn small_amplitude_mode(&mut self, index: usize, a: f64) -> Option<ModeState> {
+    pub fn small_amplitude_mode(&mut self, index: usize, a: f64) -> Option<SmallMode> {
         let settings = LinearModeSettings::default();
         if !self.force_ports.is_empty() {
             return None;
@@ -178,19 +187,39 @@ impl ModeEquations<'_> {
             let eigen = eigen::symmetric(&inverse * stiffness.map(|k| k.re) * inverse.transpose())?;
             let mut order: Vec<usize> = (0..n).collect();
             order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-            let shape = real(&(inverse.transpose() * eigen.eigenvectors.column(*order.get(index)?)));
+            let own = *order.get(index)?;
+            let is_equal = |k: &usize| {
+                let apart = eigen.eigenvalues[*k] - eigen.eigenvalues[own];
+                apart.abs() <= settings.equal_frequencies * eigen.eigenvalues[own].abs()
+            };
+            let equal: Vec<usize> = order.iter().copied().filter(is_equal).collect();
+            let shape = |k: usize| inverse.transpose() * eigen.eigenvectors.column(k);
+            let standing = real(&shape(own));
+            let wave = match equal[..] {
+                [one, other] => {
+                    let [forwards, backwards] = waves(&shape(one), &shape(other));
+                    Some(if own == one { forwards } else { backwards })
+                }
+                _ => None,
+            };
             // φᴴ M φ = 1, so ω² + 2 j ζ ω² = φᴴ (K + j ω C) φ
-            let whole = shape.dotc(&(stiffness * &shape));
+            let whole = standing.dotc(&(stiffness * &standing));
             square = whole.re;
             if square.is_nan() || square <= 0.0 {
                 return None;
             }
-            found = Some((shape, whole.im / (2.0 * square)));
+            found = Some((standing, wave, whole.im / (2.0 * square)));
         }
-        let (shape, damping) = found?;
-        let mut x = vec![ZERO; self.aft.harmonics.len() * n];
-        x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
-        Some(ModeState { x, force: Vec::new(), omega: square.sqrt(), damping })
+        let (standing, wave, damping) = found?;
+        let motion = |shape: DVector<Complex64>| {
+            let mut x = vec![ZERO; self.aft.harmonics.len() * n];
+            x[self.first * n..(self.first + 1) * n].copy_from_slice((shape * Complex64::new(a, 0.0)).as_slice());
+            ModeState { x, force: Vec::new(), omega: square.sqrt(), damping }
+        };
+        Some(match wave {
+            Some(wave) => SmallMode { state: motion(wave), standing: Some(motion(standing)) },
+            None => SmallMode { state: motion(standing), standing: None },
+        })
     }
 
     /// Adds the complex stiffness of the joints for small motions about the equilibrium, N/m: the

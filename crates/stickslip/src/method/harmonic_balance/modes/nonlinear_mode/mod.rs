@@ -21,7 +21,7 @@
 mod linear_modes;
 mod mode_results;
 
-pub(crate) use linear_modes::LinearMode;
+pub(crate) use linear_modes::{LinearMode, SmallMode};
 
 use crate::method::MethodError;
 use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
@@ -130,11 +130,12 @@ impl PlacedPort {
         by_places.fill(0.0);
         let width = by_axes.len() / self.directions.len();
         for (w, by_axis) in self.directions.iter().zip(by_axes.chunks_exact(width)) {
-            let harmonics = by_axis.chunks_exact(2).zip(by_places.chunks_exact_mut(2 * w.len()));
-            for (slope, places) in harmonics {
-                for (place, w) in places.chunks_exact_mut(2).zip(w.iter()) {
-                    place[0] += w * slope[0];
-                    place[1] += w * slope[1];
+            let n = w.len();
+            // most axes of models of masses move one or two places
+            for (place, w) in w.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                for (slope, places) in by_axis.chunks_exact(2).zip(by_places.chunks_exact_mut(2 * n)) {
+                    places[2 * place] += w * slope[0];
+                    places[2 * place + 1] += w * slope[1];
                 }
             }
         }
