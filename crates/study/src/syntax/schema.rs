@@ -201,7 +201,8 @@ pub const STRUCTURE: &[Key] = &[
         "stress",
         ValueType::File,
         "file of a matrix that gives stresses, its rows, from the displacements of all rows of the stiffness matrix, its \
-         columns; kind `orbit` writes `stress.csv` with the largest stresses of the period",
+         columns; `stress.csv` has the largest stresses of the period of an `orbit`, or the amplitudes in `modes` and \
+         `nodal-diameter`",
         "\"blade_stress.mtx\"",
     ),
     optional(

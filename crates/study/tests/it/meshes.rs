@@ -1,5 +1,6 @@
 //! Meshes in a study: places on sets, and contacts from geometry.
 
+use num_complex::Complex64;
 use std::fmt::Write;
 use std::path::Path;
 use stickslip_study::dataset::{Column, Dataset, Table};
@@ -851,6 +852,73 @@ fn fields_of_modes_are_the_shapes_of_their_places() {
             let expected = modes.numbers(&format!("corner_{axis}_first_harmonic_m")).unwrap()[row];
             assert!((found - expected).abs() < 1e-9 * expected.max(1e-9), "{axis}: {found} {expected}");
         }
+    }
+}
+
+/// The stresses of a mode are weighted sums of the displacements of its places: of a nodal diameter
+/// per unit of modal amplitude, of a nonlinear mode at every amplitude.
+#[test]
+fn stresses_of_modes_follow_from_their_shapes() {
+    let folder = tempfile::tempdir().unwrap();
+    let write_stress = |rows: &str, [first, second]: [&str; 2]| {
+        let row = |name: &str| 1 + rows.lines().position(|line| line.trim() == name).unwrap();
+        let matrix = format!(
+            "%%MatrixMarket matrix coordinate real general\n1 {} 2\n1 {} 2\n1 {} -3\n",
+            rows.lines().count(),
+            row(first),
+            row(second)
+        );
+        std::fs::write(folder.path().join("stress.mtx"), matrix).unwrap();
+        std::fs::write(folder.path().join("rows.csv"), "row,name\n1,root\n").unwrap();
+    };
+    // 2 N/mm^2 and -3 N/mm^2 for each mm along x and z
+    let factor = 1e9;
+    let stress_of = |x: Complex64, z: Complex64| (x * 2.0 - z * 3.0) * factor;
+    let with_stress = "stress = \"stress.mtx\"\nstress_rows = \"rows.csv\"\nreduce = ";
+
+    write_sector(folder.path());
+    write_stress(&std::fs::read_to_string(folder.path().join("sector.dof")).unwrap(), ["4.1", "4.3"]);
+    let study = SECTOR.replace("[method]\nkind = \"harmonic-balance\"\nharmonics = 5\ntolerance = 0.5\n", "");
+    let study = study.replace("frequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", "");
+    let study = study.replace("kind = \"response\"", "kind = \"nodal-diameter\"\nmodes = 2");
+    for reduction in ["false", "{ modes = 8 }"] {
+        let found = dataset(folder.path(), &[&study.replace("reduce = false", &format!("{with_stress}{reduction}"))]);
+        let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+        let (modes, stress) = (table("nodal_diameters"), table("stress"));
+        assert_eq!(stress.rows(), modes.rows());
+        assert_eq!(stress.numbers("frequency_Hz"), modes.numbers("frequency_Hz"));
+        assert_eq!(stress.integers("nodal_diameter"), modes.integers("nodal_diameter"));
+        for row in 0..modes.rows() {
+            let shape = |axis: &str| {
+                let size = modes.numbers(&format!("tip_{axis}_shape_per_sqrt_kg")).unwrap()[row];
+                Complex64::from_polar(size, modes.numbers(&format!("tip_{axis}_phase_deg")).unwrap()[row].to_radians())
+            };
+            let expected = stress_of(shape("x"), shape("z"));
+            let size = stress.numbers("amplitude_Pa_per_m_sqrt_kg").unwrap()[row];
+            let found = Complex64::from_polar(size, stress.numbers("phase_deg").unwrap()[row].to_radians());
+            assert!((found - expected).norm() < 1e-9 * (factor + expected.norm()), "{row}: {found} {expected}");
+        }
+    }
+
+    write_files(folder.path(), 0.01, true);
+    write_stress(&std::fs::read_to_string(folder.path().join("block.dof")).unwrap(), ["118.1", "118.3"]);
+    let kind = "kind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\n";
+    let block = STUDY.replace("kind = \"response\"\nfrequency = [\"1500 Hz\", \"1700 Hz\"]\npeaks = false\n", kind);
+    let block = block.split("[method]").next().unwrap();
+    let corner = "[[place]]\nname = \"corner\"\nnodes = [\"118\"]\n";
+    let head = HEAD.replace("reduce = ", with_stress);
+    let found = dataset(folder.path(), &[&head, block, corner]);
+    let table = |name: &str| found.tables.iter().find(|table| table.name == name).unwrap();
+    let (modes, stress) = (table("modes"), table("stress"));
+    assert_eq!((modes.rows(), stress.rows()), (3, 3));
+    for row in 0..3 {
+        let shape = |axis: &str| {
+            let size = modes.numbers(&format!("corner_{axis}_first_harmonic_m")).unwrap()[row];
+            Complex64::from_polar(size, modes.numbers(&format!("corner_{axis}_phase_deg")).unwrap()[row].to_radians())
+        };
+        let expected = stress_of(shape("x"), shape("z")).norm();
+        let found = stress.numbers("amplitude_Pa").unwrap()[row];
+        assert!(expected > 1e-3 && (found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
     }
 }
 

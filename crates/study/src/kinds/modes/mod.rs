@@ -4,6 +4,7 @@ mod figure;
 
 use super::shared::fields::{self, Fields};
 use super::shared::keys::{HARMONICS, SERIES_SAMPLES, check_samples};
+use super::shared::stress::{self, STRESS, Stresses};
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::check::warnings::mode_warnings;
@@ -56,7 +57,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: false,
         needs: |_, _, system| stickslip::curve::modes::check(system),
         adapts: false,
-        tables: &["modes", "modes_summary", FIELDS],
+        tables: &["modes", "modes_summary", FIELDS, STRESS],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -73,12 +74,14 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let harmonics = values.count("harmonics").unwrap_or(HARMONICS) as f64;
     // the shapes at both ends of the curve
     let nodes = fields::size(inputs, 2.0 * inputs.cases);
+    let sectors = inputs.case.model.ring.map_or(1, |ring| ring.sectors);
     PlannedSize {
         drawn: 2.0 * rows + nodes.rows,
         tables: vec![
             TableShape { rows, numbers: inputs.varied + 4.0 + 3.0 * inputs.places, words: 0.0 },
             TableShape { rows: inputs.cases, numbers: inputs.varied + 5.0, words: 0.0 },
             nodes,
+            stress::size(inputs, rows, sectors),
         ],
         unit: points * inputs.series_bytes(harmonics),
     }
@@ -110,7 +113,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let Some(unit) = unit else {
         (work.context.finished)();
         part.count(|| location_of(prepared), "failed", Some(NO_SUCH_MODE.to_owned()));
-        part.tables = (0..3).map(|_| TableBuilder::default()).collect();
+        part.tables = (0..4).map(|_| TableBuilder::default()).collect();
         return Ok(part);
     };
     let mode = follow(prepared, unit).map_err(|error| (prepared.case.index, error))?;
@@ -160,8 +163,29 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             nodes.write_harmonic(prepared, point.omega, &point.shape, &head, &mut of_nodes);
         }
     }
-    part.tables = vec![rows, summary, of_nodes];
+    let mut of_stresses = TableBuilder::default();
+    if let Some(stresses) = Stresses::new(work.study, prepared, &mut part) {
+        write_stresses(prepared, &mode, &stresses, &mut of_stresses);
+    }
+    part.tables = vec![rows, summary, of_nodes, of_stresses];
     Ok(part)
+}
+
+/// Writes the amplitudes of the stresses at all points of the mode, by its first harmonic.
+fn write_stresses(prepared: &PreparedCase, mode: &Mode, stresses: &Stresses, rows: &mut TableBuilder) {
+    let ring = prepared.case.model.ring;
+    for point in &mode.points {
+        for sector in 0..ring.map_or(1, |ring| ring.sectors) {
+            let head = |rows: &mut TableBuilder| {
+                rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
+                rows.number("frequency_Hz", hertz(point.omega));
+                if ring.is_some() {
+                    rows.integer("sector", sector as u64);
+                }
+            };
+            stresses.write_harmonic(prepared, (sector, &point.shape), "amplitude_Pa", &head, rows);
+        }
+    }
 }
 
 /// Returns the index of the mode, from 0.

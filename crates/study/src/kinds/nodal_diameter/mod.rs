@@ -6,6 +6,7 @@ mod figure;
 use super::shared::disk_shape::place_and_sector;
 use super::shared::fields::{self, Fields};
 use super::shared::keys::no_requirements;
+use super::shared::stress::{self, STRESS, Stresses};
 use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
@@ -24,6 +25,8 @@ const TABLE: &str = "nodal_diameters";
 const DIAMETER: &str = "nodal_diameter";
 const MODE: &str = "mode";
 const JOINTS: &str = "joints";
+/// Column with the amplitude of a stress in a mode of unit modal mass.
+const AMPLITUDE_OF_UNIT_MODE: &str = "amplitude_Pa_per_m_sqrt_kg";
 /// Both states of the joints, as written in the column `joints`.
 pub(super) const STATES: [&str; 2] = ["free", "stuck"];
 /// Largest number of shapes drawn per case.
@@ -64,7 +67,7 @@ pub(super) const KIND: Kind = Kind {
         uses_method: false,
         needs: no_requirements,
         adapts: false,
-        tables: &[TABLE, FIELDS],
+        tables: &[TABLE, FIELDS, STRESS],
     },
     unit_size: |_| UnitSize::Case,
     size,
@@ -123,7 +126,11 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let nodes = fields::size(inputs, rows);
     PlannedSize {
         drawn: rows + nodes.rows,
-        tables: vec![TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 }, nodes],
+        tables: vec![
+            TableShape { rows, numbers: inputs.varied + 4.0 + shapes, words: 1.0 },
+            nodes,
+            stress::size(inputs, rows, 1),
+        ],
         // Size above which sparse factors give only the lowest modes.
         // Bytes of matrices and factors per row. Measured: 0.7 GB for 61,000 rows.
         unit: if each > 700.0 { 12e3 * each } else { 8.0 * each * each },
@@ -146,19 +153,32 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     let prepared = work.case();
     let mut part = UnitResult::default();
     let (mut rows, mut of_nodes) = (TableBuilder::default(), TableBuilder::default());
+    let mut of_stresses = TableBuilder::default();
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
     match waves(&prepared.case.model, &prepared.system, most) {
         Ok(waves) => {
             part.count(|| location_of(prepared), CONVERGED, None);
             write(prepared, &waves, &mut rows);
             if let Some(nodes) = Fields::new(work.study, prepared, &mut part) {
-                write_fields(prepared, &waves, &nodes, &mut of_nodes);
+                each_mode(prepared, &waves, |head, omega, motion| {
+                    nodes.write_harmonic(prepared, omega, motion, head, &mut of_nodes);
+                });
+            }
+            if let Some(stresses) = Stresses::new(work.study, prepared, &mut part) {
+                each_mode(prepared, &waves, |head, omega, motion| {
+                    let head = |rows: &mut TableBuilder| {
+                        head(rows);
+                        rows.number(FREQUENCY, hertz(omega));
+                    };
+                    // all sectors have the same amplitudes
+                    stresses.write_harmonic(prepared, (0, motion), AMPLITUDE_OF_UNIT_MODE, &head, &mut of_stresses);
+                });
             }
         }
         Err(reason) => part.count(|| location_of(prepared), "failed", Some(reason)),
     }
     (work.context.finished)();
-    part.tables = vec![rows, of_nodes];
+    part.tables = vec![rows, of_nodes, of_stresses];
     Ok(part)
 }
 
@@ -196,8 +216,13 @@ fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) 
     }
 }
 
-/// Writes the shapes of unit modal mass at all nodes, in the order of the other table.
-fn write_fields(prepared: &PreparedCase, waves: &[WaveModes], nodes: &Fields, rows: &mut TableBuilder) {
+/// Calls `write` with every mode of unit modal mass: its columns in the table, its frequency
+/// (rad/s), and its motion of all degrees of freedom of the ring.
+fn each_mode(
+    prepared: &PreparedCase,
+    waves: &[WaveModes],
+    mut write: impl FnMut(&dyn Fn(&mut TableBuilder), f64, &[Complex64]),
+) {
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
     let sectors = prepared.case.model.ring.map_or(1, |ring| ring.sectors);
     for (state, name) in STATES.into_iter().enumerate() {
@@ -212,7 +237,7 @@ fn write_fields(prepared: &PreparedCase, waves: &[WaveModes], nodes: &Fields, ro
                     rows.integer(DIAMETER, wave.diameter as u64);
                     rows.integer(MODE, mode as u64 + 1);
                 };
-                nodes.write_harmonic(prepared, found.omega, &motion, &head, rows);
+                write(&head, found.omega, &motion);
             }
         }
     }

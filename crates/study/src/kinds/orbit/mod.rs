@@ -1,10 +1,10 @@
 //! Orbits over one period, in time.
 
 mod figure;
-mod stress;
 
 use super::shared::contact_states::contact_word;
 use super::shared::keys::{FREQUENCY, OUTPUT, SAMPLES, check_output, no_requirements};
+use super::shared::stress::{self, STRESS, Stresses};
 use super::shared::{fields, orbit_sweep};
 use crate::case::values::hertz;
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
@@ -19,7 +19,6 @@ use crate::run::work::{Computed, PreparedCase, UnitResult, UnitTask};
 use crate::syntax::key::{ValueType, default};
 use stickslip::dimension::Dimension;
 use stickslip::orbit::{Orbit, Sample, Symmetry};
-use stress::{STRESS, Stresses};
 
 pub(super) const KIND: Kind = Kind {
     info: KindInfo {
@@ -60,13 +59,14 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let wanted = inputs.case.values.flag("multipliers") == Some(true);
     let multipliers = if wanted { points * 2.0 * inputs.dofs } else { 0.0 };
     let fields = fields::size(inputs, points);
+    let sectors = inputs.case.model.ring.map_or(1, |ring| ring.sectors);
     PlannedSize {
         tables: vec![
             inputs.motion(rows),
             TableShape { numbers: orbits.numbers + 4.0, ..orbits },
             TableShape { rows: multipliers, numbers: inputs.varied + 5.0, words: 0.0 },
             fields,
-            stress::size(inputs, points),
+            stress::size(inputs, points, sectors),
         ],
         // the panels beyond the limit are also built; all fields are held until they are written
         drawn: rows * (inputs.places + inputs.joints) + fields.rows,
@@ -128,7 +128,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             nodes.write_orbit(prepared, &orbit, &mut of_nodes);
         }
         if let Some(stresses) = &stresses {
-            stresses.write(prepared, &orbit, &mut of_stresses);
+            stresses.write_orbit(prepared, &orbit, &mut of_stresses);
         }
     }
     part.tables = vec![motion, summary, multipliers, of_nodes, of_stresses];

@@ -7,7 +7,8 @@
 //! - `orbit_sweep`: the orbits of a unit, their instants, and failures;
 //! - `contact_states`: panels of contact states;
 //! - `disk_shape`: pictures of a disk;
-//! - `fields`: the motions of all nodes.
+//! - `fields`: the motions of all nodes;
+//! - `stress`: the stresses of orbits and modes.
 
 pub(super) mod contact_states;
 pub(super) mod disk_shape;
@@ -17,3 +18,4 @@ pub(super) mod orbit_sweep;
 pub(super) mod peak_of;
 pub(super) mod peak_search;
 pub(super) mod points_to_doubt;
+pub(super) mod stress;

@@ -1,27 +1,30 @@
-//! The table `stress`: the largest stresses of the period, by the matrix of stresses of the
-//! structure. A disk has them for every sector, along the axes of the sector.
+//! The table `stress`, by the matrix of stresses of the structure: the largest stresses of the
+//! period of an orbit, or the amplitudes of the stresses of a mode.
+//!
+//! A disk has them for every sector, along the axes of the sector.
 
+use super::fields::{displacement_field, imposed};
 use crate::case::study::Study;
 use crate::case::values::hertz;
 use crate::check::size::{SizeInputs, TableShape};
 use crate::compile::source_model::StressMatrix;
-use crate::kinds::shared::fields::{displacement_field, imposed};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{PreparedCase, UnitResult};
+use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip::model::DisplacementField;
 use stickslip::orbit::Orbit;
 
 /// Name of the table.
-pub(super) const STRESS: &str = "stress";
+pub(in crate::kinds) const STRESS: &str = "stress";
 /// Instants of the period: the largest value of a sine has an error of 8e-5.
 const INSTANTS: usize = 256;
 
-/// Returns the shape of the table for this number of orbits.
-pub(super) fn size(inputs: &SizeInputs<'_>, points: f64) -> TableShape {
+/// Returns the shape of the table for this number of orbits or modes, each with the stresses of
+/// this number of sectors.
+pub(in crate::kinds) fn size(inputs: &SizeInputs<'_>, motions: f64, sectors: usize) -> TableShape {
     let count = of_study(inputs.study).map_or(0, |stress| stress.names.len());
-    let sectors = inputs.case.model.ring.map_or(1, |ring| ring.sectors);
-    TableShape { rows: points * (count * sectors) as f64, numbers: inputs.varied + 6.0, words: 1.0 }
+    TableShape { rows: motions * (count * sectors) as f64, numbers: inputs.varied + 6.0, words: 2.0 }
 }
 
 fn of_study(study: &Study) -> Option<&Arc<StressMatrix>> {
@@ -29,7 +32,7 @@ fn of_study(study: &Study) -> Option<&Arc<StressMatrix>> {
 }
 
 /// The stresses of a case.
-pub(super) struct Stresses {
+pub(in crate::kinds) struct Stresses {
     field: DisplacementField,
     matrix: Arc<StressMatrix>,
 }
@@ -52,7 +55,7 @@ impl Stresses {
     }
 
     /// Writes a row for every stress of an orbit.
-    pub fn write(&self, prepared: &PreparedCase, orbit: &Orbit, rows: &mut TableBuilder) {
+    pub fn write_orbit(&self, prepared: &PreparedCase, orbit: &Orbit, rows: &mut TableBuilder) {
         let none = StressRange { low: f64::INFINITY, high: f64::NEG_INFINITY, sum: 0.0, largest: 0.0, time: 0.0 };
         let mut ranges = vec![none; self.field.sectors() * self.matrix.rows.len()];
         for instant in 0..INSTANTS {
@@ -85,6 +88,35 @@ impl Stresses {
             rows.number("time_of_largest_s", range.time);
             rows.number("amplitude_Pa", 0.5 * (range.high - range.low));
             rows.number("mean_Pa", range.sum / INSTANTS as f64);
+            rows.end_row();
+        }
+    }
+
+    /// Writes a row for every stress of a harmonic motion of all degrees of freedom: its amplitude
+    /// in the column `amplitude`, and its phase. `head` writes the columns that name the motion
+    /// and the sector.
+    pub fn write_harmonic(
+        &self,
+        prepared: &PreparedCase,
+        (sector, motion): (usize, &[Complex64]),
+        amplitude: &str,
+        head: &dyn Fn(&mut TableBuilder),
+        rows: &mut TableBuilder,
+    ) {
+        let at_rest = vec![0.0; prepared.system.moved_places().len()];
+        let part = |of: fn(&Complex64) -> f64| {
+            let values: Vec<f64> = motion.iter().map(of).collect();
+            self.field.rows(sector, &values, &at_rest)
+        };
+        let (real, imaginary) = (part(|x| x.re), part(|x| x.im));
+        for (name, weights) in self.matrix.names.iter().zip(&self.matrix.rows) {
+            let stress: Complex64 =
+                weights.iter().map(|(row, weight)| Complex64::new(real[*row], imaginary[*row]) * *weight).sum();
+            rows.varied(&prepared.case);
+            head(rows);
+            rows.text("stress", name);
+            rows.number(amplitude, stress.norm());
+            rows.number("phase_deg", stress.arg().to_degrees());
             rows.end_row();
         }
     }
