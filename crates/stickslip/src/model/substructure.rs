@@ -175,8 +175,13 @@ impl SubstructureParts {
             (Reduction::None { .. }, _) => SectorParts::whole(substructure, &kept, &seen, blade.as_deref())?,
             (_, None) => SectorParts::reduced(substructure, (&kept, disk.basis), &seen, sectors)?,
             (_, Some(blade)) => {
-                let component = kept.mistuned(blade, &disk.deviations, &seen, reduction).map_err(reduction_error)?;
-                return SubstructureParts::mistuned_ring(substructure, component, model);
+                let component = match (*reduction, disk.basis) {
+                    (Reduction::UpTo { up_to, .. }, Some(basis)) => {
+                        kept.mistuned_by_size(blade, (&disk.deviations, &seen), (up_to, basis))
+                    }
+                    _ => kept.mistuned(blade, &disk.deviations, &seen, reduction),
+                };
+                return SubstructureParts::mistuned_ring(substructure, component.map_err(reduction_error)?, model);
             }
         };
         let n = one.names.len();

@@ -609,7 +609,7 @@ impl SectorCache {
     pub fn reduced_by_size(&self, seen: &[Row], up_to: f64, basis: SectorBasis) -> ReducedResult {
         cached(&self.sized, &(seen.to_vec(), up_to, basis), || {
             load_or_compute(self.kept.as_ref(), &(seen, up_to, basis), || {
-                Ok(ReducedComponent::of_sector(self.sector.reduced_by_size(seen, up_to, basis)?))
+                Ok(ReducedComponent::of_sector(self.sector.reduced_by_size(seen, up_to, basis, None)?))
             })
         })
     }
@@ -652,6 +652,24 @@ impl SectorCache {
         Ok(answer)
     }
 
+    /// Returns the mistuned ring in a sector basis of a known size, with the modes of a range up to
+    /// `up_to`, rad/s. Its error is not computed.
+    pub fn mistuned_by_size(
+        &self,
+        blade: &BladeCache,
+        (deviations, seen): (&[f64], &[Row]),
+        (up_to, basis): (f64, SectorBasis),
+    ) -> ReducedResult {
+        let sized = self.sector.reduced_by_size(seen, up_to, basis, Some(&blade.blade))?;
+        let component = ReducedComponent::of_sector(sized);
+        let ring = self.nominal_ring(&component, blade)?;
+        let (modes, _) = ring.modes(&ring.mistuned_modes(deviations, EXTENTS[0])?, false)?;
+        Ok(Arc::new(ReducedComponent {
+            form: ReducedForm::Ring(Arc::new(modes)),
+            ..ReducedComponent::clone(&component)
+        }))
+    }
+
     /// Returns the mistuned ring as [`SectorCache::mistuned`] does, with the shapes of its modes.
     pub fn mistuned_with_shapes(
         &self,
@@ -676,13 +694,19 @@ impl SectorCache {
             _ => (0..1, f64::INFINITY),
         };
         let mut best: Option<(Arc<ReducedRing>, MistunedModes, ReductionDeviation)> = None;
+        let mut reached = None;
         for step in steps {
+            // the step before has already gone to this basis, or beyond it
+            if reached.is_some_and(|position| STEPS[step] <= position) {
+                continue;
+            }
             // a later failure keeps the earlier result
             let few = match (self.reduced_ring(blade, seen, how, step), &best) {
                 (Ok(few), _) => few,
                 (Err(_), Some(_)) => continue,
                 (Err(error), None) => return Err(error),
             };
+            reached = few.component.basis.and_then(|basis| basis.position());
             let mixed = few.ring.mistuned_modes(deviations, EXTENTS[0])?;
             let (own, found) =
                 (few.component.deviation, few.lacking.deviation(&mixed.values, &mixed.shapes, deviations));
@@ -714,11 +738,17 @@ impl SectorCache {
                 _ => self.chosen(seen, how, Some((&blade.blade, step)))?,
             };
             let ReducedForm::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
-            let (of_blade, up_to) = (blade.blade.projected(sector.n, &sector.basis), component.up_to);
-            let lacking = MistuningError::new((&self.sector, seen), &blade.blade, sector, up_to)?;
-            let ring = NominalRing::new(sector, of_blade, self.sector.sectors, up_to)?;
+            let lacking = MistuningError::new((&self.sector, seen), &blade.blade, sector, component.up_to)?;
+            let ring = self.nominal_ring(&component, blade)?;
             Ok(Arc::new(ReducedRing { component, ring, lacking }))
         })
+    }
+
+    /// Returns the tuned ring of a reduced sector, with the stiffness of its blades.
+    fn nominal_ring(&self, component: &ReducedComponent, blade: &BladeCache) -> Result<NominalRing, ReductionError> {
+        let ReducedForm::Sector(sector) = &component.form else { return Err(ReductionError::NoPorts) };
+        let of_blade = blade.blade.projected(sector.n, &sector.basis);
+        NominalRing::new(sector, of_blade, self.sector.sectors, component.up_to)
     }
 }
 

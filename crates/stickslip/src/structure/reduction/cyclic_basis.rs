@@ -116,6 +116,19 @@ struct WaveCollection<'a> {
     computed: Vec<ComputedWave>,
 }
 
+impl SectorBasis {
+    /// Returns its position in the sequence of extents and sizes that are tried.
+    pub(in crate::structure) fn position(&self) -> Option<usize> {
+        tried_bases().position(|(extent, size)| extent == self.extent && size == (self.order, self.share))
+    }
+}
+
+/// Returns the extents and sizes in the sequence in which they are tried. Extents are multiples of
+/// the frequency of interest up to which the modes of every wave are taken.
+fn tried_bases() -> impl Iterator<Item = (f64, (usize, f64))> {
+    [1.5, 3.0].into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)))
+}
+
 impl CyclicSector {
     /// Returns the reduced sector, observed at these weighted sums of the component's rows. For
     /// different blades, it includes blade vectors, from this entry of [`STEPS`] on.
@@ -140,22 +153,27 @@ impl CyclicSector {
     }
 
     /// Returns the sector reduced by a basis of a known size with the modes of a higher frequency
-    /// range, up to `up_to`, rad/s. Its error is not computed.
+    /// range, up to `up_to`, rad/s. For different blades, it includes blade vectors. Its error is
+    /// not computed.
     pub(in crate::structure) fn reduced_by_size(
         &self,
         seen: &[Row],
         up_to: f64,
         basis: SectorBasis,
+        blade: Option<&Blade>,
     ) -> Result<SectorReduction, ReductionError> {
         let SectorBasis { extent, order, share, level } = basis;
-        let mut waves = WaveCollection { sector: self, seen, blade: None, computed: Vec::new() };
+        let blade = blade.map(|blade| (blade, up_to));
+        let mut waves = WaveCollection { sector: self, seen, blade, computed: Vec::new() };
         let taken = self.diameters(level);
         waves.computed = try_map(taken.iter().copied(), threads(), |diameter| -> Result<_, ReductionError> {
             let whole = self.wave(diameter, seen)?;
             let modes = whole.modes(extent * up_to)?;
             let mut wave = ComputedWave::new(diameter, whole, (modes, extent), None);
             wave.vectors(order, self.dofs)?;
-            wave.whole = None;
+            if blade.is_none() {
+                wave.whole = None;
+            }
             Ok(wave)
         })?;
         let reduced = waves.basis(&taken, (order, share), ReductionKind::Rubin)?;
@@ -227,9 +245,7 @@ impl WaveCollection<'_> {
         let kind = kind.unwrap_or(ReductionKind::Rubin);
         let mut best: Option<(ReductionDeviation, usize)> = None;
         let mut level = 0;
-        // Multiples of the frequency of interest up to which the modes of every wave are tried.
-        let tried = [1.5, 3.0].into_iter().flat_map(|extent| SIZES.map(|size| (extent, size)));
-        for (extent, size) in tried.skip(from) {
+        for (extent, size) in tried_bases().skip(from) {
             loop {
                 let taken = self.sector.diameters(level);
                 let between = self.sector.diameters(level + 1);
