@@ -20,6 +20,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::time::{Duration, Instant};
+use stickslip::model::Substructure;
+use stickslip::structure::Reduction;
 use stickslip_numerics::interrupt::StopFlag;
 
 /// Limit of the processor time of all probes of a study.
@@ -41,7 +43,7 @@ pub enum ExpectedTime {
         /// The probes in words.
         probes: String,
         /// Computations that the probes do not contain, in words.
-        excluded: Option<&'static str>,
+        excluded: Option<String>,
     },
     /// The first probe did not end within the time limit.
     MoreThan {
@@ -57,12 +59,12 @@ pub enum ExpectedTime {
 impl fmt::Display for ExpectedTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            ExpectedTime::Extrapolated { seconds, .. } if *seconds < 1.0 => {
-                write!(f, "{} on one thread", format_estimate(*seconds))
-            }
             ExpectedTime::Extrapolated { seconds, probes, excluded } => {
-                write!(f, "{} on one thread, from {probes}", format_estimate(*seconds))?;
-                excluded.map_or(Ok(()), |excluded| write!(f, ", without {excluded}"))
+                write!(f, "{} on one thread", format_estimate(*seconds))?;
+                if *seconds >= 1.0 {
+                    write!(f, ", from {probes}")?;
+                }
+                excluded.iter().try_for_each(|excluded| write!(f, ", without {excluded}"))
             }
             ExpectedTime::MoreThan { seconds, parts: 1, .. } => write!(f, "more than {seconds} s on one thread"),
             ExpectedTime::MoreThan { seconds, part, parts } => {
@@ -148,6 +150,8 @@ struct Plan {
     probe: Probe,
     /// Computations that the probes do not contain, in words.
     excluded: Option<&'static str>,
+    /// True if points with slip are solved again with a larger basis of a reduced structure.
+    checks_reduction: bool,
     cases: usize,
     /// Frequencies of a case.
     frequencies: usize,
@@ -187,7 +191,17 @@ impl Plan {
             Probe::Points { excluded, .. } => excluded(study),
             Probe::Unit { .. } => None,
         };
-        Plan { probe, excluded, cases, frequencies, units: WorkUnits::new(study, (kind.unit_size)(study)) }
+        let is_reduced = |own: &Substructure| !matches!(own.reduction, Reduction::None { .. });
+        let checks_reduction = matches!(probe, Probe::Points { .. })
+            && study.case(0).is_ok_and(|case| case.model.substructure.as_ref().is_some_and(is_reduced));
+        Plan {
+            probe,
+            excluded,
+            checks_reduction,
+            cases,
+            frequencies,
+            units: WorkUnits::new(study, (kind.unit_size)(study)),
+        }
     }
 
     /// Returns the number of parts of the study of which a probe computes one or two.
@@ -257,7 +271,13 @@ impl Plan {
             }
         };
         let seconds = seconds + preparing;
-        seconds.is_finite().then_some(ExpectedTime::Extrapolated { seconds, probes, excluded: self.excluded })
+        // what the probes lack takes less than they do, unless structures are reduced
+        let excluded = match (self.excluded, self.checks_reduction) {
+            (Some(excluded), true) => Some(format!("{excluded} and the check of the reduction")),
+            (None, true) => Some("the check of the reduction".to_owned()),
+            (excluded, false) => excluded.filter(|_| seconds >= 1.0).map(str::to_owned),
+        };
+        seconds.is_finite().then_some(ExpectedTime::Extrapolated { seconds, probes, excluded })
     }
 }
 
@@ -441,6 +461,12 @@ mod tests {
         assert_eq!(time.announcement(), None);
         let long = plan.extrapolate(&[measurement(20.0, 10.0)]).unwrap();
         assert!(long.announcement().unwrap().contains("Ctrl-C"), "{long}");
+        // a quick run needs no remark, unless points of a reduced structure are solved again
+        let quick = plan.extrapolate(&[measurement(1e-4, 1e-4)]).unwrap();
+        assert_eq!(quick.to_string(), "less than a second on one thread");
+        let reduced = Plan { checks_reduction: true, ..plan }.extrapolate(&[measurement(1e-4, 1e-4)]).unwrap();
+        let words = "less than a second on one thread, without the refinement of peaks and the check of the reduction";
+        assert_eq!(reduced.to_string(), words);
         let unknown = plan.extrapolate(&[]).unwrap();
         assert_eq!(unknown.to_string(), "more than 1 s on one thread for one of 964 points");
     }
