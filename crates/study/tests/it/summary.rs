@@ -248,6 +248,16 @@ fn a_mode_that_never_slips() {
     silent(&modes("0.11 mm"));
 }
 
+/// Options of [method] that kind `modes` has in its own table have no effect.
+#[test]
+fn an_option_in_the_wrong_table_is_named() {
+    let mode = "kind = \"modes\"\nmode = 2\namplitude = { from = \"1 um\", to = \"10 mm\" }\n";
+    let model = "schema = 1\n[model]\ntemplate = \"blade-couple-massless\"\n[study]\n";
+    let method = "[method]\nkind = \"harmonic-balance\"\nharmonics = 1\n";
+    warns(&format!("{model}{mode}{method}"), &["`harmonics` in [method]", "kind `modes`", "[study]"]);
+    silent(&format!("{model}{mode}harmonics = 1\n"));
+}
+
 #[test]
 fn warnings_stand_in_the_record() {
     let text = template(

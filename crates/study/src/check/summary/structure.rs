@@ -113,7 +113,7 @@ impl StructureSummary {
         let known: Vec<(&str, f64)> =
             TRANSLATIONS.iter().zip(self.mass).filter_map(|(along, mass)| Some((*along, mass?))).collect();
         let Some(&(_, first)) = known.first() else {
-            return "unknown, because no row name has a direction (449.x); `units` cannot be checked".to_owned();
+            return "unknown, because no row name has a direction, as in `449.x`; `units` cannot be checked".to_owned();
         };
         let kilograms = |mass: f64| format!("{} kg", format_significant(mass, 4));
         // Masses along several directions that differ by less than this share are stated once.

@@ -31,6 +31,7 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -
     let component = cases[0].case.model.substructure.as_ref().map(|substructure| &substructure.component);
     warnings.extend(component.zip(study.structure.mesh.source.as_ref()).and_then(|(own, mesh)| mesh_misfit(own, mesh)));
     warnings.extend(unused(study));
+    warnings.extend(ineffective_options(study, &cases[0]));
     if let Some(environment) = first_values(study) {
         warnings.extend(bare_numbers(study, &environment));
         warnings.extend(bare_angles(study, &environment));
@@ -38,6 +39,14 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -
     }
     warnings.extend(no_references(study, cases));
     warnings.into_iter().map(|text| format!("{WARNING}{text}")).collect()
+}
+
+/// Warns of options of [method] that a kind without a method states in its own table.
+fn ineffective_options(study: &Study, one: &SurveyedCase) -> Option<String> {
+    let kind = study.kind();
+    let is_own = |key: &&String| kind.keys.iter().any(|own| own.name == key.as_str());
+    let key = one.case.method.options.keys().filter(|_| !kind.uses_method).find(is_own)?;
+    Some(format!("`{key}` in [method] has no effect on kind `{}`; write it in [study]", kind.name))
 }
 
 /// Lists names in a sentence: `a, b and 3 more`.
