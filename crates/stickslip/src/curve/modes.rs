@@ -77,9 +77,14 @@ impl ModePoint {
     /// );
     /// ```
     pub fn phases(&self) -> Vec<f64> {
-        let leading =
-            first_largest(self.places.iter().map(|x| x.norm())).map_or(Complex64::default(), |i| self.places[i]);
+        let leading = self.leading_place();
         self.places.iter().map(|x| (x * leading.conj()).arg()).collect()
+    }
+
+    /// Returns the first harmonic, m, of the place with the largest motion, the first of equal ones;
+    /// zero without places. [`ModePoint::phases`] are relative to it.
+    pub fn leading_place(&self) -> Complex64 {
+        first_largest(self.places.iter().map(|x| x.norm())).map_or(Complex64::default(), |i| self.places[i])
     }
 }
 
@@ -185,6 +190,8 @@ pub fn nonlinear_mode(system: &System, request: ModeRequest) -> Result<Mode, Met
 struct ModeBranches {
     falling: Option<ModeCurve>,
     rising: Option<ModeCurve>,
+    /// False if both branches reach a common amplitude with different motions.
+    meet: bool,
 }
 
 impl ModeBranches {
@@ -199,13 +206,16 @@ impl ModeBranches {
         };
         let reached = |rising: &ModeCurve| rising.largest_amplitude() >= high;
         if rising.as_ref().is_some_and(|rising| reached(rising) || equations.has_constant_forces()) {
-            return ModeBranches { falling: None, rising };
+            return ModeBranches { falling: None, rising, meet: true };
         }
         let falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
         let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
         let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, low, end) } else { None };
-        ModeBranches { falling: Some(falling), rising: rising.or(below) }
+        let rising = rising.or(below);
+        let is_common = |rising: &ModeCurve| is_sought && rising.largest_amplitude() >= end && end < high;
+        let meet = !rising.as_ref().is_some_and(|rising| is_common(rising) && !falling.meets(rising, equations));
+        ModeBranches { falling: Some(falling), rising, meet }
     }
 
     fn curves(&self) -> impl Iterator<Item = &ModeCurve> {
@@ -224,7 +234,10 @@ impl ModeBranches {
         let Some(falling) = &self.falling else { return self.rising.as_ref()?.ended };
         let ended = falling.ended?;
         match &self.rising {
-            Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
+            Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => {
+                let apart = ModeEnd { at: falling.smallest_amplitude(), reason: ModeEndCause::Apart };
+                (!self.meet).then_some(apart)
+            }
             Some(rising) if ended.reason == ModeEndCause::NoStart => rising.ended,
             _ => Some(ended),
         }
@@ -359,6 +372,37 @@ mod tests {
             }
         }
         model.assemble().unwrap()
+    }
+
+    /// With unlike blades, the mode of a number at large amplitudes may become another one in stick.
+    /// Slip only lowers a frequency, so points whose frequency rises with the amplitude belong to
+    /// two motions. Each mode has no such rise, or says where its curve turns or where its curves
+    /// are apart.
+    #[test]
+    fn modes_that_change_their_number_say_so() {
+        let deviations = [0.0, 0.012, -0.008, 0.004, -0.011, 0.007];
+        let mut model = Model::default();
+        let name = |i: usize| format!("b{}", i % deviations.len());
+        for (i, deviation) in deviations.into_iter().enumerate() {
+            let stiffness = 1e4 * (1.0 + deviation);
+            model.masses.push(Mass::new(name(i), 1.0));
+            model.springs.push(Spring { between: [name(i), GROUND.into()], stiffness, damping: 0.0 });
+            let law = std::sync::Arc::new(Jenkins { stiffness: 2e3, limit: 3.0 });
+            model.joints.push(Joint { name: format!("j{i}"), between: [name(i), name(i + 1)], law });
+        }
+        let system = model.assemble().unwrap();
+        let mut apart = 0;
+        for mode in 0..deviations.len() {
+            let unit = unit_amplitude(&system, mode).unwrap().unwrap();
+            let range = (5e-5 * unit, 2e-2 * unit);
+            let request = ModeRequest { mode, range, points: 13, harmonics: 3, samples: 256 };
+            let found = nonlinear_mode(&system, request).unwrap();
+            let rises = found.points.windows(2).any(|pair| pair[1].omega > 1.001 * pair[0].omega);
+            let cause = found.ended.map(|end| end.reason);
+            assert!(!rises || cause.is_some() || !found.turns.is_empty(), "mode {mode}");
+            apart += usize::from(cause == Some(ModeEndCause::Apart));
+        }
+        assert!(apart > 0, "no mode changes its number");
     }
 
     /// For two equal modes of a ring, the solver follows the travelling waves:

@@ -50,6 +50,13 @@ pub enum ModeEndCause {
         "the continuation reached its work limit, because the internal states of a law change very fast there; choose other amplitudes"
     )]
     WorkLimit,
+    /// The curve from small amplitudes is another motion where it should meet the one from large
+    /// amplitudes.
+    #[error(
+        "the curve from large amplitudes ends there; the rows below follow the mode of this number from small \
+         amplitudes, which is another motion; see also the neighbouring modes"
+    )]
+    Apart,
     /// The maximum number of steps is reached.
     #[error("the continuation did not reach the end within 4000 steps; try fewer harmonics")]
     StepLimit,
@@ -322,6 +329,15 @@ impl ModeCurve {
             return 0.0;
         }
         self.arcs.iter().fold(f64::INFINITY, |least, arc| least.min(arc.amplitude))
+    }
+
+    /// Tells whether a curve from small amplitudes has the shape of this one at its end.
+    pub(super) fn meets(&self, rising: &ModeCurve, equations: &mut ModeEquations<'_>) -> bool {
+        let lowest = self.arcs.iter().min_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
+        lowest.is_none_or(|end| {
+            let found = rising.state_at(equations, end.amplitude);
+            found.is_some_and(|state| equations.modal_assurance(&end.state, &state) >= self.settings.min_mac)
+        })
     }
 
     /// Returns the motion at modal amplitude `a`, at the first passage of the curve.

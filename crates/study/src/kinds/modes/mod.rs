@@ -17,6 +17,7 @@ use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::format_with_prefix;
 use crate::syntax::key::{Bounds, Key, ValueType, default, required};
+use num_complex::Complex64;
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, nonlinear_mode, unit_amplitude};
 use stickslip::dimension::Dimension;
 use stickslip::method::MethodError;
@@ -171,10 +172,14 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     Ok(part)
 }
 
-/// Writes the amplitudes of the stresses at all points of the mode, by its first harmonic.
+/// Writes the first harmonics of the stresses at all points of the mode, with phases relative to the
+/// place with the largest motion, as the other table has them.
 fn write_stresses(prepared: &PreparedCase, mode: &Mode, stresses: &Stresses, rows: &mut TableBuilder) {
     let ring = prepared.case.model.ring;
     for point in &mode.points {
+        let leading = point.leading_place();
+        let turn = if leading.norm() > 0.0 { leading.conj() / leading.norm() } else { Complex64::ONE };
+        let motion: Vec<Complex64> = point.shape.iter().map(|x| x * turn).collect();
         for sector in 0..ring.map_or(1, |ring| ring.sectors) {
             let head = |rows: &mut TableBuilder| {
                 rows.number("modal_amplitude_m_sqrt_kg", point.amplitude);
@@ -183,7 +188,7 @@ fn write_stresses(prepared: &PreparedCase, mode: &Mode, stresses: &Stresses, row
                     rows.integer("sector", sector as u64);
                 }
             };
-            stresses.write_harmonic(prepared, (sector, &point.shape), "amplitude_Pa", &head, rows);
+            stresses.write_harmonic(prepared, (sector, &motion), "first_harmonic_Pa", &head, rows);
         }
     }
 }
