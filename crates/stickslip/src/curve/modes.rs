@@ -81,8 +81,8 @@ impl ModePoint {
         self.places.iter().map(|x| (x * leading.conj()).arg()).collect()
     }
 
-    /// Returns the first harmonic, m, of the place with the largest motion, the first of equal ones;
-    /// zero without places. [`ModePoint::phases`] are relative to it.
+    /// Returns the first harmonic, m, of the place with the largest motion; of equal ones, that of
+    /// the first. [`ModePoint::phases`] are relative to it. It is zero without places.
     pub fn leading_place(&self) -> Complex64 {
         first_largest(self.places.iter().map(|x| x.norm())).map_or(Complex64::default(), |i| self.places[i])
     }
@@ -374,10 +374,10 @@ mod tests {
         model.assemble().unwrap()
     }
 
-    /// With unlike blades, the mode of a number at large amplitudes may become another one in stick.
-    /// Slip only lowers a frequency, so points whose frequency rises with the amplitude belong to
-    /// two motions. Each mode has no such rise, or says where its curve turns or where its curves
-    /// are apart.
+    /// With unlike blades, the mode of a number at large amplitudes may become another one in
+    /// stick. Slip only lowers a frequency, so points whose frequency rises with the amplitude
+    /// belong to two motions. Each mode has no such rise, or says where its curve turns or where
+    /// its curves are apart.
     #[test]
     fn modes_that_change_their_number_say_so() {
         let deviations = [0.0, 0.012, -0.008, 0.004, -0.011, 0.007];

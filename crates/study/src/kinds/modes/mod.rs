@@ -172,8 +172,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     Ok(part)
 }
 
-/// Writes the first harmonics of the stresses at all points of the mode, with phases relative to the
-/// place with the largest motion, as the other table has them.
+/// Writes the first harmonics of the stresses at all points of the mode. Phases are relative to
+/// the place with the largest motion, as in the other table.
 fn write_stresses(prepared: &PreparedCase, mode: &Mode, stresses: &Stresses, rows: &mut TableBuilder) {
     let ring = prepared.case.model.ring;
     for point in &mode.points {
