@@ -190,8 +190,6 @@ pub fn nonlinear_mode(system: &System, request: ModeRequest) -> Result<Mode, Met
 struct ModeBranches {
     falling: Option<ModeCurve>,
     rising: Option<ModeCurve>,
-    /// False if both branches reach a common amplitude with different motions.
-    meet: bool,
 }
 
 impl ModeBranches {
@@ -206,16 +204,17 @@ impl ModeBranches {
         };
         let reached = |rising: &ModeCurve| rising.largest_amplitude() >= high;
         if rising.as_ref().is_some_and(|rising| reached(rising) || equations.has_constant_forces()) {
-            return ModeBranches { falling: None, rising, meet: true };
+            return ModeBranches { falling: None, rising };
         }
-        let falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
+        let mut falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
         let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
         let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, low, end) } else { None };
-        let rising = rising.or(below);
-        let is_common = |rising: &ModeCurve| is_sought && rising.largest_amplitude() >= end && end < high;
-        let meet = !rising.as_ref().is_some_and(|rising| is_common(rising) && !falling.meets(rising, equations));
-        ModeBranches { falling: Some(falling), rising, meet }
+        let reaches_end = |below: &&ModeCurve| below.largest_amplitude() >= end && end < high;
+        if below.as_ref().filter(reaches_end).is_some_and(|below| !falling.meets(below, equations)) {
+            falling.ended = Some(ModeEnd { at: end, reason: ModeEndCause::Apart });
+        }
+        ModeBranches { falling: Some(falling), rising: rising.or(below) }
     }
 
     fn curves(&self) -> impl Iterator<Item = &ModeCurve> {
@@ -234,10 +233,8 @@ impl ModeBranches {
         let Some(falling) = &self.falling else { return self.rising.as_ref()?.ended };
         let ended = falling.ended?;
         match &self.rising {
-            Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => {
-                let apart = ModeEnd { at: falling.smallest_amplitude(), reason: ModeEndCause::Apart };
-                (!self.meet).then_some(apart)
-            }
+            _ if ended.reason == ModeEndCause::Apart => Some(ended),
+            Some(rising) if rising.largest_amplitude() >= falling.smallest_amplitude().min(high) => None,
             Some(rising) if ended.reason == ModeEndCause::NoStart => rising.ended,
             _ => Some(ended),
         }
