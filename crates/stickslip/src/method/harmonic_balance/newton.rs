@@ -221,7 +221,7 @@ impl Discretization {
                 break;
             }
             let reduced = after < newton.coarse.reduction * residual;
-            coarse &= reduced || residual > newton.coarse.checked_from;
+            coarse &= reduced;
             same_derivatives = coarse_derivatives && reduced && self.search.linearised;
             if convergence.add(after, motion.iterations) {
                 self.workspace.best.copy_from(motion);

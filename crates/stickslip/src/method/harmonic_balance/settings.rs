@@ -43,18 +43,15 @@ pub(super) struct CoarseSettings {
     /// it grows with the square of their spacing. Default 8e-4: the sampling error of the coarse
     /// samples has this size.
     pub tolerance: f64,
-    /// Residual below which a step with the coarse Jacobian must leave at most `reduction` of it.
-    /// Default 1e-3.
-    pub checked_from: f64,
-    /// Largest share of the residual that such a step may leave. A larger share ends the use of
-    /// coarse Jacobians. A smaller one keeps the Jacobian for the next step, because a new one
-    /// would have the same sampling error. Default 0.1.
+    /// Largest share of the residual that a step with the coarse Jacobian may leave. A larger share
+    /// ends the use of coarse Jacobians. A smaller one keeps the Jacobian for the next step,
+    /// because a new one would have the same sampling error. Default 0.1.
     pub reduction: f64,
 }
 
 impl Default for CoarseSettings {
     fn default() -> Self {
-        CoarseSettings { tolerance: 8e-4, checked_from: 1e-3, reduction: 0.1 }
+        CoarseSettings { tolerance: 8e-4, reduction: 0.1 }
     }
 }
 

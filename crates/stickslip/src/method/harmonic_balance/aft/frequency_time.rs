@@ -44,6 +44,9 @@ pub(in super::super) struct FrequencyTime {
     pub(super) states_at_samples: Vec<f64>,
     /// Known states with which the next port with memory begins. The evaluation consumes them.
     pub known_state: InitialState,
+    /// True if the law dissipates in the motion evaluated last, so that its states follow from the
+    /// period alone.
+    pub dissipates: bool,
     /// `(1 - Π)⁻¹` of the port with memory whose derivative was evaluated last, see
     /// [`InitialState`].
     pub forgetting_inverse: Vec<f64>,
@@ -66,7 +69,8 @@ pub(in super::super) struct FrequencyTime {
 /// Known states of a port with memory in a nearby motion.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct InitialState {
-    /// States at t = 0; empty if they follow from the initial step out of static equilibrium.
+    /// States at t = 0; empty if they follow from static equilibrium, as those of a joint that
+    /// sticks.
     pub state: Vec<f64>,
     /// `(1 - Π)⁻¹`, row-major. `Π` is the derivative of the states after a period by the states
     /// before. Empty if it is unknown, or if some state is never forgotten.
@@ -82,6 +86,11 @@ impl InitialState {
 }
 
 impl FrequencyTime {
+    /// Returns the states at t = 0 in the motion evaluated last; none if the law dissipates nothing.
+    pub fn dissipating_state(&self) -> &[f64] {
+        if self.dissipates { &self.state } else { &[] }
+    }
+
     /// Returns the number of harmonics times the number of samples.
     pub fn resolution(&self) -> usize {
         self.pairs.len() * self.rotations.len()
@@ -106,6 +115,7 @@ impl FrequencyTime {
             state: Vec::new(),
             states_at_samples: Vec::new(),
             known_state: InitialState::default(),
+            dissipates: false,
             forgetting_inverse: Vec::new(),
             rotations: (0..samples).map(|i| Complex64::cis(i as f64 * TAU / samples as f64)).collect(),
             argument: Vec::new(),

@@ -10,9 +10,9 @@
 //! The derivative by a harmonic of the motion follows from `δz = Π δz + δq`. If some state is
 //! never forgotten, as in a permanently stuck contact, `1 - Π` is singular. Along such
 //! directions, states and derivatives are those of a joint that moves straight from static
-//! equilibrium to the beginning of the period.
+//! equilibrium to the beginning of the period, and then through periods until its states repeat.
 
-use super::frequency_time::{FrequencyTime, amplitude_factor};
+use super::frequency_time::{FrequencyTime, InitialState, amplitude_factor};
 use super::workspace::{PERIODICITY_TOLERANCE, StepWorkspace, derivative_batch};
 use crate::law::MAX_DIRECTIONS;
 use nalgebra::{DMatrix, DVector};
@@ -31,6 +31,9 @@ struct PeriodicStateSettings {
     periods: usize,
     /// Least fraction of a Newton step that is tried.
     least_fraction: f64,
+    /// Change over a period from which one Newton step may reach the solution. A period without
+    /// derivatives, a third of the cost of one with them, then tells.
+    last_step: f64,
     /// Maximum number of initial periods without derivatives. A period with derivatives costs as
     /// much as three without.
     plain_periods: usize,
@@ -51,6 +54,7 @@ impl Default for PeriodicStateSettings {
             rounded: 1e-9,
             periods: 60,
             least_fraction: 0.1,
+            last_step: 1e-4,
             plain_periods: 6,
             slow_ratio: 0.03,
             broyden_reduction: 0.3,
@@ -97,6 +101,11 @@ pub(super) trait StepSequence {
     /// the states after it, then those of the forces. Its columns are the inputs, the states
     /// before, and ω if that is known. Returns false if a step has no solution.
     fn period(&mut self, z: &mut [f64], force: &mut [Vec<f64>; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
+    /// Tells whether the law dissipates in a period with these forces at the samples, so that its
+    /// states follow from the period alone.
+    fn dissipates(&self, _force: &[Vec<f64>; MAX_DIRECTIONS]) -> bool {
+        true
+    }
     /// Takes the initial step, straight from static equilibrium to sample 0.
     /// Returns false if it has no solution.
     fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool;
@@ -132,58 +141,73 @@ impl FrequencyTime {
     /// Finds periodic states, into `self.state`, and the forces. With `linear`,
     /// computes the derivatives of all steps and returns Π; otherwise returns
     /// an arbitrary matrix. `None` if no periodic states are found.
+    ///
+    /// The known states of a nearby motion are a valid start only if the joint slips in every
+    /// period. If it sticks there, its states depend on the history, which begins in static
+    /// equilibrium.
     fn find_periodic_state(
         &mut self,
         sequence: &mut dyn StepSequence,
         memory: &mut StepWorkspace,
         linear: bool,
     ) -> Option<DMatrix<f64>> {
-        let settings = PeriodicStateSettings::default();
         let m = sequence.states();
-        let scale = sequence.state_scale();
         let known = std::mem::take(&mut self.known_state);
-        let mut z = DVector::zeros(m);
-        let begun = m > 0 && known.state.len() == m;
-        if begun {
-            z.copy_from_slice(&known.state);
-        } else {
-            let mut force = [0.0; MAX_DIRECTIONS];
-            if !sequence.initial_step(z.as_mut_slice(), &mut force, None) {
-                return None;
+        if m > 0 && known.state.len() == m {
+            let product = self.periodic_state_from(sequence, memory, known, linear);
+            if product.is_some() && self.dissipates {
+                return product;
             }
         }
-        if m > 0 && !linear && known.forgetting_inverse.len() == m * m {
+        let (mut z, mut force) = (DVector::zeros(m), [0.0; MAX_DIRECTIONS]);
+        if !sequence.initial_step(z.as_mut_slice(), &mut force, None) {
+            return None;
+        }
+        if self.transient(sequence, &mut z, None)? && !linear {
+            self.accept(sequence, &z);
+            return Some(DMatrix::zeros(m, m));
+        }
+        self.newton(sequence, memory, z)
+    }
+
+    /// Finds periodic states from those of a nearby motion.
+    fn periodic_state_from(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        memory: &mut StepWorkspace,
+        known: InitialState,
+        linear: bool,
+    ) -> Option<DMatrix<f64>> {
+        let m = sequence.states();
+        let mut z = DVector::from_vec(known.state);
+        if known.forgetting_inverse.len() == m * m {
             let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
-            if self.broyden(sequence, &mut z, inverse)? {
-                return Some(DMatrix::zeros(m, m));
-            }
-        } else if linear
-            && self.periodicity_tolerance > PERIODICITY_TOLERANCE
-            && known.forgetting_inverse.len() == m * m
-        {
-            // known states from other samples: one period without derivatives brings them near
-            // enough, at a third of the cost of one with derivatives
-            let inverse = DMatrix::from_row_slice(m, m, &known.forgetting_inverse);
-            let change = self.period(sequence, &z, None)? - &z;
-            z += inverse * change;
-        } else if !begun {
-            // a law that slips forgets its initial states in a few periods without derivatives
-            let mut last = f64::INFINITY;
-            for _ in 0..settings.plain_periods {
-                let after = self.period(sequence, &z, None)?;
-                let gap = (&after - &z).amax() / scale;
-                z = after;
-                if gap <= PERIODICITY_TOLERANCE && !linear {
-                    self.state.clear();
-                    self.state.extend(z.iter());
+            if !linear {
+                if self.broyden(sequence, &mut z, inverse)? {
                     return Some(DMatrix::zeros(m, m));
                 }
-                if gap <= PERIODICITY_TOLERANCE || gap > settings.slow_ratio * last {
-                    break;
-                }
-                last = gap;
+            } else if self.periodicity_tolerance > PERIODICITY_TOLERANCE {
+                // known states from other samples: one period without derivatives brings them near
+                // enough, at a third of the cost of one with derivatives
+                let change = self.period(sequence, &z, None)? - &z;
+                z += inverse * change;
             }
         }
+        self.newton(sequence, memory, z)
+    }
+
+    /// Finds periodic states by Newton's method from `z`. Returns Π.
+    ///
+    /// The derivatives may be those of the last iterate before the solution: a joint that has
+    /// slipped into a state in which it just sticks keeps the derivatives of slip.
+    fn newton(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        memory: &mut StepWorkspace,
+        mut z: DVector<f64>,
+    ) -> Option<DMatrix<f64>> {
+        let settings = PeriodicStateSettings::default();
+        let (m, scale) = (sequence.states(), sequence.state_scale());
         let mut best: Option<NewtonBase> = None;
         let mut fraction = 1.0;
         for _ in 0..settings.periods {
@@ -192,11 +216,10 @@ impl FrequencyTime {
             let gap = change.amax() / scale;
             let last = best.as_ref().map_or(f64::INFINITY, |best| best.gap);
             if m == 0 || gap <= self.periodicity_tolerance || (gap <= settings.rounded && gap >= 0.5 * last) {
-                self.state.clear();
-                self.state.extend(z.iter());
+                self.accept(sequence, &z);
                 return Some(product);
             }
-            let base = match best.take() {
+            best = match best.take() {
                 Some(base) if gap > (1.0 - 0.5 * fraction) * base.gap => {
                     fraction *= 0.5;
                     if fraction < settings.least_fraction {
@@ -204,18 +227,61 @@ impl FrequencyTime {
                         fraction = 1.0;
                         continue;
                     }
-                    base
+                    z = &base.states + fraction * &base.step;
+                    Some(base)
                 }
                 _ => {
                     fraction = 1.0;
-                    let step = pseudo_inverse(DMatrix::identity(m, m) - product) * &change;
-                    NewtonBase { states: z, change, gap, step }
+                    let step = pseudo_inverse(DMatrix::identity(m, m) - &product) * &change;
+                    let states = std::mem::replace(&mut z, DVector::zeros(0));
+                    z = &states + &step;
+                    if gap <= settings.last_step
+                        && (self.period(sequence, &z, None)? - &z).amax() <= self.periodicity_tolerance * scale
+                    {
+                        self.accept(sequence, &z);
+                        return Some(product);
+                    }
+                    Some(NewtonBase { states, change, gap, step })
                 }
             };
-            z = &base.states + fraction * &base.step;
-            best = Some(base);
         }
         None
+    }
+
+    /// Keeps periodic states, whose period was integrated last.
+    fn accept(&mut self, sequence: &dyn StepSequence, z: &DVector<f64>) {
+        self.state.clear();
+        self.state.extend(z.iter());
+        self.dissipates = sequence.dissipates(&self.force);
+    }
+
+    /// Integrates periods from `z` until the states repeat, change slowly, or the periods exceed
+    /// [`PeriodicStateSettings::plain_periods`]. A law that slips forgets its initial states in a
+    /// few periods. `rows` receives the derivatives of every period. Returns whether the states
+    /// repeat. `None` if a step has no solution.
+    fn transient(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        z: &mut DVector<f64>,
+        mut rows: Option<&mut Vec<Vec<f64>>>,
+    ) -> Option<bool> {
+        let settings = PeriodicStateSettings::default();
+        let scale = sequence.state_scale();
+        let mut last = f64::INFINITY;
+        for _ in 0..settings.plain_periods {
+            let own = rows.as_deref_mut().map(|rows| rows.push_mut(Vec::new()));
+            let after = self.period(sequence, z, own)?;
+            let gap = (&after - &*z).amax() / scale;
+            *z = after;
+            if gap <= PERIODICITY_TOLERANCE {
+                return Some(true);
+            }
+            if gap > settings.slow_ratio * last {
+                break;
+            }
+            last = gap;
+        }
+        Some(false)
     }
 
     /// Finds periodic states from those of a nearby motion by Broyden's method. The initial
@@ -254,8 +320,7 @@ impl FrequencyTime {
             }
             change = after;
         }
-        self.state.clear();
-        self.state.extend(z.iter());
+        self.accept(sequence, z);
         Some(true)
     }
 
@@ -311,10 +376,10 @@ impl FrequencyTime {
         if !neutral {
             self.forgetting_inverse.extend(inverse.transpose().iter());
         }
-        // states that are never forgotten have the derivative of the first period
+        // states that are never forgotten have the derivative of the periods until they repeat
         let beginning = if neutral {
             let mut first = std::mem::take(&mut memory.first);
-            let rows = self.first_period(sequence, &mut first);
+            let rows = self.transient_derivatives(sequence, &mut first);
             memory.first = first;
             match rows {
                 Some(rows) => Some(rows),
@@ -477,13 +542,13 @@ impl FrequencyTime {
     /// changes of these states that keep them periodic into `memory.shift`.
     ///
     /// The columns are the parts of the harmonics of the motion along `count` axes, or the
-    /// frequency. `beginning` contains the steps of the first period if some state is never
-    /// forgotten; the states at t = 0 then change with the inputs.
+    /// frequency. `beginning` contains the steps of the periods from static equilibrium if
+    /// some state is never forgotten; the states at t = 0 then change with the inputs.
     fn differentiate_forces(
         &self,
         sequence: &dyn StepSequence,
         memory: &mut StepWorkspace,
-        (beginning, inverse): (Option<&[f64]>, &DMatrix<f64>),
+        (beginning, inverse): (Option<&[Vec<f64>]>, &DMatrix<f64>),
         (input, count, wide, own): (DerivativeVariable, usize, usize, usize),
     ) {
         let n = self.samples();
@@ -500,9 +565,9 @@ impl FrequencyTime {
         if let Some(beginning) = beginning {
             // the factors of the initial step follow those of the samples
             by.advance(&memory.first[..m * width], waves(n), &next, &mut start);
-            for step in 1..=n {
+            for (period, step) in beginning.iter().flat_map(|period| (1..=n).map(move |step| (period, step))) {
                 let i = step % n;
-                by.advance(&beginning[i * size..][..m * width], waves(i), &start, &mut next);
+                by.advance(&period[i * size..][..m * width], waves(i), &start, &mut next);
                 std::mem::swap(&mut start, &mut next);
             }
         }
@@ -534,9 +599,13 @@ impl FrequencyTime {
         }
     }
 
-    /// Computes the derivatives of the steps of the first period, and of the
-    /// initial step into `first`. Restores `self.force`.
-    fn first_period(&mut self, sequence: &mut dyn StepSequence, first: &mut Vec<f64>) -> Option<Vec<f64>> {
+    /// Computes the derivatives of the initial step, into `first`, and of the periods after it
+    /// until the states repeat. Restores `self.force`.
+    fn transient_derivatives(
+        &mut self,
+        sequence: &mut dyn StepSequence,
+        first: &mut Vec<f64>,
+    ) -> Option<Vec<Vec<f64>>> {
         let (m, d) = (sequence.states(), sequence.axes());
         first.resize((m + d) * width(sequence), 0.0);
         let mut z = DVector::zeros(m);
@@ -546,7 +615,7 @@ impl FrequencyTime {
         }
         let forces = self.force.clone();
         let mut rows = Vec::new();
-        let run = self.period(sequence, &z, Some(&mut rows));
+        let run = self.transient(sequence, &mut z, Some(&mut rows));
         self.force = forces;
         run.map(|_| rows)
     }

@@ -37,6 +37,7 @@ impl FrequencyTime {
             return self.step_by_step(step, port, c, force, tangent);
         }
         self.state.clear();
+        self.dissipates = false;
         self.forgetting_inverse.clear();
         self.known_state = InitialState::default();
         let mut point = StepPoint::new(axes, step.states());
@@ -160,6 +161,21 @@ impl StepSequence for ReturnMapStepper<'_> {
         self.step.advance_cycle(self.axes, self.samples, (&mut *z, &mut self.trail), force, rows);
         z.iter().all(|z| z.is_finite())
     }
+    /// Slip dissipates energy. The trapezoidal rule is exact for a joint that sticks.
+    fn dissipates(&self, force: &[Vec<f64>; MAX_DIRECTIONS]) -> bool {
+        // Dissipated energy, relative to the work that is exchanged, that is more than rounding.
+        let rounding = 1e-9;
+        let (mut dissipated, mut exchanged) = (0.0, 0.0);
+        for (force, motion) in force.iter().zip(self.samples).take(self.axes) {
+            for i in 0..motion.len() {
+                let next = (i + 1) % motion.len();
+                let work = 0.5 * (force[i] + force[next]) * (motion[next] - motion[i]);
+                dissipated += work;
+                exchanged += work.abs();
+            }
+        }
+        dissipated > rounding * exchanged
+    }
     fn initial_step(&mut self, after: &mut [f64], force: &mut [f64; MAX_DIRECTIONS], rows: Option<&mut [f64]>) -> bool {
         let (from, to) = (self.rest, self.read(0));
         let before = std::mem::take(&mut self.states);
@@ -258,6 +274,55 @@ mod tests {
                 "{change}: {from_rest:?} {nearby:?}"
             );
             assert!(few < many || change > 0.1, "{change}: {few} steps, {many} from rest");
+        }
+    }
+
+    /// A contact that slips for some periods and then sticks: the forces do not depend on the
+    /// states of a nearby motion, and their derivatives are those of the difference quotient.
+    #[test]
+    fn a_contact_that_slips_into_stick_has_exact_derivatives() {
+        let contact = FrictionContact { tangential: 3.0, normal: 2.0, friction: 0.5, preload: 4.0, tangents: 2 };
+        let (harmonics, port) = (vec![0, 1, 2, 3], port(contact, 3));
+        let nh = harmonics.len();
+        let size = 6 * nh;
+        let at = |factor: f64, change: f64, part: usize, seed: usize| -> Vec<Complex64> {
+            let own = |i: usize| {
+                let phase = Complex64::cis(1.0 + ((seed + 1) * i) as f64);
+                let c = if i.is_multiple_of(nh) { Complex64::new(0.1, 0.0) } else { phase * (1.2 / (1.0 + i as f64)) };
+                let moved = [Complex64::new(change, 0.0), Complex64::new(0.0, change)][part % 2];
+                c * factor + if i == part / 2 { moved } else { Complex64::new(0.0, 0.0) }
+            };
+            (0..3 * nh).map(own).collect()
+        };
+        let mut aft = FrequencyTime::new(harmonics, 128);
+        let mut run = |c: &[Complex64], known: InitialState, slopes: Option<&mut [f64]>| {
+            let mut force = vec![Complex64::new(0.0, 0.0); 3 * nh];
+            aft.known_state = known;
+            aft.step_by_step(&contact, &port, c, &mut force, slopes);
+            let state = aft.dissipating_state().to_vec();
+            (force, InitialState { state, forgetting_inverse: aft.forgetting_inverse.clone() })
+        };
+        for (factor, seed) in (0..20).flat_map(|seed| (25..60).map(move |i| (0.02 * f64::from(i), seed))) {
+            let mut slopes = vec![0.0; size * size];
+            let (force, known) = run(&at(factor, 0.0, 0, seed), InitialState::default(), Some(&mut slopes));
+            assert!(force.iter().all(|f| f.is_finite()));
+            let [nearby, rest] =
+                [known, InitialState::default()].map(|known| run(&at(1.01 * factor, 0.0, 0, seed), known, None).0);
+            let apart = nearby.iter().zip(&rest).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(apart < 1e-9, "{factor}, {seed}: {apart:.1e} between two histories");
+            // the mean has no imaginary part
+            for part in (0..size).filter(|part| part % (2 * nh) != 1) {
+                let step = 1e-7;
+                let [ahead, behind] =
+                    [step, -step].map(|change| run(&at(factor, change, part, seed), InitialState::default(), None).0);
+                for (i, (a, b)) in ahead.iter().zip(&behind).enumerate() {
+                    let quotient = (a - b) / (2.0 * step);
+                    for (row, value) in [(2 * i, quotient.re), (2 * i + 1, quotient.im)] {
+                        let slope = slopes[row * size + part];
+                        assert!((slope - value).abs() < 1e-3, "{factor}, {seed}, {row} by {part}: {slope} {value}");
+                    }
+                }
+            }
         }
     }
 }

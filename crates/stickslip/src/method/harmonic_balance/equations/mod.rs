@@ -144,8 +144,8 @@ pub(super) struct SearchState {
     pub anchor: Vec<Complex64>,
     /// Springs of the proximal point method for static equilibrium.
     pub tether: Option<ProximalSprings>,
-    /// Per port with memory: the states at t = 0 in the motion evaluated last, and how they are
-    /// forgotten.
+    /// Per port with memory: the states at t = 0 in the motion evaluated last, if it slips there,
+    /// and how they are forgotten.
     pub states: Vec<InitialState>,
     /// True if laws that forget their initial states begin the next motion with these. They reach
     /// the same states as from static equilibrium, in fewer periods.
@@ -370,7 +370,8 @@ impl Discretization {
                 self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
             }
             if port.has_memory_steps() {
-                self.search.states[p].state.clone_from(&self.aft.state);
+                self.search.states[p].state.clear();
+                self.search.states[p].state.extend(self.aft.dissipating_state());
             }
         }
     }
