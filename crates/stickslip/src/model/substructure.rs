@@ -306,7 +306,7 @@ impl SectorParts {
             return Err(reduction_error(ReductionError::NoPorts));
         };
         let damping = match damping_law(substructure, &component) {
-            Some(law) => sector.damped(&law, sectors).map_err(reduction_error)?,
+            Some(law) => Arc::unwrap_or_clone(sector.damped(&law, sectors).map_err(reduction_error)?),
             None => sector.damping.clone().unwrap_or_default(),
         };
         let mut places = vec![RingRow::new(); seen.len()];

@@ -27,7 +27,7 @@ pub(crate) use sector_boundary::{CyclicSector, RingEntry, RingRow};
 pub use sector_faces::{FacesError, NodeCoordinates, SectorFaces};
 pub(crate) use uncoupled_modes::UncoupledModes;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVectorView};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use stickslip_numerics::definiteness::{is_semidefinite, semidefinite_rank, sparse_definite};
@@ -488,6 +488,17 @@ impl Structure {
             Storage::Full(full) => nonzero_entries(&full.damping),
             Storage::Sparse { damping, .. } => Box::new(damping.entries()),
             Storage::Ring { sector, .. } => Box::new(sector.ring_entries_of(1)),
+        }
+    }
+
+    /// Returns `vᵀ C v` of velocities, W.
+    pub(in crate::structure) fn damping_power(&self, velocity: &[f64]) -> f64 {
+        match &self.0.form {
+            Storage::Full(full) => {
+                let velocity = DVectorView::from_slice(velocity, velocity.len());
+                velocity.dot(&(&full.damping * velocity))
+            }
+            _ => self.damping_entries().map(|(row, column, c)| velocity[row] * c * velocity[column]).sum(),
         }
     }
 

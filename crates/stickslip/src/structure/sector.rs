@@ -14,6 +14,7 @@ use super::{Structure, StructureError, is_full, to_full};
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::rc::Rc;
 use std::sync::{Mutex, PoisonError};
 use stickslip_numerics::definiteness::{is_semidefinite, sparse_definite};
 use stickslip_numerics::sparse::{Singular, SparseMatrix};
@@ -244,10 +245,13 @@ impl RingSector {
     pub(super) fn ring_entries_of(&self, kind: usize) -> impl Iterator<Item = (usize, usize, f64)> + use<> {
         let (n, sectors) = (self.dofs(), self.sectors);
         let own = self.entries.iter().filter(|entry| entry.3[kind] != 0.0);
-        let own: Vec<_> = own.map(|&(row, column, shift, values)| (row, column, shift, values[kind])).collect();
-        (0..sectors * own.len()).map(move |at| {
-            let (sector, (row, column, shift, value)) = (at / own.len(), own[at % own.len()]);
-            (sector * n + row, (sector + shift) % sectors * n + column, value)
+        let own: Rc<[_]> = own.map(|&(row, column, shift, values)| (row, column, shift, values[kind])).collect();
+        (0..sectors).flat_map(move |sector| {
+            let own = own.clone();
+            (0..own.len()).map(move |at| {
+                let (row, column, shift, value) = own[at];
+                (sector * n + row, (sector + shift) % sectors * n + column, value)
+            })
         })
     }
 
@@ -410,14 +414,14 @@ impl Wave {
     /// Returns `vᴴ C v` of complex velocities of the first sector, W: twice the mean power that
     /// its damping dissipates.
     pub(crate) fn damping_power(&self, velocity: &[Complex64]) -> f64 {
-        let n = self.dofs;
-        let part = |row: usize| if row < n { velocity[row].re } else { velocity[row - n].im };
-        let double = self.is_double();
-        let loss = self.structure.damping_entries().map(|(row, column, damping)| {
-            let imaginary = if double { 0.0 } else { velocity[row].im * velocity[column].im };
-            damping * (part(row) * part(column) + imaginary)
-        });
-        loss.sum()
+        let (real, imaginary) = (velocity.iter().map(|v| v.re), velocity.iter().map(|v| v.im));
+        match self.is_double() {
+            true => self.structure.damping_power(&real.chain(imaginary).collect::<Vec<_>>()),
+            false => {
+                let parts: [Vec<f64>; 2] = [real.collect(), imaginary.collect()];
+                parts.iter().map(|part| self.structure.damping_power(part)).sum()
+            }
+        }
     }
 }
 

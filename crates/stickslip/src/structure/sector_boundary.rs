@@ -514,6 +514,7 @@ fn summed(mut all: Vec<RingEntry>) -> Vec<RingEntry> {
         }
         same
     });
+    all.shrink_to_fit();
     all
 }
 

@@ -13,6 +13,7 @@ use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
+use stickslip_numerics::parallel::map;
 use stickslip_numerics::tie_break::first_largest;
 
 /// Points with slip on a reduced structure.
@@ -109,8 +110,10 @@ impl SlipReductionCheck {
         let all = std::mem::take(&mut self.candidates);
         let larger = larger_basis_system(model, system)?;
         let mut solved = 0;
-        for index in chosen(&all) {
-            let Some(again) = compare_point(&larger, method, &all[index]) else { continue };
+        let chosen = chosen(&all);
+        let again = map(&chosen, rayon::current_num_threads(), |&index| compare_point(&larger, method, &all[index]));
+        for (index, again) in chosen.into_iter().zip(again) {
+            let Some(again) = again else { continue };
             solved += 1;
             if self.again.as_ref().is_none_or(|worst| again.error > worst.error) {
                 self.again = Some(BasisDifference { point_text: at(all[index].omega), ..again });

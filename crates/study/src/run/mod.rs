@@ -12,6 +12,7 @@
 
 pub(crate) mod basis_check;
 pub(crate) mod output_columns;
+mod period_samples;
 pub(crate) mod point_row;
 mod probe;
 pub mod result_block;

@@ -2,12 +2,13 @@
 
 use crate::case::study::Case;
 use crate::results::columns;
+use crate::run::period_samples::{INSTANTS, PeriodSamples};
 use crate::run::set_columns;
 use crate::run::work::PreparedCase;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use stickslip::model::{Axis, System, SystemJoint};
-use stickslip::orbit::{JointMotion, Orbit, Sample};
+use stickslip::orbit::{JointMotion, Orbit};
 
 /// A group of columns that `output` can select.
 pub(crate) struct OutputColumns {
@@ -18,7 +19,7 @@ pub(crate) struct OutputColumns {
     /// Names of its columns.
     columns: fn(&Case, &System) -> Vec<String>,
     /// Its numbers, one for each column.
-    values: fn(&PreparedCase, &Orbit, &[Sample]) -> Vec<f64>,
+    values: fn(&PreparedCase, &Orbit, &PeriodSamples) -> Vec<f64>,
 }
 
 /// All choices of `output`.
@@ -30,7 +31,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
-            axes.map(|(j, a)| half_range(samples.iter().map(|sample| sample.joints[j].force[a]))).collect()
+            axes.map(|(j, a)| half_range(samples.all().iter().map(|sample| sample.joints[j].force[a]))).collect()
         },
     },
     OutputColumns {
@@ -40,10 +41,8 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         values: |prepared, _, samples| {
             let joints = prepared.system.joints().iter().enumerate();
             let axes = joints.flat_map(|(j, joint)| (0..joint.axes().len()).map(move |a| (j, a)));
-            // the switches follow the evenly spaced instants
-            let sum = |j: usize, a: usize| -> f64 {
-                samples[..INSTANTS].iter().map(|sample| sample.joints[j].force[a]).sum()
-            };
+            let sum =
+                |j: usize, a: usize| -> f64 { samples.even().iter().map(|sample| sample.joints[j].force[a]).sum() };
             axes.map(|(j, a)| sum(j, a) / INSTANTS as f64).collect()
         },
     },
@@ -82,7 +81,9 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         columns: |_, system| place_columns(system, |unit| format!("velocity_amplitude_{unit}_per_s")),
         values: |prepared, _, samples| {
             let places = prepared.system.place_axes().iter();
-            places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.velocity)))).collect()
+            places
+                .map(|place| half_range(samples.all().iter().map(|sample| place.component(&sample.velocity))))
+                .collect()
         },
     },
     OutputColumns {
@@ -91,7 +92,9 @@ pub(crate) const TABLE: &[OutputColumns] = &[
         columns: |_, system| place_columns(system, |unit| format!("acceleration_amplitude_{unit}_per_s2")),
         values: |prepared, _, samples| {
             let places = prepared.system.place_axes().iter();
-            places.map(|place| half_range(samples.iter().map(|sample| place.component(&sample.acceleration)))).collect()
+            places
+                .map(|place| half_range(samples.all().iter().map(|sample| place.component(&sample.acceleration))))
+                .collect()
         },
     },
     OutputColumns {
@@ -104,7 +107,7 @@ pub(crate) const TABLE: &[OutputColumns] = &[
             };
             places.flat_map(all).collect()
         },
-        values: |prepared, orbit, _| harmonics(prepared, orbit),
+        values: |prepared, _, samples| harmonics(prepared, samples),
     },
     OutputColumns {
         name: "receptance",
@@ -131,10 +134,6 @@ pub(crate) const TABLE: &[OutputColumns] = &[
 
 /// Highest harmonic of `harmonics`.
 const HARMONICS: usize = 5;
-/// Instants per period at which ranges are evaluated, in addition to every switch. The range of
-/// a sine has an error of 2e-6.
-const INSTANTS: usize = 1024;
-
 fn joint_columns(system: &System, quantity: &str) -> Vec<String> {
     system.joints().iter().flat_map(|joint| joint.labels()).map(|label| format!("{label}_{quantity}")).collect()
 }
@@ -152,11 +151,10 @@ fn half_range(values: impl Iterator<Item = f64>) -> f64 {
 /// Returns the amplitudes of the harmonics by the rectangle rule.
 ///
 /// For a smooth periodic motion the error comes only from harmonics near [`INSTANTS`].
-fn harmonics(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
+fn harmonics(prepared: &PreparedCase, samples: &PeriodSamples) -> Vec<f64> {
     let mut sums = vec![Complex64::new(0.0, 0.0); prepared.system.places().len() * HARMONICS];
-    for instant in 0..INSTANTS {
+    for (instant, sample) in samples.even().iter().enumerate() {
         let turn = TAU * instant as f64 / INSTANTS as f64;
-        let sample = orbit.sample(orbit.period() * instant as f64 / INSTANTS as f64);
         for (place, x) in prepared.system.at_places(&sample.displacement).into_iter().enumerate() {
             for h in 1..=HARMONICS {
                 sums[place * HARMONICS + h - 1] += x * Complex64::from_polar(1.0, -(h as f64) * turn);
@@ -179,11 +177,6 @@ pub(crate) fn columns(case: &Case, system: &System) -> Vec<String> {
 
 /// Returns the values of these columns.
 pub(crate) fn values(prepared: &PreparedCase, orbit: &Orbit) -> Vec<f64> {
-    if selected(&prepared.case).next().is_none() {
-        return Vec::new();
-    }
-    let mut times: Vec<f64> = (0..INSTANTS).map(|i| orbit.period() * i as f64 / INSTANTS as f64).collect();
-    times.extend(orbit.transition_times());
-    let samples: Vec<Sample> = times.iter().map(|time| orbit.sample(*time)).collect();
+    let samples = PeriodSamples::new(orbit);
     selected(&prepared.case).flat_map(|extra| (extra.values)(prepared, orbit, &samples)).collect()
 }

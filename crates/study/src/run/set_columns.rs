@@ -4,6 +4,7 @@
 use crate::case::study::Case;
 use crate::compile::mesh::NamedMembers;
 use crate::results::columns;
+use crate::run::period_samples::PeriodSamples;
 use crate::run::work::PreparedCase;
 use std::collections::HashMap;
 use stickslip::model::Axis;
@@ -33,7 +34,7 @@ pub(super) fn columns(case: &Case) -> Vec<String> {
 }
 
 /// Returns their values.
-pub(super) fn values(prepared: &PreparedCase, orbit: &Orbit, samples: &[Sample]) -> Vec<f64> {
+pub(super) fn values(prepared: &PreparedCase, orbit: &Orbit, samples: &PeriodSamples) -> Vec<f64> {
     let PreparedCase { case, system, .. } = prepared;
     let joints: HashMap<&str, usize> = system.joints().iter().enumerate().map(|(i, joint)| (joint.name(), i)).collect();
     let mut places: HashMap<&str, Vec<usize>> = HashMap::new();
@@ -61,7 +62,7 @@ pub(super) fn values(prepared: &PreparedCase, orbit: &Orbit, samples: &[Sample])
             let square = |place: &usize| system.place_axes()[*place].component(&sample.displacement).powi(2);
             node.iter().map(square).sum::<f64>()
         };
-        let all = samples.iter().flat_map(|sample| nodes.iter().map(move |node| distance(sample, node)));
+        let all = samples.all().iter().flat_map(|sample| nodes.iter().map(move |node| distance(sample, node)));
         vec![all.fold(0.0, f64::max).sqrt()]
     };
     let of_set = |set: &NamedMembers, ending: &str| {
