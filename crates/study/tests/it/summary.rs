@@ -432,10 +432,13 @@ fn several_orbits_are_announced() {
     assert_eq!(summary(&template("blade-couple", &[])).orbits, Some(OrbitCount::One));
     let falling = r#"law = { kind = "stribeck", limit = "Ft", static_limit = "1.5*Ft", velocity = "1 mm/s" }"#;
     let falling = summary(&template("blade-couple", &[(coulomb, falling)]));
-    assert_eq!(falling.orbits, Some(OrbitCount::Several("`stribeck` of shroud".to_owned())));
+    assert_eq!(
+        falling.orbits,
+        Some(OrbitCount::Several { reasons: "`stribeck` of shroud".to_owned(), reverse_sweep: true })
+    );
     assert!(falling.to_string().contains("several may exist at one frequency (`stribeck` of shroud)"), "{falling}");
     let stop = summary(&stop(r#"kind = "gap", gap = "1 mm", stiffness = "1e5 N/m""#, ""));
-    assert_eq!(stop.orbits, Some(OrbitCount::Several("`gap` of j".to_owned())));
+    assert_eq!(stop.orbits, Some(OrbitCount::Several { reasons: "`gap` of j".to_owned(), reverse_sweep: true }));
 }
 
 /// A stop for a mass of 1 kg, with a gap as a bare number, and a figure with references.

@@ -29,6 +29,7 @@ use crate::run::work::WorkUnits;
 use crate::syntax::error::StudyError;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
+use stickslip::curve::bidirectional_sweep;
 use stickslip::model::{LinearModes, SlipOnset, System};
 
 /// Summary of a study before it is run.
@@ -75,14 +76,22 @@ pub enum OrbitCount {
     /// One orbit, except for the offsets of stuck contacts: no two motions under the same
     /// excitation separate.
     One,
-    /// Possibly several, for this reason.
-    Several(String),
+    /// Possibly several.
+    Several {
+        /// The reasons in words.
+        reasons: String,
+        /// True if `response` also sweeps downward in frequency.
+        reverse_sweep: bool,
+    },
 }
 
 impl OrbitCount {
     fn new(system: &System) -> Option<OrbitCount> {
         // Number of joints that are named as the reason for several orbits.
         let max_named_joints = 2;
+        let several = |reasons: String| {
+            Some(OrbitCount::Several { reasons, reverse_sweep: bidirectional_sweep::is_followed(system) })
+        };
         let separating = system.joints().iter().filter(|joint| !joint.law().is_incrementally_passive());
         let mut reasons: Vec<String> =
             separating.map(|joint| format!("`{}` of {}", joint.law().name(), joint.name())).collect();
@@ -91,14 +100,14 @@ impl OrbitCount {
             return match system.structure().is_sparse() {
                 true => None,
                 false if system.is_incrementally_stable() => Some(OrbitCount::One),
-                false => Some(OrbitCount::Several("the structure feeds energy into some motion".to_owned())),
+                false => several("the structure feeds energy into some motion".to_owned()),
             };
         }
         if let Some(more @ 1..) = reasons.len().checked_sub(max_named_joints) {
             reasons.truncate(max_named_joints);
             reasons.push(format!("{more} more"));
         }
-        Some(OrbitCount::Several(reasons.join(", ")))
+        several(reasons.join(", "))
     }
 }
 

@@ -211,10 +211,14 @@ impl fmt::Display for ModelSummary {
         }
         match &self.orbits {
             Some(OrbitCount::One) => line("orbits", "one at each frequency, except for the offsets of stuck contacts")?,
-            Some(OrbitCount::Several(why)) => {
+            Some(OrbitCount::Several { reasons, reverse_sweep }) => {
                 let what = "the table states the stability of each orbit if it is known; kind `branch` follows \
                     connected orbits if it supports the laws";
-                line("orbits", &format!("several may exist at one frequency ({why}): {what}"))?;
+                let lacks = match reverse_sweep {
+                    true => "",
+                    false => "; the model is too large for the reverse sweep of `response`, which finds other orbits",
+                };
+                line("orbits", &format!("several may exist at one frequency ({reasons}): {what}{lacks}"))?;
             }
             None => {}
         }
