@@ -159,7 +159,7 @@ fn every_study_runs() {
         assert!(few.failures.is_empty(), "{name}: {:?}", few.failures);
         assert!(few.record.points.keys().all(|status| status == "converged"), "{name}: {:?}", few.record.points);
         // Few points step over resonances, and a warning states the sufficient number.
-        let wrong = |note: &String| is_wrong(name, note) && !note.contains("points are enough");
+        let wrong = |note: &String| is_wrong(name, note) && !note.contains("points the steps are no wider");
         assert!(!few.notes.iter().any(wrong), "{name}: {:?}", few.notes);
         assert!(!few.figure.panels.is_empty(), "{name}");
         assert!(picture(&few).contains("<path"), "{name}");

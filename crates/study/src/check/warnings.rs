@@ -158,7 +158,7 @@ fn coarse_frequencies(cases: &[SurveyedCase]) -> Option<String> {
     let hertz = |omega: f64, digits: i32| format_significant(omega / TAU, digits);
     let step = (to - from) / (points - 1) as f64;
     let several = if enough <= MAX_POINTS as f64 {
-        format!("{enough} points are enough")
+        format!("with {enough} points the steps are no wider than it")
     } else {
         "use a narrower range".to_owned()
     };

@@ -213,3 +213,60 @@ time_step = "1 ms"
         assert!(errors.iter().all(|error| error.abs() < 5e-9), "{milliseconds} ms: {errors:?} m");
     }
 }
+
+/// A contact that slips in the first periods into a state in which it just reaches its limit. It
+/// then sticks and loses nothing.
+#[test]
+fn a_contact_that_has_slipped_into_stick_sticks() {
+    let found = dataset(
+        r#"[[mass]]
+name = "m"
+mass = "1.268 kg"
+directions = ["x", "y", "z"]
+[[spring]]
+between = ["m.x", "ground"]
+stiffness = "135.205 N/mm"
+damping = "1.19 %"
+[[spring]]
+between = ["m.y", "ground"]
+stiffness = "17.353 N/mm"
+damping = "3.28 %"
+[[spring]]
+between = ["m.z", "ground"]
+stiffness = "50.236 N/mm"
+damping = "2.14 %"
+[[place]]
+name = "foot"
+of = "m"
+normal = [0.173, 0.672, 1.0]
+[[joint]]
+name = "c"
+between = ["foot", "ground"]
+law = { kind = "friction-contact", tangential = "113.67 N/mm", normal = "137.17 N/mm", friction = 0.464, preload = "16.51 N" }
+[[force]]
+on = "m.x"
+amplitude = "1.074*F"
+phase = "95.9 deg"
+[[force]]
+on = "m.y"
+amplitude = "1.223*F"
+phase = "212.8 deg"
+[[force]]
+on = "m.x"
+amplitude = "0.897 N"
+harmonic = 0
+[parameters]
+F = "1 N"
+[study]
+kind = "orbit"
+frequency = "15.60 Hz"
+vary = { F = ["0.1 N", "0.4 N", "2 N"] }
+[method]
+kind = "harmonic-balance"
+"#,
+    );
+    let orbits = table(&found, "orbits");
+    let (slip, loss) = (orbits.numbers("c_slip_fraction").unwrap(), orbits.numbers("c_dissipation_J").unwrap());
+    assert_eq!(slip[..2], [0.0, 0.0], "{slip:?}");
+    assert!(loss[1].abs() < 1e-15 && slip[2] > 0.0 && loss[2] > 1e-9, "{slip:?} {loss:?}");
+}

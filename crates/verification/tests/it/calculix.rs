@@ -39,7 +39,7 @@ fn folder(more: &str) -> tempfile::TempDir {
         "schema = 1\n[structure]\nstiffness = \"blade.sti\"\nmass = \"blade.mas\"\ndofs = \"blade.dof\"\nunits = \"mm-t-s\"\n\
          rayleigh = {{ mass = \"5 /s\", stiffness = \"1e-7 s\" }}\n{more}\n\
          {}[[force]]\non = \"tip.z\"\namplitude = \"1 N\"\n\
-         [study]\nkind = \"response\"\nfrequency = {HERTZ:?}\n[method]\nkind = \"harmonic-balance\"\n",
+         [study]\nkind = \"response\"\nfrequency = {HERTZ:?}\npeaks = false\n[method]\nkind = \"harmonic-balance\"\n",
         PLACES.map(|(name, node)| format!("[[place]]\nname = \"{name}\"\nnodes = [\"{node}\"]\n")).concat()
     );
     std::fs::write(folder.path().join("blade.toml"), study).unwrap();

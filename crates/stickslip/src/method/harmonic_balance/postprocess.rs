@@ -264,7 +264,7 @@ fn sample_joints(
     for (j, joint) in system.joints().iter().enumerate() {
         let (axes, force, contact) = (joint.axes(), &mut force[j], &mut contact[j]);
         // without a port the joint carries no force and slips permanently
-        let mut has_slip_states = false;
+        let (mut has_slip_states, mut dissipates) = (false, true);
         for (p, port) in ports.iter().enumerate() {
             let Some(&PortMember { force_ratio: share, .. }) = port.member(j) else { continue };
             discretization.sample(ports, p, omega, motion);
@@ -281,6 +281,9 @@ fn sample_joints(
                 }
             }
             has_slip_states |= port.samples_slip();
+            if port.has_memory_steps() {
+                dissipates = aft.dissipates;
+            }
             match joint.law().rate() {
                 Some(rate) if port.is_force() => {
                     let mut z = vec![0.0; rate.states()];
@@ -310,6 +313,10 @@ fn sample_joints(
         for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
             let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
             *contact = joint.law().contact_state(&now[..axes.len()], &force[..axes.len()]);
+            // a joint that dissipates nothing only touches its limit, up to which it slipped before
+            if contact.slips() && !dissipates {
+                *contact = Contact::Stick;
+            }
         }
     }
     JointSamples { force, contact, states }

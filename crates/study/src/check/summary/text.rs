@@ -54,7 +54,7 @@ impl ModelSummary {
         // Largest number of listed frequency ranges with slip per joint.
         let max_slip_ranges = 3;
         match joint.normal_force {
-            Some(0.0) => return "open in static equilibrium: it closes and opens".to_owned(),
+            Some(0.0) => return "open in static equilibrium; the vibration may close it".to_owned(),
             Some(preload) => return normal_force_text(preload, joint.normal_force_at_rest),
             None => {}
         }
@@ -139,27 +139,28 @@ fn normal_force_text(preload: f64, at_rest: Option<f64>) -> String {
     let newtons = |force: f64| format_with_prefix(force, "N");
     match at_rest {
         None => {
-            format!("pressed with {} if the structure is rigid: it opens and closes", newtons(preload))
+            format!("pressed with {} if the structure is rigid; a larger dynamic force opens it", newtons(preload))
         }
         // Relative change of a preload by the structure below which it is ignored.
         Some(force) if (force - preload).abs() <= 1e-3 * preload => {
-            format!("pressed with {} in static equilibrium: it opens and closes", newtons(force))
+            format!("pressed with {} in static equilibrium; a larger dynamic force opens it", newtons(force))
         }
         Some(force) if force > preload => format!(
-            "pressed with {} in static equilibrium, by its preload of {} and {} of the constant forces: it opens and \
-             closes",
+            "pressed with {} in static equilibrium, by its preload of {} and {} of the constant forces; a larger \
+             dynamic force opens it",
             newtons(force),
             newtons(preload),
             newtons(force - preload)
         ),
         Some(force) if force > 0.0 => format!(
-            "pressed with {} in static equilibrium; the structure carries {} of its preload of {}: it opens and closes",
+            "pressed with {} in static equilibrium (the structure carries {} of its preload of {}); a larger dynamic \
+             force opens it",
             newtons(force),
             newtons(preload - force),
             newtons(preload)
         ),
         Some(_) => format!(
-            "open in static equilibrium, because the structure carries its preload of {}: it closes and opens",
+            "open in static equilibrium, because the structure carries its preload of {}; the vibration may close it",
             newtons(preload)
         ),
     }

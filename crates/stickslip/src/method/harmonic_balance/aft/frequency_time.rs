@@ -86,7 +86,7 @@ impl InitialState {
 }
 
 impl FrequencyTime {
-    /// Returns the states at t = 0 in the motion evaluated last; none if the law dissipates nothing.
+    /// Returns the states at t = 0 in the motion evaluated last; none without dissipation.
     pub fn dissipating_state(&self) -> &[f64] {
         if self.dissipates { &self.state } else { &[] }
     }

@@ -31,8 +31,8 @@ struct PeriodicStateSettings {
     periods: usize,
     /// Least fraction of a Newton step that is tried.
     least_fraction: f64,
-    /// Change over a period from which one Newton step may reach the solution. A period without
-    /// derivatives, a third of the cost of one with them, then tells.
+    /// Change over a period from which one Newton step may reach the solution. Two periods without
+    /// derivatives, which cost less than one with them, then tell.
     last_step: f64,
     /// Maximum number of initial periods without derivatives. A period with derivatives costs as
     /// much as three without.
@@ -235,11 +235,18 @@ impl FrequencyTime {
                     let step = pseudo_inverse(DMatrix::identity(m, m) - &product) * &change;
                     let states = std::mem::replace(&mut z, DVector::zeros(0));
                     z = &states + &step;
-                    if gap <= settings.last_step
-                        && (self.period(sequence, &z, None)? - &z).amax() <= self.periodicity_tolerance * scale
-                    {
-                        self.accept(sequence, &z);
-                        return Some(product);
+                    if gap <= settings.last_step {
+                        // the second period ends slip into stick that the step left in another
+                        // direction; joints that slip have better derivatives at the solution
+                        for attempt in 0..2 {
+                            let after = self.period(sequence, &z, None)?;
+                            let settled = (&after - &z).amax() <= self.periodicity_tolerance * scale;
+                            z = after;
+                            if settled && (attempt == 0 || !sequence.dissipates(&self.force)) {
+                                self.accept(sequence, &z);
+                                return Some(product);
+                            }
+                        }
                     }
                     Some(NewtonBase { states, change, gap, step })
                 }
