@@ -6,6 +6,7 @@
 //! higher frequency.
 
 use crate::syntax::expression::quantity_text;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use stickslip::curve::sweep::BLOCK;
@@ -13,7 +14,6 @@ use stickslip::dimension::Dimension;
 use stickslip::method::Method;
 use stickslip::model::{Model, System};
 use stickslip::orbit::Orbit;
-use stickslip_numerics::parallel::map;
 use stickslip_numerics::tie_break::first_largest;
 
 /// Points with slip on a reduced structure.
@@ -110,8 +110,8 @@ impl SlipReductionCheck {
         let all = std::mem::take(&mut self.candidates);
         let larger = larger_basis_system(model, system)?;
         let mut solved = 0;
-        let chosen = chosen(&all);
-        let again = map(&chosen, rayon::current_num_threads(), |&index| compare_point(&larger, method, &all[index]));
+        let chosen: Vec<usize> = chosen(&all).into_iter().collect();
+        let again: Vec<_> = chosen.par_iter().map(|&index| compare_point(&larger, method, &all[index])).collect();
         for (index, again) in chosen.into_iter().zip(again) {
             let Some(again) = again else { continue };
             solved += 1;
