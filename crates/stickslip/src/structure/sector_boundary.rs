@@ -299,7 +299,7 @@ impl CyclicSector {
             })
             .collect();
         let part = |matrix: &SparseMatrix| eliminated(matrix, &rows);
-        let symmetric = |matrix: &SparseMatrix| symmetrized(part(matrix), |shift| -shift);
+        let symmetric = |matrix: &SparseMatrix| symmetrized(part(matrix));
         let (mass, damping, stiffness) = (symmetric(mass), damping.map(part), symmetric(stiffness));
         CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness }
     }
@@ -518,12 +518,11 @@ fn summed(mut all: Vec<RingEntry>) -> Vec<RingEntry> {
     all
 }
 
-/// Returns the mean of a ring's matrix and its transpose, symmetric to the last bit. `back`
-/// returns the opposite sector offset.
-pub(super) fn symmetrized(entries: Vec<RingEntry>, back: impl Fn(i64) -> i64) -> Vec<RingEntry> {
+/// Returns the mean of a ring's matrix and its transpose, symmetric to the last bit.
+fn symmetrized(entries: Vec<RingEntry>) -> Vec<RingEntry> {
     let halves = entries.into_iter().flat_map(|(i, k, shift, value)| {
         let half = 0.5 * value;
-        [(i, k, shift, half), (k, i, back(shift), half)]
+        [(i, k, shift, half), (k, i, -shift, half)]
     });
     summed(halves.collect())
 }

@@ -233,8 +233,8 @@ impl FrequencyTime {
                 _ => {
                     fraction = 1.0;
                     let step = pseudo_inverse(DMatrix::identity(m, m) - &product) * &change;
-                    let states = std::mem::replace(&mut z, DVector::zeros(0));
-                    z = &states + &step;
+                    let next = &z + &step;
+                    let states = std::mem::replace(&mut z, next);
                     if gap <= settings.last_step {
                         // the second period ends slip into stick that the step left in another
                         // direction; joints that slip have better derivatives at the solution
