@@ -93,7 +93,8 @@ impl SparseMatrix {
         n: usize,
         triplets: impl IntoIterator<Item = (usize, usize, f64)>,
     ) -> Result<Self, MatrixError> {
-        let mut entries = Vec::new();
+        let triplets = triplets.into_iter();
+        let mut entries = Vec::with_capacity(triplets.size_hint().0);
         for (row, column, value) in triplets {
             if row >= n || column >= n {
                 return Err(MatrixError::OutOfRange { row, column, n });

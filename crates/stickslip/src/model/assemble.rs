@@ -9,7 +9,7 @@ use super::substructure::{Entries, RingEntries};
 use super::system::{Axis, MovedPlace, System, SystemBuilder};
 use super::{GROUND, Joint, Model, Ring};
 use crate::structure::reduction::Row;
-use crate::structure::{ModalDamping, RingEntry, RingSector, Structure, sector_entries};
+use crate::structure::{ModalDamping, RingSector, Structure, sector_entries};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use std::collections::{BTreeMap, BTreeSet};
@@ -231,9 +231,8 @@ impl Assembler<'_> {
         let structure = match found {
             [Some(mass), Some(damping), Some(stiffness)] => {
                 let more = [mass, damping, stiffness];
-                let all: [Vec<RingEntry>; 3] = std::array::from_fn(|k| [&ring.entries[k][..], &more[k]].concat());
-                let sector =
-                    RingSector::from_entries(names[..dofs].to_vec(), ring.sectors, all.each_ref().map(|of| &of[..]));
+                let all = std::array::from_fn(|k| ring.entries[k].iter().chain(&more[k]).copied());
+                let sector = RingSector::from_entries(names[..dofs].to_vec(), ring.sectors, all);
                 Structure::ring(names, sector)
             }
             // a ring that was edited after its creation

@@ -33,8 +33,9 @@ pub(super) struct SubstructureParts {
 /// The matrices of a ring of equal sectors.
 pub(super) struct RingEntries {
     pub sectors: usize,
-    /// Entries of mass, damping and stiffness in the rows of the first sector.
-    pub entries: [Vec<RingEntry>; 3],
+    /// Entries of mass, damping and stiffness in the rows of the first sector. Modal damping has
+    /// the most, because it couples all sectors.
+    pub entries: [Arc<Vec<RingEntry>>; 3],
 }
 
 impl RingEntries {
@@ -260,7 +261,7 @@ struct SectorParts {
     names: Vec<String>,
     /// One row for each observed displacement.
     places: Vec<RingRow>,
-    entries: [Vec<RingEntry>; 3],
+    entries: [Arc<Vec<RingEntry>>; 3],
     /// Stiffness entries of the blade for a relative deviation of one, if the blades differ.
     of_blade: Vec<(usize, usize, f64)>,
     reduced: Option<Arc<ReducedComponent>>,
@@ -285,7 +286,7 @@ impl SectorParts {
         Ok(SectorParts {
             names: sector.kept.iter().map(|&row| row_name(row, &rows[row])).collect(),
             places: seen.iter().map(|row| sector.row(row)).collect(),
-            entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
+            entries: [sector.mass.clone(), damping, sector.stiffness.clone()].map(Arc::new),
             of_blade: blade.map_or_else(Vec::new, |blade| blade.entries().to_vec()),
             reduced: None,
         })
@@ -306,15 +307,15 @@ impl SectorParts {
             return Err(reduction_error(ReductionError::NoPorts));
         };
         let damping = match damping_law(substructure, &component) {
-            Some(law) => Arc::unwrap_or_clone(sector.damped(&law, sectors).map_err(reduction_error)?),
-            None => sector.damping.clone().unwrap_or_default(),
+            Some(law) => sector.damped(&law, sectors).map_err(reduction_error)?,
+            None => Arc::new(sector.damping.clone().unwrap_or_default()),
         };
         let mut places = vec![RingRow::new(); seen.len()];
         sector.ports.iter().for_each(|&(port, at, shift, weight)| places[port].push((at, shift, weight)));
         Ok(SectorParts {
             names: (1..=sector.dofs()).map(|number| format!("coordinate {number}")).collect(),
             places,
-            entries: [sector.mass.clone(), damping, sector.stiffness.clone()],
+            entries: [Arc::new(sector.mass.clone()), damping, Arc::new(sector.stiffness.clone())],
             of_blade: Vec::new(),
             reduced: Some(component),
         })

@@ -63,6 +63,13 @@ pub(crate) fn unit_root(k: i64, n: usize) -> Complex64 {
     }
 }
 
+/// Returns the function from the offset of a sector to its phase factor `e^{jdθs}` in a wave with
+/// one nodal diameter.
+fn phases(diameter: usize, sectors: usize) -> impl Fn(i64) -> Complex64 {
+    let all: Vec<Complex64> = (0..sectors).map(|offset| unit_root((diameter * offset) as i64, sectors)).collect();
+    move |offset| all[offset.rem_euclid(sectors as i64) as usize]
+}
+
 /// Returns whether the matrices of a wave are real: adjacent sectors move in phase or in
 /// antiphase.
 pub(crate) fn is_real(diameter: usize, sectors: usize) -> bool {
@@ -109,10 +116,10 @@ pub(super) fn wave_entries(
     diameter: usize,
     sectors: usize,
 ) -> Vec<(usize, usize, f64)> {
-    let real = is_real(diameter, sectors);
+    let (real, phase) = (is_real(diameter, sectors), phases(diameter, sectors));
     let mut triplets = Vec::new();
     for (row, column, shift, value) in entries {
-        let phase = unit_root(diameter as i64 * shift, sectors);
+        let phase = phase(shift);
         triplets.push((row, column, value * phase.re));
         if !real {
             triplets.push((rows + row, columns + column, value * phase.re));
@@ -133,8 +140,10 @@ pub(super) fn symmetric_wave_entries(
     diameter: usize,
     sectors: usize,
 ) -> Vec<(usize, usize, f64)> {
-    let real = is_real(diameter, sectors);
-    let mut triplets = Vec::with_capacity(if real { entries.len() } else { 2 * entries.len() });
+    let (real, phase) = (is_real(diameter, sectors), phases(diameter, sectors));
+    // an entry between two sectors has a real and an imaginary part
+    let coupled = entries.iter().filter(|entry| entry.2 != 0).count();
+    let mut triplets = Vec::with_capacity(if real { entries.len() } else { 2 * (entries.len() + coupled) });
     for copy in 0..if real { 1 } else { 2 } {
         for group in entries.chunk_by(|a, b| a.0 == b.0) {
             let column = copy * n + group[0].0;
@@ -145,9 +154,8 @@ pub(super) fn symmetric_wave_entries(
                     (0, _) => phase.im,
                     _ => -phase.im,
                 };
-                let all = group.iter().map(|&(_, row, shift, value)| {
-                    (half * n + row, column, value * part(unit_root(diameter as i64 * shift, sectors)))
-                });
+                let all =
+                    group.iter().map(|&(_, row, shift, value)| (half * n + row, column, value * part(phase(shift))));
                 triplets.extend(all.filter(|entry| entry.2 != 0.0));
             }
         }
@@ -196,10 +204,14 @@ impl RingSector {
 
     /// Creates the first of `sectors` equal sectors from its places and the entries of mass,
     /// damping and stiffness. Entries of the same row and column are summed.
-    pub(crate) fn from_entries(places: Vec<String>, sectors: usize, kinds: [&[RingEntry]; 3]) -> Self {
-        let mut entries = Vec::with_capacity(kinds.iter().map(|of| of.len()).sum());
+    pub(crate) fn from_entries(
+        places: Vec<String>,
+        sectors: usize,
+        kinds: [impl Iterator<Item = RingEntry>; 3],
+    ) -> Self {
+        let mut entries = Vec::with_capacity(kinds.iter().map(|of| of.size_hint().0).sum());
         for (kind, of) in kinds.into_iter().enumerate() {
-            entries.extend(of.iter().map(|&(row, column, shift, value)| {
+            entries.extend(of.map(|(row, column, shift, value)| {
                 let values: [f64; 3] = std::array::from_fn(|k| if k == kind { value } else { 0.0 });
                 (row, column, shift.rem_euclid(sectors as i64) as usize, values)
             }));
@@ -213,6 +225,7 @@ impl RingSector {
             }
             same
         });
+        entries.shrink_to_fit();
         RingSector { sectors, places, entries, waves: Mutex::default() }
     }
 
@@ -336,13 +349,12 @@ impl RingSector {
     /// Returns the mass (0), damping (1) or stiffness matrix (2) of a wave in real form.
     fn wave_matrix(&self, kind: usize, diameter: usize) -> Result<SparseMatrix, StructureError> {
         let (n, real) = (self.dofs(), is_real(diameter, self.sectors));
-        let phases: Vec<Complex64> =
-            (0..self.sectors).map(|shift| unit_root((diameter * shift) as i64, self.sectors)).collect();
+        let phase = phases(diameter, self.sectors);
         // damping by modes couples all sectors: the entries of one row and column are summed
         let mut triplets = Vec::new();
         for group in self.entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (row, column, ..) = group[0];
-            let sum: Complex64 = group.iter().map(|entry| phases[entry.2] * entry.3[kind]).sum();
+            let sum: Complex64 = group.iter().map(|entry| phase(entry.2 as i64) * entry.3[kind]).sum();
             triplets.push((row, column, sum.re));
             if !real {
                 triplets.extend([(n + row, n + column, sum.re), (row, n + column, -sum.im), (n + row, column, sum.im)]);
@@ -515,7 +527,8 @@ mod tests {
                 first.entries.iter().map(|entry| (entry.0, entry.1, entry.2 as i64, entry.3[kind])).collect()
             };
             let [mass, damping, stiffness] = [0, 1, 2].map(of);
-            let sector = RingSector::from_entries(first.places.clone(), sectors, [&mass, &damping, &stiffness]);
+            let kinds = [mass, damping, stiffness].map(Vec::into_iter);
+            let sector = RingSector::from_entries(first.places.clone(), sectors, kinds);
             let stored = Structure::ring(whole.places().to_vec(), sector).unwrap();
             assert_eq!((&stored, stored.is_sparse()), (stored.expanded(), whole.is_sparse()));
             assert_eq!(stored.has_definite_mass(), whole.has_definite_mass());
@@ -541,7 +554,8 @@ mod tests {
             assert_ne!(stored, ring(sectors, 1e-6));
             assert_ne!(ring(sectors, 1e-6), stored);
         }
-        let sector = RingSector::from_entries(vec!["a".into()], 3, [&[(0, 0, 0, 1.0), (0, 0, 1, -1.0)], &[], &[]]);
+        let kinds = [vec![(0, 0, 0, 1.0), (0, 0, 1, -1.0)], vec![], vec![]].map(Vec::into_iter);
+        let sector = RingSector::from_entries(vec!["a".into()], 3, kinds);
         let names = vec!["0".to_owned(), "1".into(), "2".into()];
         assert_eq!(Structure::ring(names, sector).unwrap_err(), StructureError::NegativeMass);
     }
