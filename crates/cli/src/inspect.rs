@@ -347,8 +347,8 @@ impl fmt::Display for Pair {
                 let hertz = |unit: f64| {
                     lowest.iter().map(|omega| format!("{:.6e}", omega / TAU * unit)).collect::<Vec<_>>().join(", ")
                 };
-                writeln!(f, "  lowest frequencies, Hz: {} (times in seconds)", hertz(1.0))?;
-                writeln!(f, "                          {} (times in milliseconds)", hertz(1e3))?;
+                writeln!(f, "  lowest frequencies, Hz: {} (if the unit of time is s)", hertz(1.0))?;
+                writeln!(f, "                          {} (if it is ms)", hertz(1e3))?;
                 if lowest.len() < LOWEST {
                     writeln!(f, "                          the structure has no further frequencies")?;
                 }
@@ -357,7 +357,7 @@ impl fmt::Display for Pair {
         }
         if let Some(turning) = &self.turning {
             let hertz: Vec<String> = turning.iter().map(|omega| format!("{:.6e}", omega / TAU)).collect();
-            writeln!(f, "  with the gyroscopic part of the damping: {} (times in seconds)", hertz.join(", "))?;
+            writeln!(f, "  with the gyroscopic part of the damping: {} (if the unit of time is s)", hertz.join(", "))?;
         }
         let Some(&(_, first)) = self.mass.first() else {
             return writeln!(

@@ -483,10 +483,12 @@ fn complain(dataset: &Dataset) {
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
         if let Some(points) = dataset.record.points.get(status) {
-            complain!(
-                "{}: {points} {status}: less accurate than requested; the notes in record.json state the error",
-                dataset.name
-            );
+            let plural = if *points == 1 { "" } else { "s" };
+            let error = match status == Accuracy::Unchecked.status() {
+                true => "the error was not estimated",
+                false => "the estimated error exceeds the tolerance",
+            };
+            complain!("{}: {points} point{plural} {status}: {error}, see the notes in record.json", dataset.name);
         }
     }
     if failures.len() > named_failures {

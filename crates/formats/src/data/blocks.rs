@@ -55,7 +55,10 @@ impl Blocks {
         let columns = columns.collect();
         let notes = match self.replaced {
             0 => Vec::new(),
-            count => vec![format!("{count} earlier results of the same quantities are left out; the last ones count")],
+            count => {
+                let plural = if count == 1 { "" } else { "s" };
+                vec![format!("only the last result of each quantity is used; {count} earlier result{plural} left out")]
+            }
         };
         Ok(DataFile { columns, notes, ..DataFile::default() })
     }

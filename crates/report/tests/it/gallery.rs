@@ -102,7 +102,7 @@ fn words(name: &str, text: &str) -> (String, String) {
 fn page() -> String {
     let mut page =
         "<!-- Generated from studies/gallery/ by crates/report/tests/it/gallery.rs; do not edit. -->\n\n# Gallery\n\n\
-         I want to start from a similar problem. All studies of this page run in ten seconds:\n\n\
+         I want to start from a similar problem. Together, all studies here run in ten seconds:\n\n\
          ```sh\nstickslip run studies/gallery/*.toml --out gallery\n```\n\n\
          Copy the closest one from `studies/gallery/`, change the numbers, and run it.\n"
             .to_owned();

@@ -34,7 +34,7 @@ use stickslip_numerics::dual::Real;
 /// Entry of this law in [`super::TABLE`].
 pub(super) static INFO: LawInfo = LawInfo {
     name: "iwan",
-    summary: "parallel spring-sliders with the four-parameter distribution of Segalman, exact",
+    summary: "parallel spring-sliders with the continuous four-parameter distribution of Segalman",
     parameters: &[
         Parameter::positive("stiffness", Dimension::STIFFNESS, "initial stiffness, KT"),
         Parameter::limit("slip limit, FS"),
@@ -48,13 +48,13 @@ pub(super) static INFO: LawInfo = LawInfo {
             "beta",
             Dimension::NONE,
             Range::ZeroOrMore,
-            "ratio of the stiffness that slips last to that of the distribution",
+            "stiffness of the sliders that slip together at the slip limit, divided by that of all others",
         ),
         Parameter::new(
             "elements",
             Dimension::NONE,
             Range::UpTo(1000),
-            "number of sliders that approximate the distribution, needed for `event-driven`; 0: exact distribution",
+            "number of sliders that approximate the distribution, needed for `event-driven`; 0: continuous distribution",
         )
         .with_default(0.0),
     ],

@@ -29,8 +29,17 @@ pub(super) static INFO: LawInfo = LawInfo {
             Range::ZeroOrMore,
             "stiffness in slip, Et; below `stiffness`",
         ),
-        Parameter::positive("lambda", Dimension::INVERSE_LENGTH, "rate of the transition from stick to slip"),
-        Parameter::new("kappa", Dimension::NONE, Range::Within(0.0, 1.0), "sharpness of the knee, below 1"),
+        Parameter::positive(
+            "lambda",
+            Dimension::INVERSE_LENGTH,
+            "reciprocal of the displacement over which stick turns into slip",
+        ),
+        Parameter::new(
+            "kappa",
+            Dimension::NONE,
+            Range::Within(0.0, 1.0),
+            "sharpness of the transition to slip, below 1; near 1 there is no micro-slip",
+        ),
     ],
     sample: &[10_000.0, 1000.0, 5000.0, 0.6],
     build: |values| {

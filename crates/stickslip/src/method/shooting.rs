@@ -112,13 +112,13 @@ impl Default for ShootingSettings {
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "smooth laws and laws with steps: Newton's method on the return map of an implicit integration, with exact sensitivities",
+    summary: "smooth laws, and laws defined from one state to the next: Newton's method on the return map of an implicit integration, with exact sensitivities",
     options: &[
         MethodOption {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "relative error per step of the integration; orbits in equal steps have 1000 times this error; default 1e-8",
+            doc: "relative error per time step; orbits of laws that need equal time steps have 1000 times this error; default 1e-8",
         },
         MethodOption {
             key: WIDTH,

@@ -1,10 +1,15 @@
 //! Errors: why no orbit was found.
 
+use std::f64::consts::TAU;
+
 /// Why time integration of a motion failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IntegrationError {
     /// Too many transitions.
-    #[error("joint `{joint}` chatters: {switches} transitions before t = {time:.6e} s")]
+    #[error(
+        "joint `{joint}` chatters: {switches} transitions before t = {time:.6e} s; give it a stiffness (law `jenkins`), add \
+         damping, or use `harmonic-balance`"
+    )]
     Chatter {
         /// Time of the failure, s.
         time: f64,
@@ -28,14 +33,18 @@ pub enum IntegrationError {
         joint: String,
     },
     /// The contact problem has no solution.
-    #[error("no combination of stick and slip satisfies the contact conditions at t = {time:.6e} s")]
+    #[error(
+        "no combination of stick and slip satisfies the contact conditions at t = {time:.6e} s; give rigid joints a \
+         stiffness (law `jenkins`), or use `harmonic-balance`"
+    )]
     NoContactState {
         /// Time of the failure, s.
         time: f64,
     },
     /// The linear motion of a contact pattern has no complete set of modes.
     #[error(
-        "two modes coincide at {lambda:.6e} rad/s (critical damping), at t = {time:.6e} s; change the coefficient of one damper slightly"
+        "with the contact states at t = {time:.6e} s, a mode with {lambda:.6e} rad/s has exactly critical damping, which the \
+         closed-form solution cannot represent; change the coefficient of one damper slightly"
     )]
     Defective {
         /// Time of the failure, s.
@@ -46,14 +55,17 @@ pub enum IntegrationError {
     /// The signals oscillate too fast relative to the period.
     #[error(
         "the search for the next transition reached its maximum number of steps at t = {time:.6e} s, because \
-         some modes are far faster than the excitation"
+         some modes are far faster than the excitation; lower their stiffnesses, or use `harmonic-balance`"
     )]
     TooFast {
         /// Time of the failure, s.
         time: f64,
     },
     /// The step size of a time integration became too small.
-    #[error("the step size of the time integration became too small at t = {time:.6e} s (step {step:.1e} s)")]
+    #[error(
+        "the step size of the time integration became too small at t = {time:.6e} s (step {step:.1e} s); make steep laws \
+         less steep, or use `harmonic-balance`"
+    )]
     Stalled {
         /// Time of the failure, s.
         time: f64,
@@ -110,6 +122,15 @@ pub enum IntegrationError {
     },
 }
 
+/// Writes a frequency (rad/s) in Hz, with seven digits.
+fn hertz(omega: f64) -> String {
+    let value = omega / TAU;
+    let decimals = (6 - value.abs().log10().floor().clamp(-6.0, 6.0) as i32).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text} Hz")
+}
+
 /// Formats an estimate with two digits, or with four if two do not distinguish it from the
 /// tolerance.
 fn distinct_digits(estimate: f64, tolerance: f64) -> String {
@@ -124,7 +145,7 @@ fn truncation_advice(needed: Option<usize>) -> String {
         || format!("; {raise}"),
         |needed| {
             format!(
-                ": rigid friction may need {needed} or more, which exceeds the work or memory limit of a point; \
+                ": rigid friction may need {needed} harmonics or more, which exceeds the work or memory limit of a point; \
                  {raise}, or give friction a stiffness (law `jenkins`, in a plane `jenkins-2d`)"
             )
         },
@@ -132,7 +153,7 @@ fn truncation_advice(needed: Option<usize>) -> String {
 }
 
 fn time_suffix(time: f64) -> String {
-    if time.is_finite() { format!(" by t = {time:.6e} s") } else { String::new() }
+    if time.is_finite() { format!(" (detected at t = {time:.6e} s)") } else { String::new() }
 }
 
 impl IntegrationError {
@@ -170,9 +191,9 @@ impl IntegrationError {
 pub enum OrbitError {
     /// The iteration did not converge.
     #[error(
-        "{method} stopped at Ω = {omega:.4} rad/s after {iterations} iterations, residual {residual:.1e}{}; use a \
-         neighbouring orbit as initial guess, or check that a periodic motion exists (an undamped resonance has \
-         none){advice}",
+        "{method} stopped at {} after {iterations} iterations, residual {residual:.1e}{}; use finer steps of the \
+         frequency, or check that a periodic motion exists (an undamped resonance has none){advice}",
+        hertz(*omega),
         if *work_limit_reached { ", at the work limit of a point" } else { "" }
     )]
     NotConverged {
@@ -192,8 +213,9 @@ pub enum OrbitError {
     },
     /// The motion does not settle.
     #[error(
-        "{method} at Ω = {omega:.4} rad/s: the motion has not settled after {returns} returns; it still changes by {change:.1e} per return{}",
-        settling_advice(*.repeats, *.needed, .advice)
+        "{method} at {}: the motion has not settled after {returns} returns, each of `period` cycles; it still changes by a \
+         fraction of {change:.1e} per return{}",
+        hertz(*omega), settling_advice(*.repeats, *.needed, .advice)
     )]
     Unsettled {
         /// Name of the method.
@@ -215,7 +237,7 @@ pub enum OrbitError {
         advice: String,
     },
     /// The time integration of the motion failed.
-    #[error("{method} failed at Ω = {omega:.4} rad/s: {cause}")]
+    #[error("{method} failed at {}: {cause}", hertz(*omega))]
     Breakdown {
         /// Name of the method.
         method: &'static str,
@@ -225,7 +247,11 @@ pub enum OrbitError {
         cause: IntegrationError,
     },
     /// The evidence contradicts the orbit.
-    #[error("{method} rejected its orbit at Ω = {omega:.4} rad/s: the energy balance has a gap of {energy_gap:.1e}")]
+    #[error(
+        "{method} rejected its orbit at {}: the energies supplied and dissipated in one period differ by a fraction of \
+         {energy_gap:.1e}; use more `samples`, a smaller `tolerance`, or another method",
+        hertz(*omega)
+    )]
     Evidence {
         /// Name of the method.
         method: &'static str,
@@ -236,8 +262,8 @@ pub enum OrbitError {
     },
     /// The longest series that the method may use does not reach the tolerance.
     #[error(
-        "{method} at Ω = {omega:.4} rad/s: the estimated error with {harmonics} harmonics is {}, above the tolerance {tolerance:.1e}{}{advice}",
-        distinct_digits(*.estimate, *.tolerance), truncation_advice(*.needed)
+        "{method} at {}: the estimated error with {harmonics} harmonics is {}, above the tolerance {tolerance:.1e}{}{advice}",
+        hertz(*omega), distinct_digits(*.estimate, *.tolerance), truncation_advice(*.needed)
     )]
     Truncation {
         /// Name of the method.
@@ -261,9 +287,9 @@ pub enum OrbitError {
     },
     /// No stiffness, or friction alone, carries the mean of the forces.
     #[error(
-        "{method} found no periodic motion at Ω = {omega:.4} rad/s, because a body drifts: friction or contacts \
-         alone hold part of the structure, and the mean force exceeds what they carry; increase the normal loads, or \
-         add a spring{}",
+        "{method} found no periodic motion at {}, because a body drifts: friction or contacts alone hold part of the \
+         structure, and the mean force exceeds what they carry; increase the normal loads, or add a spring{}",
+        hertz(*omega),
         if .advice.is_empty() { String::new() } else { format!("{advice}, which may find a motion that friction holds") }
     )]
     Drift {
@@ -277,7 +303,7 @@ pub enum OrbitError {
     },
     /// No orbit was found. A motion that was integrated from static equilibrium shows the actual
     /// behaviour.
-    #[error("{method} found no orbit at Ω = {omega:.4} rad/s; a time integration from static equilibrium {observed}")]
+    #[error("{method} found no orbit at {}; a time integration from static equilibrium {observed}", hertz(*omega))]
     NoOrbit {
         /// Name of the method.
         method: &'static str,
@@ -290,7 +316,8 @@ pub enum OrbitError {
     },
     /// The motion of the structure without its joints is unbounded.
     #[error(
-        "{method} at Ω = {omega:.4} rad/s: without its joints, the structure {}: {}",
+        "{method} at {}: without its joints, the structure {}: {}",
+        hertz(*omega),
         if *resonance == 0.0 { "has a rigid-body mode" } else { "has an undamped resonance" },
         resonance_advice(*resonance)
     )]
@@ -303,7 +330,7 @@ pub enum OrbitError {
         resonance: f64,
     },
     /// The path that a method returned is not a periodic motion.
-    #[error("the motion that {method} returned at Ω = {omega:.4} rad/s is not an orbit: it {problem}")]
+    #[error("the motion that {method} returned at {} is not an orbit: it {problem}", hertz(*omega))]
     NotAnOrbit {
         /// Name of the method.
         method: &'static str,
@@ -368,7 +395,7 @@ impl std::fmt::Display for ObservedMotion {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let apart = |joint: &str, open_fraction: f64| {
             if open_fraction > 0.0 {
-                format!(" (`{joint}` is separated for {:.0} % of the last)", 100.0 * open_fraction)
+                format!(" (`{joint}` is separated for {:.0} % of the last period)", 100.0 * open_fraction)
             } else {
                 String::new()
             }
@@ -397,7 +424,7 @@ impl std::fmt::Display for ObservedMotion {
                 if *open_fraction >= 1.0 {
                     return write!(
                         f,
-                        ", and `{joint}` is separated for all of the last: if a force or a preload should close it, \
+                        ", and `{joint}` is separated throughout the last period: if a force or a preload should close it, \
                          exchange the two places of its `between`, or reverse the force; otherwise increase the \
                          normal loads, or hold the body by a weak spring along this direction"
                     );
@@ -450,7 +477,7 @@ fn resonance_advice(resonance: f64) -> String {
         return "some bodies have no support; add a spring, or a constant force or preload that closes their contacts"
             .to_owned();
     }
-    format!("its motion is unbounded at {resonance:.4} rad/s; add damping, or choose another frequency")
+    format!("its motion is unbounded at {}; add damping, or choose another frequency", hertz(resonance))
 }
 
 impl OrbitError {

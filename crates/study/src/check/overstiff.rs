@@ -56,8 +56,8 @@ fn attached_masses(model: &Model) -> impl Iterator<Item = AttachedMass<'_>> {
 pub(crate) fn overstiff_element(model: &Model, omega: f64) -> Option<ModelError> {
     let AttachedMass { mass, stiffness, element: by } = attached_masses(model).find(|held| omega < held.slowest())?;
     let message = format!(
-        "a stiffness of {} is too high for a mass of {}: `{}` cannot move at {}, because its inertia is lost in \
-         rounding; replace this place by `ground`, merge the two masses, or use the law `coulomb` for rigid friction",
+        "a stiffness of {} is too high for a mass of {}: `{}` cannot move at {}, because its inertia is smaller than \
+         the rounding of the spring force; replace this place by `ground`, merge the two masses, or use the law `coulomb` for rigid friction",
         quantity_text(stiffness, Some(Dimension::STIFFNESS)),
         quantity_text(mass.mass, Some(Dimension::MASS)),
         mass.name,
@@ -76,8 +76,8 @@ pub(crate) fn too_soft(model: &Model, omega: f64) -> Option<ModelError> {
     let lost = |held: &AttachedMass<'_>| f64::EPSILON * omega > 1e-6 * (held.stiffness / held.mass.mass).sqrt();
     let AttachedMass { mass, stiffness, element: by } = attached_masses(model).find(lost)?;
     let message = format!(
-        "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because it is lost in \
-         rounding; remove it, or correct the mass",
+        "a stiffness of {} is too low for a mass of {}: it has no effect on `{}` at {}, because its force is \
+         smaller than the rounding of the inertia; remove it, or correct the mass",
         quantity_text(stiffness, Some(Dimension::STIFFNESS)),
         quantity_text(mass.mass, Some(Dimension::MASS)),
         mass.name,
@@ -113,7 +113,7 @@ pub(crate) fn too_slow(model: &Model, omega: f64) -> Option<KeyError> {
     // quasi-static there.
     let enough = TAU * 10f64.powf((100f64.sqrt() * slowest / TAU).log10().ceil());
     let message = format!(
-        "at {} inertia has no effect, because it is lost in rounding; the lowest natural frequency of a single mass is \
+        "at {} inertia has no effect, because it is smaller than the rounding of spring forces; the lowest natural frequency of a single mass is \
          {}, that of `{name}`",
         shown(omega),
         shown(own)

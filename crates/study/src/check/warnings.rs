@@ -54,7 +54,7 @@ fn no_excitation(cases: &[SurveyedCase], initial_states: InitialStates) -> Optio
         return None;
     }
     Some(if cases.iter().any(constant) {
-        "all forces and motions are constant in time, so nothing vibrates".to_owned()
+        "all forces and motions are constant in time, so nothing vibrates; give one of them `harmonic = 1`".to_owned()
     } else {
         "all forces and motions are zero, so nothing vibrates; add a [[force]] or a [[motion]]".to_owned()
     })

@@ -117,11 +117,11 @@ impl TemplateSource {
         }
         let names: Vec<String> = if own.is_empty() { all } else { own }.into_iter().collect();
         let owner = match &names[..] {
-            [] => "these parameters make".to_owned(),
-            [one] => format!("the value of {one} makes"),
-            several => format!("the values of {} make", several.join(", ")),
+            [] => "with these parameters,".to_owned(),
+            [one] => format!("with this value of {one},"),
+            several => format!("with these values of {},", several.join(", ")),
         };
-        format!("{owner} {element} of the template invalid: `{key}` {message}")
+        format!("{owner} {element} of the template is invalid: `{key}` {message}")
     }
 }
 
@@ -301,8 +301,8 @@ pub(crate) fn model_problem(structure: &SourceModel, error: &ModelError, model: 
         None if error.element == Element::Whole => Some("add a [[mass]], a [[body]] or a [[motion]]".to_owned()),
         None if error.key == "reduce" => reduction_advice(model),
         None if softened => Some(
-            "lower `speed`: at this speed the sum of both exports loses more stiffness than rotation adds; or check \
-             `at` and the sign of the second export"
+            "lower `speed`: the stiffness at this speed, extrapolated from both files, is not positive definite; or check \
+             that the second file has the prestressed stiffness at the speed `at`"
                 .to_owned(),
         ),
         None if error.key == "name" => Some("choose another name".to_owned()),

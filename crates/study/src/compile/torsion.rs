@@ -98,7 +98,8 @@ pub(crate) fn use_moments_of_inertia(
         return problem(&lists.mass[other], "mass", message);
     }
     if let Some(mass) = lists.mass.iter().find(|mass| mass.entry("directions").is_some()) {
-        let message = format!("`{}` is a moment of inertia, which turns about one axis", name(mass));
+        let message =
+            format!("`{}` is a moment of inertia (kg m^2) about one axis, which has no `directions`", name(mass));
         return problem(mass, "directions", message);
     }
     if let Some(body) = lists.body.first() {

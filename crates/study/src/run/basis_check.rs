@@ -128,7 +128,7 @@ impl SlipReductionCheck {
         let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
         let SlipReductionCheck { points, up_to, again, .. } = self;
         let slips = format!(
-            "at {points} point{} joints slip: `reduction_error` holds for forces up to {}, not for the higher \
+            "joints slip at {points} point{}: `reduction_error` holds for forces up to {}, not for the higher \
              harmonics of friction",
             if *points == 1 { "" } else { "s" },
             hertz(*up_to)
@@ -136,19 +136,15 @@ impl SlipReductionCheck {
         let twice = hertz(2.0 * up_to);
         match again {
             None => format!(
-                "A{}. Amplitudes may have an error of several percent if a harmonic excites a lightly damped mode, \
+                "J{}. Amplitudes may have an error of several percent if a harmonic excites a lightly damped mode, \
                  if a joint is rigid or stiff, or if a joint is at the place of the excitation. Compare with \
                  reduce = {{ up_to = \"{twice}\" }} or with reduce = false.",
                 &slips[1..]
             ),
             Some(BasisDifference { error, place, point_text: at, solved_points: of, coordinates, up_to }) => {
-                let some = if *of == 1 {
-                    "the largest was".to_owned()
-                } else {
-                    format!("{of} points of one part of the study were")
-                };
+                let some = if *of == 1 { "one of them was".to_owned() } else { format!("{of} of them were") };
                 let solved = format!(
-                    "{some} solved again in {coordinates} coordinates with all modes up to {}: the amplitude of \
+                    "{some} solved again with {coordinates} coordinates and all modes up to {}: the amplitude of \
                      `{place}` differs by up to {error:.1e} of the largest amplitude ({at}); other points may differ \
                      more",
                     hertz(*up_to)
@@ -160,7 +156,7 @@ impl SlipReductionCheck {
                         "{warning}{slips}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
                         hertz(*up_to)
                     ),
-                    false => format!("A{}; {solved}.", &slips[1..]),
+                    false => format!("J{}; {solved}.", &slips[1..]),
                 }
             }
         }

@@ -57,8 +57,8 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     },
     OutputColumns {
         name: "contact",
-        doc: "shares of the period in which the faces of every joint stick and are apart, in addition to the slip \
-            share",
+        doc: "share of the period in which every joint sticks, and share in which its faces are apart, in addition to the \
+            slip share",
         columns: |_, system| {
             let joints = system.joints().iter();
             joints

@@ -228,7 +228,7 @@ impl CheckedStudy {
     ) -> Result<(), E> {
         let all = self.units();
         if range.start > range.end || range.end > all {
-            let message = format!("there are no units {} to {}; the study has {all} units", range.start, range.end);
+            let message = format!("there are no units of work {} to {}; the study has {all}", range.start, range.end);
             return Err(self.study.error_at("study", 0, "kind", message, None).into());
         }
         let first = match &self.first {

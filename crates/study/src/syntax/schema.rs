@@ -234,9 +234,9 @@ pub const STRUCTURE: &[Key] = &[
     optional(
         "reduce",
         ValueType::TableOrFalse(REDUCE),
-        "reduction of the structure. Absent: the range is five times the highest excitation frequency, and up to \
-         fifteen times with joints if it contains at most 60 modes; a structure of up to 100 rows with joints of \
-         exact laws is not reduced. false: no reduction",
+        "reduction of the structure. Absent: with all modes up to five times the highest excitation frequency; with \
+         joints up to fifteen times, if these are at most 60 modes; a structure of up to 100 rows is not reduced if \
+         `event-driven` accepts the laws of its joints. false: no reduction",
         "{ up_to = \"5 kHz\" }",
     ),
     optional(
@@ -317,8 +317,8 @@ const REDUCE: &[Key] = &[
     optional(
         "orders",
         ValueType::Count(1, 3),
-        "orders of residual vectors in addition to `modes`; each order makes two terms of the residual series exact; \
-         absent: 1, the residual flexibility",
+        "orders of residual vectors in addition to `modes`: 1 is the static flexibility of the omitted modes, each \
+         further order adds two terms of its series in the squared frequency; absent: 1",
         "2",
     ),
     default(

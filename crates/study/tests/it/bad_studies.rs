@@ -532,7 +532,7 @@ fn template_errors_name_user_parameters() {
     assert_eq!(found.file_name(), "--set a1", "{found}");
     // an element of the template: the message names the parameter of its key
     let found = error(study("m = \"-5 g\"\nmu = 0.2\nspeed = \"5000 rpm\"", ""));
-    assert!(found.message().starts_with("the value of `m` makes"), "{found}");
+    assert!(found.message().starts_with("with this value of `m`, body 1 of the template is invalid"), "{found}");
 }
 
 /// An expression of the wrong dimension with one parameter without a unit: the error is at the

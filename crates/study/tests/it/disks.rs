@@ -649,7 +649,9 @@ fn drawn_mode_shapes() {
     let hertz = ((1e5 + 3.0 * 3e4) / 0.2f64).sqrt() / TAU;
     assert_eq!(stuck, [format!("mode 1, 2 nodal diameters, {hertz:.2} Hz, joints stuck")]);
     assert_eq!(titles("mode = 1").len(), 4);
-    for (keys, words) in [("nodal_diameter = 4", "has no 4 nodal diameters"), ("mode = 3", "not among the 2 lowest")] {
+    for (keys, words) in
+        [("nodal_diameter = 4", "has no modes with 4 nodal diameters"), ("mode = 3", "not among the 2 lowest")]
+    {
         let error = read("", "", &format!("[study]\nkind = \"nodal-diameter\"\nmodes = 2\n{keys}\n")).unwrap_err();
         assert!(error.message().contains(words), "{keys}: {}", error.message());
     }

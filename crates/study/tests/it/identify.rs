@@ -342,7 +342,7 @@ fn rows_without_one_to_spare_have_the_errors_of_their_weight() {
     // d|X|/|X| = -dk (k - 2 ω²)/|k - 2 ω² + 0.1 i ω|², 2 % of |X|
     let error = 0.02 * 4e8 / (truth - 2.0 * omega * omega);
     assert!((found.error / error - 1.0).abs() < 1e-4, "{} {error}", found.error);
-    let warned = |text: &String| text.contains("1 measured numbers for 1 parameters: nothing tests the model");
+    let warned = |text: &String| text.contains("1 measured number for 1 parameter: no row is left to test the model");
     assert!(dataset.notes.iter().any(warned), "{:?}", dataset.notes);
 }
 

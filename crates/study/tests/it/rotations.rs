@@ -108,7 +108,7 @@ fn mixed_units_are_refused() {
         ("limit = \"3 N m\"", "limit = \"3 N\"", "expected energy or moment"),
         ("stiffness = \"2000 N m/rad\"", "stiffness = \"2000 N/m\"", "expected angular stiffness"),
         ("amplitude = \"10 N m\"", "amplitude = \"10 N\"", "expected energy or moment"),
-        ("mass = \"J/5\"", "mass = \"J/5\"\ndirections = [\"x\", \"y\"]", "turns about one axis"),
+        ("mass = \"J/5\"", "mass = \"J/5\"\ndirections = [\"x\", \"y\"]", "about one axis"),
         (
             "[[spring]]",
             "[[body]]\nname = \"b\"\nmass = \"1 kg\"\ninertia = \"1 kg m^2\"\ndirections = [\"x\", \"y\"]\n[[spring]]",

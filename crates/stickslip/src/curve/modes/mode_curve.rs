@@ -33,7 +33,7 @@ pub enum ModeEndCause {
     NoStart,
     /// The curve turned and returned to amplitudes at which friction is negligible.
     #[error(
-        "its curve turns there and returns to large amplitudes: it coalesces with another mode and does not exist below"
+        "its curve turns there and returns to large amplitudes: it merges with another mode and does not exist at smaller amplitudes"
     )]
     Merged,
     /// The curve turned and did not return to smaller amplitudes.

@@ -77,7 +77,7 @@ impl StructureSummary {
     pub(super) fn lines(&self) -> Vec<(&'static str, String)> {
         let Self { rows, constrained_rows: left_out, entries: [stiffness, mass], .. } = self;
         let mut text = format!(
-            "{rows} rows, {stiffness} entries of stiffness, {mass} of mass, symmetric, mass positive definite or semidefinite"
+            "{rows} rows, {stiffness} nonzero entries of stiffness and {mass} of mass, symmetric, mass positive definite or semidefinite"
         );
         if *left_out > 0 {
             text += &format!("; {left_out} constrained row{} left out", plural_suffix(*left_out));

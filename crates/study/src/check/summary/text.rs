@@ -45,7 +45,11 @@ impl ModelSummary {
             text += &format!("; {} rigid-body motion{}", modes.rigid, plural_suffix(modes.rigid));
         }
         if modes.unresolved > 0 {
-            text += &format!("; {} lost in rounding, because other stiffnesses are much higher", modes.unresolved);
+            text += &format!(
+                "; {} frequenc{} too low for floating-point accuracy beside much higher stiffnesses",
+                modes.unresolved,
+                if modes.unresolved == 1 { "y" } else { "ies" }
+            );
         }
         text
     }
@@ -108,10 +112,10 @@ impl ModelSummary {
                 true => {
                     format!("; {slip} at {ranges}; any excitation makes it slip at its undamped resonance{at}")
                 }
-                false => format!("; {slip} at {ranges}; {factor} of the excitation makes it slip{at}"),
+                false => format!("; {slip} at {ranges}; begins at {factor} times the excitation{at}"),
             };
         } else {
-            text += &format!("; {slip} occurs; {factor} of the excitation makes it slip");
+            text += &format!("; {slip} occurs; begins at {factor} times the excitation");
         }
         text
     }
@@ -227,7 +231,7 @@ impl fmt::Display for ModelSummary {
         let rows = format!("{} row{}", size.rows, if size.rows == 1 { "" } else { "s" });
         let cases = format!("{cases} case{}", plural_suffix(*cases));
         let results = format!(
-            "{cases}, {rows}, {} of numbers, {} of memory",
+            "{cases}, {rows}, {} of tables, {} of memory",
             format_bytes(size.results),
             format_bytes(size.memory)
         );

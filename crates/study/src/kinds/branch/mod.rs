@@ -210,7 +210,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     };
     if let Some(reason) = reason {
         let kept = format!(
-            "{reason}; the tables contain the {} points up to there, and kind = \"response\" solves each point \
+            "{reason}; the tables contain the points up to there ({}), and kind = \"response\" solves each point \
              separately",
             branch.points.len()
         );

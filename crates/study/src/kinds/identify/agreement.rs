@@ -81,8 +81,8 @@ pub(super) fn predictions(problem: &FitProblem, agreements: &[Agreement]) -> Vec
         let target = &problem.targets[found.target];
         let (measured, predicted) = (found.measured, found.fitted);
         format!(
-            "prediction of `{}`, group {}: largest value {:.6} instead of {:.6} ({:+.2} %), at {} {:.6} instead of {:.6} \
-             ({:+.3} %); the rows deviate by {:.2} % of the largest value.",
+            "prediction of `{}`, group {}: largest value {:.6}, measured {:.6} ({:+.2} %), at {} {:.6}, measured {:.6} \
+             ({:+.3} %); rms deviation of the rows {:.2} % of the largest value.",
             target.data(),
             found.group,
             predicted.value,

@@ -34,9 +34,10 @@ impl Backbone {
         let amplitudes = input.column("amplitude", input.quantity.dimension())?;
         let omegas = input.column("frequency", Dimension::FREQUENCY)?;
         let damping = input.optional_column("damping", Dimension::NONE)?;
-        let positive = amplitudes.iter().chain(&omegas).all(|value| *value > 0.0);
-        if !positive {
-            let message = format!("an amplitude or a frequency of `{}` is not more than zero", input.data.name);
+        if let Some(row) =
+            amplitudes.iter().zip(&omegas).position(|(amplitude, omega)| !(*amplitude > 0.0 && *omega > 0.0))
+        {
+            let message = format!("row {} of `{}`: amplitude and frequency must be positive", row + 1, input.data.name);
             return Err(ColumnError { message, help: "remove the row".to_owned() });
         }
         let frequencies = input.deviations(&omegas, Dimension::FREQUENCY)?;
@@ -133,7 +134,9 @@ impl Target for Backbone {
             range.0 *= 0.7 * reach(least / first[0].exp()).min(1.0);
             range.1 *= 1.4 * reach(most / last[0].exp()).max(1.0);
         }
-        Err("the nonlinear mode does not reach the measured amplitudes".to_owned())
+        Err("the nonlinear mode does not reach the measured amplitudes: check their unit and `mode`, or remove the rows with \
+             extreme amplitudes"
+            .to_owned())
     }
 }
 

@@ -67,7 +67,10 @@ pub(super) fn forces_along(law: &dyn Law, path: &LoadPath) -> Result<Vec<f64>, S
     }
     match law.rate() {
         Some(rate) => rates(law, rate, path),
-        None => Err(format!("the law `{}` has no view that gives the force along a measured path", law.info().name)),
+        None => Err(format!(
+            "the law `{}` cannot be evaluated along a measured path; use a target with `is = \"settled\"` or `is = \"response\"`",
+            law.info().name
+        )),
     }
 }
 

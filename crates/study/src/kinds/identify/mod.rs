@@ -64,7 +64,7 @@ const TARGET: &[Key] = &[
     required(
         "at",
         ValueType::Text,
-        "the measured place; for a loop and for a settled dissipation the joint",
+        "the measured place; for a loop and for a steady-state dissipation the joint",
         "\"blade1\"",
     ),
     default(
@@ -77,7 +77,7 @@ const TARGET: &[Key] = &[
     optional(
         "phase_of",
         ValueType::Choice(targets::quantities),
-        "the quantity whose phase relative to the force the column `phase` has; default: `quantity`",
+        "the quantity of the column `phase`, which is relative to the force; default: `quantity`",
         "\"displacement\"",
     ),
     default(
@@ -160,14 +160,14 @@ pub(super) const KIND: Kind = Kind {
                 "loss",
                 ValueType::Choice(search::losses),
                 "squares",
-                "weight of large residuals; for data with outliers, use another value than `squares`",
+                "loss function, which sets the weight of large residuals; for data with outliers, use another value than `squares`",
                 "\"huber\"",
             ),
             default(
                 "profile",
                 ValueType::Flag,
                 "false",
-                "true: profile likelihood, the rise of the loss over each parameter while the others are fitted again",
+                "true: profile likelihood, the smallest weighted sum of squares over each parameter while the others are fitted again",
                 "true",
             ),
             optional(

@@ -331,7 +331,7 @@ impl Statistics {
         }
         (!reached).then(|| {
             format!(
-                "the search ended {:.1} standard errors before the minimum: use more `starts`, or narrower ranges",
+                "the search did not converge: it ended about {:.1} standard errors from the minimum; use more `starts`, or narrower ranges",
                 self.distance
             )
         })
@@ -362,7 +362,7 @@ impl Statistics {
         if self.undetermined.len() > listed {
             let more = self.undetermined.len() - listed;
             warnings.push(format!(
-                "the data do not determine {more} more combination{} of the parameters.",
+                "the data do not determine {more} further combination{} of the parameters either.",
                 plural_suffix(more)
             ));
         }
@@ -376,23 +376,25 @@ impl Statistics {
         }));
         warnings.extend(self.widened.iter().map(|k| {
             format!(
-                "the loss over `{}` is flat on one side of the estimate; its interval is that of the profile \
+                "the sum of squares over `{}` is flat on one side of the estimate; its interval is that of the profile \
                 likelihood.",
                 name(k)
             )
         }));
         if self.count <= self.parameters.len() {
             warnings.push(format!(
-                "{} measured numbers for {} parameters: nothing tests the model, and standard errors are only those that \
-                 `weight` states. Add rows.",
+                "{} measured number{} for {} parameter{}: no row is left to test the model, and the standard errors follow \
+                 from `weight` alone. Add rows.",
                 self.count,
-                self.parameters.len()
+                plural_suffix(self.count),
+                self.parameters.len(),
+                plural_suffix(self.parameters.len())
             ));
         }
         let significant = 3.0 / (self.count as f64).sqrt();
         if self.autocorrelation > significant && self.rms > EXACT {
             warnings.push(format!(
-                "neighbouring residuals are correlated ({:.2}), so the model leaves out part of the measured behaviour; the \
+                "neighbouring residuals are correlated (coefficient {:.2}), so the model leaves out part of the measured behaviour; the \
                  parameters are less certain than their standard errors.",
                 self.autocorrelation
             ));

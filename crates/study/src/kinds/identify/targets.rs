@@ -87,7 +87,7 @@ pub(super) fn kinds() -> Vec<(&'static str, &'static str)> {
         ("loop", "loops of a joint: the columns `displacement` and `force`, for laws with velocity also `time`"),
         (
             "settled",
-            "settled vibration: the columns `frequency`, `force`, and `amplitude` (half of peak to peak) or `mean` of a \
+            "steady-state vibration: the columns `frequency`, `force`, and `amplitude` (half of peak to peak) or `mean` of a \
              place, or `dissipation` of a joint per cycle",
         ),
         ("ring-down", "free decay: the columns `time` and `response`"),

@@ -15,7 +15,7 @@ use crate::results::dataset::FIELDS;
 use crate::results::notes::Note;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
-use crate::syntax::format::format_with_prefix;
+use crate::syntax::format::{format_with_prefix, plural_suffix};
 use crate::syntax::key::{Bounds, Key, ValueType, default, required};
 use num_complex::Complex64;
 use stickslip::curve::modes::{Mode, ModePoint, ModeRequest, nonlinear_mode, unit_amplitude};
@@ -31,7 +31,7 @@ const MAX_POINTS: i64 = 10_000;
 const AMPLITUDE: &[Key] = &[
     required("from", LENGTH, "smallest amplitude", "\"1 um\""),
     required("to", LENGTH, "largest amplitude", "\"10 mm\""),
-    default("points", ValueType::Count(2, MAX_POINTS), "61", "points, evenly spaced in the logarithm", "61"),
+    default("points", ValueType::Count(2, MAX_POINTS), "61", "number of amplitudes, spaced logarithmically", "61"),
 ];
 
 pub(super) const KIND: Kind = Kind {
@@ -101,7 +101,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let mass_places = model.masses.iter().map(|mass| mass.places().len());
     let masses = mass_places.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
-        let message = format!("there is no mode {number}: degrees of freedom of the structure: {masses}");
+        let plural = plural_suffix(masses as usize);
+        let message = format!("there is no mode {number}: the structure has {masses} degree{} of freedom", plural);
         return Err(KeyError::new("mode", message, "modes count from 1, by ascending frequency"));
     }
     Ok(())

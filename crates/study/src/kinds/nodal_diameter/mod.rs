@@ -88,7 +88,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     fields::check(values, model)?;
     let (most, sectors) = (values.count("modes").unwrap_or(4), model.ring.map_or(0, |ring| ring.sectors as u64));
     if let Some(diameter) = values.count(DIAMETER).filter(|diameter| 2 * diameter > sectors) {
-        let message = format!("a disk of {sectors} sectors has no {diameter} nodal diameters");
+        let message = format!("a disk of {sectors} sectors has no modes with {diameter} nodal diameters");
         return Err(KeyError::new(DIAMETER, message, format!("choose a nodal diameter from 0 to {}", sectors / 2)));
     }
     if let Some(mode) = values.count(MODE).filter(|mode| *mode > most) {

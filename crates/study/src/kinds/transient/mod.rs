@@ -62,8 +62,8 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 "run_up",
                 ValueType::Table(RUN_UP),
-                "excitation frequency that changes in time: it is constant in each cycle, and each cycle ends when that of \
-                 the continuous change ends",
+                "excitation frequency that changes in time. It is constant within each cycle, and cycles end at the instants of \
+                 the continuous change",
                 "{ from = \"110 Hz\", to = \"130 Hz\", duration = \"10 s\" }",
             ),
             optional("duration", DURATION, "computed time; default for a run-up: its duration", "\"2 s\""),

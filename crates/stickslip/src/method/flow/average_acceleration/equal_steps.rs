@@ -95,7 +95,7 @@ impl AverageAccelerationFlow {
                     Err(DROPS)
                 }
                 None if chosen.ideal_elements().is_some() => Err("its slider is rigid; it needs a spring in series"),
-                None => Err("it defines neither a step view nor a rate view"),
+                None => Err("it defines neither the force after a step nor a differential equation"),
             }
         })?;
         Ok(AverageAccelerationFlow {

@@ -65,7 +65,7 @@ impl PortBuilder {
         }
         if let Some(prox) = law.prox() {
             if !(scale.is_finite() && scale > 0.0) {
-                return Err(unsupported("its force scale is not finite and positive, which its resolvent needs"));
+                return Err(unsupported("its slip limit must be finite and positive"));
             }
             let scales = PortScales {
                 series_compliance: prox.compliance(),
@@ -79,7 +79,7 @@ impl PortBuilder {
             self.add(j, joint, Kernel::Rate(law.clone()), PortScales::of_force(scale));
         } else {
             return Err(unsupported(
-                "it defines none of the views prox, step and rate, and no ideal elements along one direction",
+                "it has no form that harmonic balance can evaluate (ideal elements along one direction, `prox`, `step` or `rate`)",
             ));
         }
         Ok(())

@@ -148,9 +148,10 @@ fn ports_of(law: &SharedLaw) -> Ports {
 #[test]
 fn refusals_name_law_and_alternative() {
     let jump = Arc::new(Stribeck { limit: 1.0, static_limit: 1.5, velocity: 0.0 });
-    for (law, words) in
-        [(jump as SharedLaw, "`event-driven`"), (Arc::new(Plane::Unknown), "none of the views prox, step and rate")]
-    {
+    for (law, words) in [
+        (jump as SharedLaw, "`event-driven`"),
+        (Arc::new(Plane::Unknown), "no form that harmonic balance can evaluate"),
+    ] {
         let d = law.directions();
         let places = (0..d).map(|i| format!("p{i}")).collect();
         let one = DMatrix::identity(d, d);
