@@ -18,19 +18,16 @@
 //! `*INCLUDE`; CalculiX CrunchiX User's Manual, chapter 7.
 
 use super::builder::{MeshBuilder, SetKind};
+use super::include::load_included;
 use super::shape::Shape;
 use super::{MeshFile, MeshFormat};
 use crate::abaqus_element::{fields, keyword, parameter};
 use crate::error::{Error, ErrorKind};
-use crate::file::load;
 use crate::text::{Line, Lines, integer, quoted};
 use std::path::Path;
 
 pub(super) const FORMAT: MeshFormat =
     MeshFormat { name: "abaqus-deck", summary: "input decks of Abaqus and CalculiX (.inp)", sniff, read };
-
-/// Deepest nesting of included files.
-const MAX_DEPTH: usize = 8;
 
 fn sniff(bytes: &[u8]) -> bool {
     let named = |line: Line| keyword(&line).and_then(|text| text.split(',').next().map(str::to_owned));
@@ -102,6 +99,8 @@ impl Deck<'_> {
         let mut lines = Lines::new(crate::without_bom(bytes));
         let mut last = Line { text: b"", number: 0 };
         while let Some(line) = lines.next() {
+            // CalculiX itself writes keywords behind a space
+            let line = Line { text: line.text.trim_ascii_start(), ..line };
             last = line;
             if line.text.starts_with(b"**") || line.text.trim_ascii().is_empty() {
                 continue;
@@ -127,18 +126,9 @@ impl Deck<'_> {
     }
 
     fn include(&mut self, line: &Line, folder: Option<&Path>, depth: usize) -> Result<(), Error> {
-        let refuse =
-            |problem: String, remedy: &str| Err(Error::new(ErrorKind::Unsupported, line.location(), problem, remedy));
         let Some(name) = stated(line, "INPUT") else { return Err(line.malformed("*INCLUDE, INPUT=file", "no file")) };
-        let Some(folder) = folder else {
-            return refuse(format!("the deck includes the file {name}"), "read the deck from its folder");
-        };
-        if depth == MAX_DEPTH {
-            return refuse(format!("more than {MAX_DEPTH} files include each other"), "does a file include itself?");
-        }
-        let path = folder.join(&name);
-        let bytes = load(&path)?;
-        self.file(&bytes, Some(folder), depth + 1).map_err(|error| error.with_path(&path))
+        let (path, bytes) = load_included(line, &name, folder, depth)?;
+        self.file(&bytes, folder, depth + 1).map_err(|error| error.with_path(&path))
     }
 
     fn keyword(&mut self, line: &Line) -> Result<(), Error> {
@@ -401,7 +391,7 @@ mod tests {
     fn included_files_are_read_in_their_place() {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-        write("main.inp", "*INCLUDE, INPUT=Nodes.inp\n*ELEMENT, TYPE=C3D4\n1,1,2,3,4\n");
+        write("main.inp", "*INCLUDE, INPUT=Nodes.inp\n ** comment\n *ELEMENT, TYPE=C3D4\n1,1,2,3,4\n");
         write("Nodes.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n");
         assert_eq!(read(folder.path().join("main.inp")).unwrap().elements().len(), 1);
         write("Nodes.inp", "*NODE\n1,0,0,x\n");

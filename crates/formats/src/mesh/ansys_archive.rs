@@ -11,12 +11,14 @@
 //! (8i10)
 //!          1        -8
 //! ```
+//! Current versions write the types of elements as a block, `ETBLOCK`, instead of `ET`.
+//!
 //! A line of an element has eleven numbers (the second its type, the ninth its number of nodes, the
 //! eleventh its own), then its nodes. Wedges, pyramids and tetrahedra may be bricks that repeat
 //! nodes. A negative number in a component ends a range.
 //!
-//! Source: Ansys Mechanical APDL Programmer's Reference, "Archive files", `NBLOCK`, `EBLOCK`,
-//! `CMBLOCK`; Element Reference, `SOLID186`, "Degenerated shape elements".
+//! Source: Ansys Mechanical APDL Programmer's Reference, "Archive files", `ETBLOCK`, `NBLOCK`,
+//! `EBLOCK`, `CMBLOCK`; Element Reference, `SOLID186`, "Degenerated shape elements".
 
 use super::builder::{MeshBuilder, SetKind};
 use super::shape::{Family, Shape};
@@ -49,6 +51,7 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
                     types.insert(number, kind);
                 }
             }
+            ["ETBLOCK", ..] => element_types(&mut lines, &mut types)?,
             ["NBLOCK", _, ..] => nodes(&mut lines, builder)?,
             ["EBLOCK", _, "SOLID", ..] => elements(&mut lines, &types, builder)?,
             ["EBLOCK", ..] => {
@@ -63,37 +66,44 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
     Ok(())
 }
 
-/// The widths of the fields of a block, from its format `(3i9,6e21.13e3)`.
-struct FieldWidths {
-    integers: usize,
-    integer: usize,
-    real: usize,
+/// The fields of a block, from its format, such as `(3i9,6e21.13e3)` or `(1i7,2i9,6e21.13)`.
+struct Fields {
+    /// The columns behind each integer.
+    integer_ends: Vec<usize>,
+    real_width: usize,
 }
 
-impl FieldWidths {
-    fn new(line: &Line) -> Result<FieldWidths, Error> {
+impl Fields {
+    fn new(line: &Line) -> Result<Fields, Error> {
         let text = String::from_utf8_lossy(line.text).to_lowercase();
         let wrong = || line.malformed("a format such as (3i9,6e21.13e3)", &quoted(line.text));
         let inside = text.trim().strip_prefix('(').and_then(|text| text.strip_suffix(')')).ok_or_else(wrong)?;
-        let mut widths = FieldWidths { integers: 0, integer: 0, real: 0 };
+        let mut fields = Fields { integer_ends: Vec::new(), real_width: 0 };
         for part in inside.split(',') {
             let (count, rest) = part.split_once(['i', 'e']).ok_or_else(wrong)?;
             let width = rest.split('.').next().and_then(|width| width.parse().ok());
             let width: usize = width.filter(|width| (1..=40).contains(width)).ok_or_else(wrong)?;
             if part.contains('i') {
-                (widths.integers, widths.integer) = (count.parse().map_err(|_| wrong())?, width);
+                let count: usize = count.parse().ok().filter(|count| *count <= 40).ok_or_else(wrong)?;
+                let begin = fields.begin_of_reals();
+                fields.integer_ends.extend((1..=count).map(|field| begin + field * width));
             } else {
-                widths.real = width;
+                fields.real_width = width;
             }
         }
-        if widths.integers == 0 || widths.integers > 40 { Err(wrong()) } else { Ok(widths) }
+        if fields.integer_ends.is_empty() || fields.integer_ends.len() > 40 { Err(wrong()) } else { Ok(fields) }
+    }
+
+    /// Returns the number of columns of all integers.
+    fn begin_of_reals(&self) -> usize {
+        self.integer_ends.last().copied().unwrap_or(0)
     }
 
     /// Returns the integers of a line, up to its end.
     fn integers(&self, line: &Line) -> Result<Vec<i64>, Error> {
-        let field = |at: usize| line.columns(at * self.integer, (at + 1) * self.integer);
-        let filled = (0..self.integers).map(field).take_while(|field| !field.is_empty());
-        filled.map(|field| line.integer(field)).collect()
+        let begins = std::iter::once(0).chain(self.integer_ends.iter().copied());
+        let fields = begins.zip(&self.integer_ends).map(|(begin, end)| line.columns(begin, *end));
+        fields.take_while(|field| !field.is_empty()).map(|field| line.integer(field)).collect()
     }
 }
 
@@ -103,33 +113,49 @@ fn ends(line: &Line) -> bool {
     text == b"-1" || text.first().is_some_and(u8::is_ascii_alphabetic)
 }
 
-fn nodes(lines: &mut Lines, builder: &mut MeshBuilder) -> Result<(), Error> {
-    let head = lines.expect("the format of the nodes")?;
-    let widths = FieldWidths::new(&head)?;
+/// Reads a block of element types: their numbers and names.
+fn element_types(lines: &mut Lines, types: &mut HashMap<i64, i64>) -> Result<(), Error> {
+    lines.expect("the format of the element types")?;
     for line in lines.by_ref() {
         if ends(&line) {
             return Ok(());
         }
-        let begin = widths.integers * widths.integer;
+        let mut fields = line.text.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
+        let (Some(number), Some(kind)) = (fields.next(), fields.next()) else {
+            return Err(line.malformed("the number of an element type and its name", &quoted(line.text)));
+        };
+        types.insert(line.integer(number)?, line.integer(kind)?);
+    }
+    Ok(())
+}
+
+fn nodes(lines: &mut Lines, builder: &mut MeshBuilder) -> Result<(), Error> {
+    let head = lines.expect("the format of the nodes")?;
+    let fields = Fields::new(&head)?;
+    for line in lines.by_ref() {
+        if ends(&line) {
+            return Ok(());
+        }
+        let begin = fields.begin_of_reals();
         let mut position = [0.0; 3];
         for (axis, x) in position.iter_mut().enumerate() {
             // zeros at the end of a line are left out
-            let field = line.columns(begin + axis * widths.real, begin + (axis + 1) * widths.real);
+            let field = line.columns(begin + axis * fields.real_width, begin + (axis + 1) * fields.real_width);
             *x = if field.is_empty() { 0.0 } else { line.real(field)? };
         }
-        builder.node(line.integer(line.columns(0, widths.integer))?, position, &line)?;
+        builder.node(line.integer(line.columns(0, fields.integer_ends[0]))?, position, &line)?;
     }
     Ok(())
 }
 
 fn elements(lines: &mut Lines, types: &HashMap<i64, i64>, builder: &mut MeshBuilder) -> Result<(), Error> {
     let head = lines.expect("the format of the elements")?;
-    let widths = FieldWidths::new(&head)?;
+    let fields = Fields::new(&head)?;
     while let Some(line) = lines.next() {
         if ends(&line) {
             return Ok(());
         }
-        let numbers = widths.integers(&line)?;
+        let numbers = fields.integers(&line)?;
         let (Some(kind), Some(count), Some(number)) = (numbers.get(1), numbers.get(8), numbers.get(10)) else {
             return Err(line.malformed("eleven numbers and the nodes of an element", &numbers.len().to_string()));
         };
@@ -139,7 +165,7 @@ fn elements(lines: &mut Lines, types: &HashMap<i64, i64>, builder: &mut MeshBuil
         let mut nodes = numbers[11..].to_vec();
         while nodes.len() < count {
             let more = lines.expect("the nodes of an element")?;
-            let more = widths.integers(&more)?;
+            let more = fields.integers(&more)?;
             if more.is_empty() {
                 break;
             }
@@ -153,6 +179,11 @@ fn elements(lines: &mut Lines, types: &HashMap<i64, i64>, builder: &mut MeshBuil
             _ => &[],
         };
         match undegenerate(families, &nodes) {
+            Some((shape, nodes)) if nodes[shape.family.corners()..].contains(&0) => {
+                builder.count_incomplete();
+                let shape = Shape { quadratic: false, ..shape };
+                builder.element(*number, shape, &nodes[..shape.nodes()], &line)?;
+            }
             Some((shape, nodes)) => builder.element(*number, shape, &nodes, &line)?,
             None => builder.leave_out(&format!("{name} with {count} nodes")),
         }
@@ -204,7 +235,7 @@ fn component(line: &Line, lines: &mut Lines, kind: &str, builder: &mut MeshBuild
     let count = count.split('!').next().unwrap_or_default().trim();
     let count = line.count(count.as_bytes())?;
     let head = lines.expect("the format of a component")?;
-    let widths = FieldWidths::new(&head)?;
+    let fields = Fields::new(&head)?;
     let kind = match kind.get(..4) {
         Some("NODE") => SetKind::Nodes,
         _ => SetKind::Elements,
@@ -213,7 +244,7 @@ fn component(line: &Line, lines: &mut Lines, kind: &str, builder: &mut MeshBuild
     let (mut read, mut before) = (0, None);
     while read < count {
         let line = lines.expect("the members of a component")?;
-        let numbers = widths.integers(&line)?;
+        let numbers = fields.integers(&line)?;
         if numbers.is_empty() {
             return Err(line.malformed("the members of a component", &quoted(line.text)));
         }
@@ -313,6 +344,26 @@ mod tests {
         assert_eq!(pyramid, (13, vec![1, 2, 3, 4, 5, 9, 10, 11, 12, 17, 18, 19, 20]));
         let without = of([1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(without.0, 8);
+    }
+
+    /// Types of elements in a block, fields of different widths, and two elements of ten nodes, of
+    /// which the second lacks a middle node.
+    #[test]
+    fn other_forms_of_blocks_are_read() {
+        let mut text = String::from("ETBLOCK,1,1\n(2i9,19a9)\n        4      187        0\n       -1\n");
+        text += "NBLOCK,6,SOLID,14,14\n(1i7,2i9,6e21.13)\n";
+        for number in 1..=14 {
+            text += &format!("{number:7}{:9}{:9}{:21}\n", 0, 0, f64::from(number) / 8.0);
+        }
+        text += "N,UNBL,LOC,-1,\nEBLOCK,19,SOLID,2,2\n(19i9)\n";
+        let element = |number: i64, nodes: [i64; 10]| element(4, number, &nodes);
+        text += &element(7, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
+        text += &element(8, [1, 2, 3, 11, 5, 6, 7, 12, 0, 14]);
+        let mesh = mesh(&(text + "-1\n"));
+        assert_eq!((mesh.nodes()[13].number, mesh.nodes()[13].position), (14, [1.75, 0.0, 0.0]));
+        let shapes: Vec<String> = mesh.elements().iter().map(|element| element.shape.to_string()).collect();
+        assert_eq!(shapes, ["tetrahedra of 10 nodes", "tetrahedra of 4 nodes"]);
+        assert_eq!(mesh.notes(), ["1 elements lack some of their middle nodes and are read with their corners"]);
     }
 
     #[test]

@@ -18,6 +18,8 @@ pub(super) struct MeshBuilder {
     sets: Vec<NumberedSet>,
     /// Number of elements of each type that was left out.
     left_out: BTreeMap<String, usize>,
+    /// Number of elements that lack some middle nodes.
+    incomplete: usize,
     notes: Vec<String>,
 }
 
@@ -86,6 +88,11 @@ impl MeshBuilder {
     /// Counts an element of a type that is not read.
     pub fn leave_out(&mut self, kind: &str) {
         *self.left_out.entry(kind.to_owned()).or_default() += 1;
+    }
+
+    /// Counts an element that lacks some of its middle nodes, and is read with its corners.
+    pub fn count_incomplete(&mut self) {
+        self.incomplete += 1;
     }
 
     /// Adds members to a set, which is made if it does not exist. Upper and lower case are equal.
@@ -190,6 +197,11 @@ impl MeshBuilder {
         }
         for (kind, count) in self.left_out {
             self.notes.push(format!("{count} elements of type {kind} are left out"));
+        }
+        if self.incomplete > 0 {
+            let count = self.incomplete;
+            self.notes
+                .push(format!("{count} elements lack some of their middle nodes and are read with their corners"));
         }
         let MeshBuilder { nodes, by_number, elements, notes, .. } = self;
         Ok(Mesh { nodes, by_number, elements, connectivity, sets, notes, ..Mesh::default() })

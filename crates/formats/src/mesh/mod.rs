@@ -18,6 +18,7 @@
 //! - `face`: area, normals and closest point of a face;
 //! - `patch`: the outer faces of a set, and the area and normal of its nodes;
 //! - `builder`: what a reader has read so far;
+//! - `include`: the files that a deck includes;
 //! - one file for every format in [`TABLE`].
 
 mod abaqus_deck;
@@ -25,6 +26,7 @@ mod ansys_archive;
 mod builder;
 mod face;
 mod gmsh;
+mod include;
 mod nastran_bulk;
 mod patch;
 mod report;

@@ -8,25 +8,29 @@
 //! SET1    5       1       THRU    4
 //! ```
 //! The elements of a property become the set `property_3`, the grid points of `SET1`, `SET3` and of
-//! `SET 5 = …` in the case control the set `set_5`. Coordinate systems of grid points are refused,
-//! because the rows of the matrices follow them.
+//! `SET 5 = …` in the case control the set `set_5`. Files named by `INCLUDE` are read in their
+//! place. Coordinate systems of grid points are refused, because the rows of the matrices follow
+//! them.
 //!
 //! Source: MSC Nastran Quick Reference Guide, bulk data entries `GRID`, `CTETRA`, `CPYRAM`,
 //! `CPENTA`, `CHEXA`, `CQUAD4`, `CQUAD8`, `CTRIA3`, `CTRIA6`, `SET1`, `SET3`; case control `SET`.
 
 use super::builder::{MeshBuilder, SetKind};
+use super::include::load_included;
 use super::shape::Shape;
 use super::{MeshFile, MeshFormat};
 use crate::error::{Error, ErrorKind};
 use crate::nastran_dmig::{fields, is_continuation};
 use crate::text::{Line, Lines, integer};
+use std::borrow::Cow;
 
 pub(super) const FORMAT: MeshFormat =
     MeshFormat { name: "nastran-bulk", summary: "Nastran bulk data (.bdf, .dat, .nas)", sniff, read };
 
 fn sniff(bytes: &[u8]) -> bool {
     let names = || Lines::new(bytes).map(|line| name(&line));
-    names().any(|name| name == "GRID") && !names().any(|name| name == "DMIG")
+    let is_deck = |name: String| name == "GRID" || name == "BEGIN";
+    names().any(is_deck) && !names().any(|name| name == "DMIG")
 }
 
 /// Returns the name of the card that begins in a line; empty for other lines.
@@ -54,9 +58,23 @@ impl BulkCard<'_> {
 }
 
 fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
-    let mut card: Option<BulkCard> = None;
     let mut sets: Vec<StatedSet> = Vec::new();
-    let mut lines = Lines::new(file.bytes);
+    read_deck(file, 0, &mut sets, builder)?;
+    // a set may precede its grid points
+    sets.iter().for_each(|set| set.add(builder));
+    Ok(())
+}
+
+/// Reads a deck, or a file that it includes, at this depth of nesting.
+fn read_deck(
+    file: &MeshFile<'_>,
+    depth: usize,
+    sets: &mut Vec<StatedSet>,
+    builder: &mut MeshBuilder,
+) -> Result<(), Error> {
+    let mut card: Option<BulkCard> = None;
+    let bytes = without_tabs(file.bytes);
+    let mut lines = Lines::new(&bytes);
     while let Some(line) = lines.next() {
         if line.text.starts_with(b"$") {
             continue;
@@ -66,23 +84,50 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
             continue;
         }
         if let Some(card) = card.take() {
-            add(&card, &mut sets, builder)?;
+            add(&card, sets, builder)?;
         }
         match name(&line).as_str() {
             "SET" => sets.extend(case_set(&line, &mut lines)),
             "INCLUDE" => {
-                let problem = "the deck includes another file".to_owned();
-                let remedy = "write the whole model to one file, or name the included file";
-                return Err(Error::new(ErrorKind::Unsupported, line.location(), problem, remedy));
+                let name = included_name(&line, &mut lines);
+                let (path, bytes) = load_included(&line, &name, file.folder, depth)?;
+                let included = MeshFile { bytes: &bytes, folder: file.folder };
+                read_deck(&included, depth + 1, sets, builder).map_err(|error| error.with_path(&path))?;
             }
             "" => {}
             name => card = Some(BulkCard { name: name.to_owned(), fields: fields(&line), line }),
         }
     }
-    card.map_or(Ok(()), |card| add(&card, &mut sets, builder))?;
-    // a set may precede its grid points
-    sets.iter().for_each(|set| set.add(builder));
-    Ok(())
+    card.map_or(Ok(()), |card| add(&card, sets, builder))
+}
+
+/// Replaces tabs by spaces up to the next field of eight characters.
+fn without_tabs(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if !bytes.contains(&b'\t') {
+        return Cow::Borrowed(bytes);
+    }
+    let (mut text, mut begin) = (Vec::with_capacity(2 * bytes.len()), 0);
+    for &byte in bytes {
+        match byte {
+            b'\t' => text.resize(begin + ((text.len() - begin) / 8 + 1) * 8, b' '),
+            byte => text.push(byte),
+        }
+        if byte == b'\n' {
+            begin = text.len();
+        }
+    }
+    Cow::Owned(text)
+}
+
+/// Returns the name in `INCLUDE 'file'`. A name in quotes may continue on the next lines.
+fn included_name(line: &Line, lines: &mut Lines) -> String {
+    let quotes = ['\'', '"'];
+    let mut text = String::from_utf8_lossy(line.text).trim().to_owned();
+    while text.matches(quotes).count() == 1 {
+        let Some(more) = lines.next() else { break };
+        text += String::from_utf8_lossy(more.text).trim();
+    }
+    text.split_off("INCLUDE".len()).trim().trim_matches(quotes).to_owned()
 }
 
 /// Adds what a card states.
@@ -137,18 +182,16 @@ fn element(card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
     };
     let is_face = card.name.starts_with("CTRI") || card.name.starts_with("CQUAD");
     let stated = (0..quadratic).map(|i| card.field(2 + i)).collect::<Vec<_>>();
-    let filled = stated.iter().filter(|field| !field.is_empty()).count();
-    let count = if stated[linear..].iter().all(|field| field.is_empty()) { linear } else { quadratic };
-    if filled != count {
-        let problem = format!("element {number} has some middle nodes, but not all");
-        let remedy = "write the elements with all middle nodes, or with none";
-        return Err(Error::new(ErrorKind::Unsupported, card.line.location(), problem, remedy));
-    }
+    let middle = stated[linear..].iter().filter(|field| !field.is_empty()).count();
+    let count = if linear + middle == quadratic { quadratic } else { linear };
     let nodes = stated[..count].iter().map(|field| card.line.integer(field)).collect::<Result<Vec<_>, _>>()?;
     let shape = if is_face { Shape::face(count) } else { Shape::solid(count) };
     let Some(shape) = shape else {
-        return Err(card.line.malformed("the nodes of an element", &filled.to_string()));
+        return Err(card.line.malformed("the nodes of an element", &(linear + middle).to_string()));
     };
+    if middle > 0 && count == linear {
+        builder.count_incomplete();
+    }
     // Nastran numbers the edges between both ends before those of the second end
     let order: &[usize] = match count {
         20 => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15],
@@ -215,7 +258,7 @@ fn case_set(line: &Line, lines: &mut Lines) -> Option<StatedSet> {
 #[cfg(test)]
 mod tests {
     use crate::error::Location;
-    use crate::mesh::{Mesh, read_bytes};
+    use crate::mesh::{Mesh, read, read_bytes};
 
     /// A brick in small fields, its upper face as a plate in free fields, and a point in large
     /// fields.
@@ -276,16 +319,41 @@ mod tests {
         assert!(faces.len() == 6 && faces.iter().all(|face| (face.area() - 4.0).abs() < 1e-12));
     }
 
+    /// Tabs end fields of eight characters, a brick with one middle node is read with its corners.
+    #[test]
+    fn tabs_and_missing_middle_nodes() {
+        let tabs = DECK.replace("GRID           2              1.      0.      0.", "GRID\t2\t\t1.\t0.\t0.");
+        assert!(mesh(&tabs).nodes() == mesh(DECK).nodes() && tabs != DECK);
+        let mesh = mesh(&DECK.replace("+              7       8\n", "+              7       8       5\n"));
+        assert_eq!(mesh.element_nodes(0), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(
+            mesh.notes().last().unwrap(),
+            "1 elements lack some of their middle nodes and are read with their corners"
+        );
+    }
+
+    #[test]
+    fn included_files_are_read_in_their_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        let (head, points) = DECK.split_once("GRID           2").unwrap();
+        write("main.bdf", &format!("{head}include 'points\n  .bdf'\nENDDATA\n"));
+        write("points.bdf", &format!("GRID           2{points}"));
+        let main = || read(folder.path().join("main.bdf"));
+        assert_eq!(main().unwrap().nodes(), mesh(DECK).nodes());
+        write("points.bdf", "GRID,2,,x\n");
+        let error = main().unwrap_err().to_string();
+        assert!(error.contains("points.bdf, line 1") && error.contains("`x`"), "{error}");
+        write("points.bdf", "INCLUDE points.bdf\n");
+        assert!(main().unwrap_err().to_string().contains("include each other"));
+    }
+
     #[test]
     fn coordinate_systems_and_incomplete_elements_are_refused() {
         for (text, location, words) in [
             (DECK.replace("GRID,5,,", "GRID,5,2,"), Location::Line(12), "coordinate system 2"),
             (DECK.replace("GRID,6,0,1.,0.,1.0,0", "GRID,6,0,1.,0.,1.0,9"), Location::Line(13), "coordinate system 9"),
-            (
-                DECK.replace("+              7       8\n", "+              7       8       5\n"),
-                Location::Line(17),
-                "not all",
-            ),
+            (DECK.replace("+              7       8\n", "+              7\n"), Location::Line(17), "a whole number"),
             (DECK.replace("GRID,7,,1.,", "GRID,7,,a,"), Location::Line(14), "`a`"),
             (DECK.replace("ENDDATA", "INCLUDE 'rest.bdf'"), Location::Line(23), "includes"),
         ] {

@@ -1,4 +1,5 @@
-"""Writes the meshes of the tests: with meshio a brick, two wedges and a tetrahedron on one of them.
+"""Writes the meshes of the tests: a brick, two wedges and a tetrahedron on one of them, with meshio
+and, in the form of Ansys archives, by itself.
 
 The brick fills 0 to 1 along x, y and z, both wedges x from 1 to 2, and the tip of the tetrahedron
 is (1.5, 0.5, 2). The set FOOT has the nodes with z = 0. Gmsh writes three bricks of 1 x 1 x 1, apart
@@ -49,8 +50,42 @@ def model(quadratic):
     return points, blocks, foot
 
 
+def brick(kind, nodes):
+    """Returns the nodes of an element as those of a brick that repeats nodes, as Ansys writes it."""
+    if kind.startswith("hexahedron"):
+        return nodes
+    wedge = kind.startswith("wedge")
+    corners = [0, 1, 2, 2, 3, 4, 5, 5] if wedge else [0, 1, 2, 2, 3, 3, 3, 3]
+    if len(nodes) in (4, 6):
+        return [nodes[i] for i in corners]
+    middles = [6, 7, 2, 8, 9, 10, 5, 11, 12, 13, 14, 14] if wedge else [4, 5, 2, 6, 3, 3, 3, 3, 7, 8, 9, 9]
+    return [nodes[i] for i in corners + middles]
+
+
+def archive(points, blocks, foot, quadratic):
+    """Returns an archive of Ansys (CDWRITE)."""
+    real = lambda x: f"{x:21.13E}"[1:-2] + "0" + f"{x:21.13E}"[-2:]
+    row = lambda numbers: "".join(f"{number:9d}" for number in numbers) + "\n"
+    elements = [(kind, nodes) for kind, group in blocks for nodes in group]
+    text = "/PREP7\nETBLOCK,        1,        1\n(2i9,19a9)\n"
+    text += row([1, 186 if quadratic else 185] + 18 * [0]) + "       -1\n"
+    text += f"NBLOCK,6,SOLID,{len(points):10d},{len(points):10d}\n(3i9,6e21.13e3)\n"
+    for number, point in enumerate(points, 1):
+        text += row([number, 0, 0])[:-1] + "".join(real(x) for x in point) + "\n"
+    text += f"N,R5.3,LOC,       -1,\nEBLOCK,19,SOLID,{len(elements):10d},{len(elements):10d}\n(19i9)\n"
+    for number, (kind, nodes) in enumerate(elements, 1):
+        nodes = [node + 1 for node in brick(kind, list(nodes))]
+        numbers = [1, 1, 1, 1, 0, 0, 0, 0, len(nodes), 0, number] + nodes
+        text += row(numbers[:19]) + (row(numbers[19:]) if numbers[19:] else "")
+    text += f"       -1\nCMBLOCK,FOOT    ,NODE,{len(foot):8d}\n(8i10)\n"
+    for begin in range(0, len(foot), 8):
+        text += "".join(f"{node + 1:10d}" for node in foot[begin : begin + 8]) + "\n"
+    return text
+
+
 for quadratic in (False, True):
     points, blocks, foot = model(quadratic)
+    pathlib.Path(f"{'quadratic' if quadratic else 'linear'}.cdb").write_text(archive(points, blocks, foot, quadratic))
     name = "quadratic" if quadratic else "linear"
     # ids in a set of element sets differ from format to format, so only nodes are named
     mesh = meshio.Mesh(points, blocks, point_sets={"FOOT": foot})

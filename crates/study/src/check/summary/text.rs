@@ -46,7 +46,7 @@ impl ModelSummary {
         }
         if modes.unresolved > 0 {
             text += &format!(
-                "; {} frequenc{} too low for floating-point accuracy beside much higher stiffnesses",
+                "; {} frequenc{} not resolved in floating point, because other stiffnesses are much higher",
                 modes.unresolved,
                 if modes.unresolved == 1 { "y" } else { "ies" }
             );
