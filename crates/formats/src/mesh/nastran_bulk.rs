@@ -28,9 +28,9 @@ pub(super) const FORMAT: MeshFormat =
     MeshFormat { name: "nastran-bulk", summary: "Nastran bulk data (.bdf, .dat, .nas)", sniff, read };
 
 fn sniff(bytes: &[u8]) -> bool {
-    let names = || Lines::new(bytes).map(|line| name(&line));
-    let is_deck = |name: String| name == "GRID" || name == "BEGIN";
-    names().any(is_deck) && !names().any(|name| name == "DMIG")
+    let has = |wanted: &str| Lines::new(bytes).any(|line| name(&line) == wanted);
+    // the grid points may be in an included file
+    (has("GRID") || (has("BEGIN") && has("INCLUDE"))) && !has("DMIG")
 }
 
 /// Returns the name of the card that begins in a line; empty for other lines.
