@@ -53,7 +53,7 @@ named! {
     FORCE = [1, 1, -2, 0] "force" "N";
     PRESSURE = [1, -1, -2, 0] "pressure" "Pa";
     STIFFNESS = [1, 0, -2, 0] "stiffness" "N/m";
-    CUBIC_STIFFNESS = [1, -2, -2, 0] "cubic stiffness" "N/m^3";
+    CUBIC_STIFFNESS = [1, -2, -2, 0] "stiffness per area or cubic stiffness" "N/m^3";
     INVERSE_LENGTH = [0, -1, 0, 0] "inverse length" "1/m";
     DAMPING = [1, 0, -1, 0] "damping" "kg/s";
     ENERGY = [1, 2, -2, 0] "energy or moment" "J";

@@ -199,8 +199,11 @@ pub fn mesh_picture(mesh: &Mesh, title: &str) -> Result<Vec<u8>, ReportError> {
         canvas.pixels_of(&nodes.map(|node| seen[*node]).collect::<Vec<_>>())
     };
     let dots: Vec<Vec<[f32; 2]>> = shown.iter().take(canvas.settings.sets).map(unhidden).collect();
-    for (number, at) in dots.iter().enumerate() {
-        canvas.dots(at, colour(number), 5.0);
+    // small sets are drawn over large ones that contain them
+    let mut order: Vec<usize> = (0..dots.len()).collect();
+    order.sort_by_key(|number| std::cmp::Reverse(shown[*number].1.len()));
+    for number in order {
+        canvas.dots(&dots[number], colour(number), 5.0);
     }
     let entry = |(number, (name, nodes)): (usize, &(String, Vec<usize>))| PictureLegendEntry {
         name: name.clone(),

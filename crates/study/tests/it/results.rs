@@ -474,3 +474,33 @@ kind = "shooting"
     assert!(!notes.iter().any(|note| note.contains("unstable")), "{notes:?}");
     assert!(notes.iter().any(|note| note.contains("`j0`") && note.contains("sticks permanently")), "{notes:?}");
 }
+
+/// Of many places, the figure of an orbit shows those with the largest range; the nodes of a
+/// contact only if there is nothing else.
+#[test]
+fn an_orbit_shows_few_curves() {
+    let oscillator = |name: &str, force: f64| {
+        format!(
+            "[[mass]]\nname = \"{name}\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"{name}\", \"ground\"]\n\
+             stiffness = \"4 N/m\"\ndamping = \"1 kg/s\"\n[[force]]\non = \"{name}\"\namplitude = \"{force} N\"\n"
+        )
+    };
+    let shown = |elements: &str| -> (String, Vec<String>) {
+        let study = "[study]\nkind = \"orbit\"\nfrequency = \"1 rad/s\"\n";
+        let (_, dataset) = of(&format!("schema = 1\ntitle = \"oscillators\"\n{elements}{study}"));
+        let panel = &dataset.figure.panels[0];
+        (panel.title.clone(), panel.series.iter().map(|series| series.label.clone()).collect())
+    };
+    // the range is proportional to the force
+    let many: String = (1..=15).map(|i| oscillator(&format!("m{i}"), f64::from(i * 7 % 16))).collect();
+    let (title, names) = shown(&many);
+    let largest: Vec<String> = (1..=15).filter(|i| i * 7 % 16 > 3).map(|i| format!("m{i}")).collect();
+    assert!(
+        names == largest && title.starts_with("displacement, 12 of 15 with the largest range"),
+        "{title} {names:?}"
+    );
+    let contact = ["pad_a", "pad_b"].map(|name| oscillator(name, 1.0)).concat()
+        + "[[joint]]\nname = \"pad\"\nbetween = [\"pad_a\", \"pad_b\"]\nlaw = { kind = \"jenkins\", stiffness = \"1 N/m\", limit = \"1 N\" }\n";
+    assert_eq!(shown(&contact).1, ["pad_a", "pad_b"]);
+    assert_eq!(shown(&(contact + &oscillator("tip", 1.0))).1, ["tip"]);
+}

@@ -183,7 +183,7 @@ mod tests {
     use crate::law::{FrictionContact, Gap};
     use crate::model::Axis;
     use crate::structure::Structure;
-    use nalgebra::DMatrix;
+    use nalgebra::{DMatrix, DVector};
     use num_complex::Complex64;
 
     const TANGENTIAL: f64 = 15e6;
@@ -246,6 +246,25 @@ mod tests {
         let found = equilibrium(&system).unwrap();
         let depth = found.states[0].displacement[0];
         assert!((depth * NORMAL / load - 1.0).abs() < 1e-4, "{}", depth * NORMAL / load);
+    }
+
+    /// A spring holds a body along one direction, a contact along the other. The projection of a
+    /// mesh leaves a stiffness of 1e-14 of the largest there, which would hold the body 400 km away.
+    #[test]
+    fn rounding_of_the_stiffness_holds_no_body() {
+        let (stiff, load) = (1e10, 40.0);
+        let (sine, cosine) = ANGLE.to_radians().sin_cos();
+        let (held, free) = (DVector::from_vec(vec![cosine, sine]), DVector::from_vec(vec![-sine, cosine]));
+        let stiffness = &held * held.transpose() * stiff + &free * free.transpose() * (1e-14 * stiff);
+        let mass = DMatrix::identity(2, 2) * 0.01;
+        let structure = Structure::new(vec!["x".into(), "z".into()], mass, DMatrix::zeros(2, 2), stiffness).unwrap();
+        let axis = Axis::new(vec![(0, free[0]), (1, free[1])]);
+        let builder =
+            System::builder(structure).joint("foot", Arc::new(Gap { gap: 0.0, stiffness: NORMAL }), vec![axis]);
+        let builder = (0..2).fold(builder, |builder, row| builder.force(row, 0, Complex64::new(load * free[row], 0.0)));
+        let found = equilibrium(&Arc::new(builder.build().unwrap())).unwrap();
+        let depth = found.states[0].displacement[0];
+        assert!((depth * NORMAL / load - 1.0).abs() < 1e-9, "{depth}");
     }
 
     /// A load that pulls the wedge out has no equilibrium.

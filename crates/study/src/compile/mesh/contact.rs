@@ -13,6 +13,7 @@ use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledEntry, CompiledTable, CompiledValue, LawCoordinate};
 use crate::data::DataTable;
 use crate::syntax::error::{Location, Problem};
+use crate::syntax::expression::quantity_text;
 use crate::syntax::format::{format_significant, plural_suffix};
 use serde_json::{Value as Json, json};
 use stickslip::dimension::Dimension;
@@ -156,23 +157,41 @@ pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Resu
         Some(meters) => meters / source.length,
         None => second.as_ref().map_or(0.0, default_distance),
     };
-    let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
+    let (mut pairs, mut unpaired, mut nearest) = (Vec::new(), Vec::new(), f64::INFINITY);
     for own in first.nodes() {
         let node = PatchNode { position: in_second(own.position), normal: in_second(own.normal), ..*own };
         match &second {
             None => pairs.push(Pair { node, opposite: None, normal: node.normal }),
-            Some(second) => match second.closest(&node).filter(|found| found.point.distance <= limit) {
-                Some(found) => {
+            Some(second) => match second.closest(&node) {
+                Some(found) if found.point.distance <= limit => {
                     let normal = unit([0, 1, 2].map(|axis| node.normal[axis] - found.point.normal[axis]));
                     pairs.push(Pair { node, opposite: Some(found), normal });
                 }
-                None => unpaired.push(source.number(node.node)),
+                found => {
+                    nearest = found.map_or(nearest, |found| nearest.min(found.point.distance));
+                    unpaired.push(source.number(node.node));
+                }
             },
         }
     }
     if pairs.is_empty() {
-        let message = format!("no node of {} has a face of {} in front of it within the distance", sets[0], sets[1]);
-        let help = "state a larger `distance`; `stickslip inspect` shows the extent of the mesh";
+        let length = |mesh: f64| quantity_text(mesh * source.length, Some(Dimension::LENGTH));
+        let (message, help) = match nearest.is_finite() {
+            true => (
+                format!(
+                    "no node of {} has a face of {} in front of it within {}; the nearest is {} away",
+                    sets[0],
+                    sets[1],
+                    length(limit),
+                    length(nearest)
+                ),
+                "state a larger `distance`, or the sides that touch each other",
+            ),
+            false => (
+                format!("no face of {} points towards a node of {} that points towards it", sets[1], sets[0]),
+                "state the sides that touch each other; `stickslip inspect` with `--picture` draws the sets",
+            ),
+        };
         return Err(Problem::new(location, "between", message).help(help));
     }
     let mut expanded = ExpandedContact {

@@ -5,8 +5,21 @@ use crate::results::draw_panels;
 use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, join_title, largest, numbers};
 use crate::syntax::format::{format_hertz, prefixed_unit};
 use std::ops::Range;
+use stickslip::model::System;
 
-/// Draws displacements of the places and forces of the joints over time: two panels per orbit.
+/// Largest number of curves in a panel: more have no colours and line styles of their own.
+const MAX_CURVES: usize = 12;
+
+/// Returns true for a direction of a node of a contact between faces, such as `pad_71_a.n` of the
+/// joint `pad_71`.
+fn is_contact_node(direction: &str, system: &System) -> bool {
+    let place = direction.split('.').next().unwrap_or_default();
+    let joint = place.strip_suffix("_a").or_else(|| place.strip_suffix("_b"));
+    joint.is_some_and(|name| system.joints().iter().any(|joint| joint.name() == name))
+}
+
+/// Draws displacements of the places and forces of the joints over time: two panels per orbit. Nodes
+/// of contacts between faces are left out if other places are observed.
 pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
     // a table from another source may lack columns
@@ -22,22 +35,40 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
             let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
             let (unit, factor) = prefixed_unit(largest(motion, columns.clone()), si);
-            let line = |(i, column): (usize, &String)| {
-                let y = numbers(motion, column, rows.clone()).iter().map(|value| value * factor).collect();
-                Series::line(names[i], x.clone(), y, colour + i)
+            let curves = columns.iter().map(|column| numbers(motion, column, rows.clone()));
+            let (mut curves, all): (Vec<(usize, Vec<f64>)>, usize) = (curves.enumerate().collect(), columns.len());
+            if all > MAX_CURVES {
+                let range = |curve: &[f64]| {
+                    curve.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+                        - curve.iter().copied().fold(f64::INFINITY, f64::min)
+                };
+                curves.sort_by(|a, b| range(&b.1).total_cmp(&range(&a.1)));
+                curves.truncate(MAX_CURVES);
+                curves.sort_by_key(|(column, _)| *column);
+            }
+            let line = |(i, (column, curve)): (usize, (usize, Vec<f64>))| {
+                let y = curve.iter().map(|value| value * factor).collect();
+                Series::line(names[column], x.clone(), y, colour + i)
+            };
+            let selection = if all > MAX_CURVES {
+                format!("{MAX_CURVES} of {all} with the largest range, ")
+            } else {
+                String::new()
             };
             Panel {
-                title: format!("{what}, {title}"),
+                title: format!("{what}, {selection}{title}"),
                 x: Axis::new("time", time_unit.clone()),
                 y: Axis::new(what, unit),
-                series: columns.iter().enumerate().map(line).collect(),
+                series: curves.into_iter().enumerate().map(line).collect(),
                 ..Panel::default()
             }
         };
         let mut panels = Vec::new();
         if !system.places().is_empty() {
             let shown = drawing.displacements(&system);
-            let names = shown.iter().map(|(name, _)| name.as_str()).collect();
+            let own = |name: &&str| !is_contact_node(name, &system);
+            let all = || shown.iter().map(|(name, _)| name.as_str());
+            let names = if all().any(|name| own(&name)) { all().filter(own).collect() } else { all().collect() };
             panels.push(panel("displacement", drawing.unit("m"), names, "displacement_m", 0));
         }
         if !system.joints().is_empty() {

@@ -189,7 +189,8 @@ impl LinearDynamics {
     pub fn closed(&self, omega: f64) -> Option<&ClosedContacts> {
         let own = |omega: f64| self.form.dynamics().static_receptances(omega);
         let find = || {
-            if closed_contacts::need_contact_support(&self.springs, own, omega) {
+            let largest = self.structure.largest()[2];
+            if closed_contacts::need_contact_support(&self.springs, own, omega, largest) {
                 self.with_closed_contacts()
             } else {
                 None
