@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 /// Deepest nesting of included files.
 const MAX_DEPTH: usize = 8;
 
-/// Loads a file that a line includes, with its path. `folder` is the folder of the deck, `depth` the
-/// nesting of the file with this line.
+/// Loads a file that a line includes, with its path. `folder` is the folder of the deck, and
+/// `depth` the nesting of the file with this line.
 ///
 /// # Errors
 /// [`Error`]: the deck has no folder, the files are nested too deeply, or the file cannot be read.

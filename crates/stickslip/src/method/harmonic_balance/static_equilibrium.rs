@@ -249,7 +249,8 @@ mod tests {
     }
 
     /// A spring holds a body along one direction, a contact along the other. The projection of a
-    /// mesh leaves a stiffness of 1e-14 of the largest there, which would hold the body 400 km away.
+    /// mesh leaves a stiffness of 1e-14 of the largest there, which would hold the body 400 km
+    /// away.
     #[test]
     fn rounding_of_the_stiffness_holds_no_body() {
         let (stiff, load) = (1e10, 40.0);

@@ -18,8 +18,8 @@ fn is_contact_node(direction: &str, system: &System) -> bool {
     joint.is_some_and(|name| system.joints().iter().any(|joint| joint.name() == name))
 }
 
-/// Draws displacements of the places and forces of the joints over time: two panels per orbit. Nodes
-/// of contacts between faces are left out if other places are observed.
+/// Draws displacements of the places and forces of the joints over time: two panels per orbit.
+/// Nodes of contacts between faces are left out if other places are observed.
 pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let (Some(motion), Some(system)) = (drawing.table("orbit"), drawing.system()) else { return Figure::default() };
     // a table from another source may lack columns
