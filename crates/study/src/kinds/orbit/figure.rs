@@ -7,8 +7,18 @@ use crate::syntax::format::{format_hertz, prefixed_unit};
 use std::ops::Range;
 use stickslip::model::System;
 
-/// Largest number of curves in a panel: more have no colours and line styles of their own.
-const MAX_CURVES: usize = 12;
+/// Returns the indices of the curves with the largest range, ascending.
+fn largest_ranges(curves: &[Vec<f64>]) -> Vec<usize> {
+    // Largest number of curves in a panel: more have no colours and line styles of their own.
+    let most = 12;
+    let largest = |curve: &[f64], sign: f64| curve.iter().map(|y| sign * y).fold(f64::NEG_INFINITY, f64::max);
+    let range = |index: usize| largest(&curves[index], 1.0) + largest(&curves[index], -1.0);
+    let mut shown: Vec<usize> = (0..curves.len()).collect();
+    shown.sort_by(|&a, &b| range(b).total_cmp(&range(a)));
+    shown.truncate(most);
+    shown.sort_unstable();
+    shown
+}
 
 /// Returns true for a direction of a node of a contact between faces, such as `pad_71_a.n` of the
 /// joint `pad_71`.
@@ -35,31 +45,21 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         let panel = |what: &str, si: &str, names: Vec<&str>, column: &str, colour: usize| {
             let columns: Vec<String> = names.iter().map(|name| format!("{name}_{column}")).collect();
             let (unit, factor) = prefixed_unit(largest(motion, columns.clone()), si);
-            let curves = columns.iter().map(|column| numbers(motion, column, rows.clone()));
-            let (mut curves, all): (Vec<(usize, Vec<f64>)>, usize) = (curves.enumerate().collect(), columns.len());
-            if all > MAX_CURVES {
-                let range = |curve: &[f64]| {
-                    curve.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-                        - curve.iter().copied().fold(f64::INFINITY, f64::min)
-                };
-                curves.sort_by(|a, b| range(&b.1).total_cmp(&range(&a.1)));
-                curves.truncate(MAX_CURVES);
-                curves.sort_by_key(|(column, _)| *column);
-            }
-            let line = |(i, (column, curve)): (usize, (usize, Vec<f64>))| {
-                let y = curve.iter().map(|value| value * factor).collect();
+            let curves: Vec<Vec<f64>> = columns.iter().map(|column| numbers(motion, column, rows.clone())).collect();
+            let shown = largest_ranges(&curves);
+            let line = |(i, &column): (usize, &usize)| {
+                let y = curves[column].iter().map(|value| value * factor).collect();
                 Series::line(names[column], x.clone(), y, colour + i)
             };
-            let selection = if all > MAX_CURVES {
-                format!("{MAX_CURVES} of {all} with the largest range, ")
-            } else {
-                String::new()
+            let selection = match curves.len() {
+                all if all > shown.len() => format!("{} of {all} with the largest range, ", shown.len()),
+                _ => String::new(),
             };
             Panel {
                 title: format!("{what}, {selection}{title}"),
                 x: Axis::new("time", time_unit.clone()),
                 y: Axis::new(what, unit),
-                series: curves.into_iter().enumerate().map(line).collect(),
+                series: shown.iter().enumerate().map(line).collect(),
                 ..Panel::default()
             }
         };
