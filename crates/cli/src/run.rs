@@ -101,7 +101,6 @@ pub fn check(request: &Request<'_>, picture: Option<&Path>) -> Exit {
             for (checked, file) in studies.iter().zip(request.files) {
                 let (study, summary) = (checked.study(), print_warnings(checked));
                 let (cases, points) = (study.cases(), study.points());
-                let plural = |count: usize| if count == 1 { "" } else { "s" };
                 let verdict = match summary.warnings.len() {
                     0 => "nothing wrong".to_owned(),
                     warnings => format!("{warnings} warning{}", plural(warnings)),
@@ -473,6 +472,11 @@ fn print_json(dataset: &Dataset) -> Exit {
     }
 }
 
+/// Returns the ending of a noun with this count.
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
 /// Prints the failed points and those of lower accuracy than requested on standard error.
 fn complain(dataset: &Dataset) {
     // Number of failed points named on standard error; the record names all.
@@ -483,11 +487,11 @@ fn complain(dataset: &Dataset) {
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
         if let Some(points) = dataset.record.points.get(status) {
-            let plural = if *points == 1 { "" } else { "s" };
             let error = match status == Accuracy::Unchecked.status() {
                 true => "the error was not estimated",
                 false => "the estimated error exceeds the tolerance",
             };
+            let plural = plural(*points as usize);
             complain!("{}: {points} point{plural} {status}: {error}, see the notes in record.json", dataset.name);
         }
     }

@@ -23,14 +23,18 @@ use crate::error::{Error, ErrorKind};
 use crate::nastran_dmig::{fields, is_continuation};
 use crate::text::{Line, Lines, integer};
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 pub(super) const FORMAT: MeshFormat =
     MeshFormat { name: "nastran-bulk", summary: "Nastran bulk data (.bdf, .dat, .nas)", sniff, read };
 
 fn sniff(bytes: &[u8]) -> bool {
-    let has = |wanted: &str| Lines::new(bytes).any(|line| name(&line) == wanted);
+    let telling = ["GRID", "BEGIN", "INCLUDE", "DMIG"];
+    let names = Lines::new(bytes).map(|line| name(&line)).filter(|name| telling.contains(&name.as_str()));
+    let names: BTreeSet<String> = names.collect();
+    let has = |name: &str| names.contains(name);
     // the grid points may be in an included file
-    (has("GRID") || (has("BEGIN") && has("INCLUDE"))) && !has("DMIG")
+    !has("DMIG") && (has("GRID") || (has("BEGIN") && has("INCLUDE")))
 }
 
 /// Returns the name of the card that begins in a line; empty for other lines.

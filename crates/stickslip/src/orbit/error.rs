@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 pub enum IntegrationError {
     /// Too many transitions.
     #[error(
-        "joint `{joint}` chatters: {switches} transitions before t = {time:.6e} s; give it a stiffness (law `jenkins`), add \
-         damping, or use `harmonic-balance`"
+        "joint `{joint}` chatters: {switches} transitions before t = {time:.6e} s; give it a stiffness (law `jenkins`) or add \
+         damping; for an orbit, also try `harmonic-balance`"
     )]
     Chatter {
         /// Time of the failure, s.
@@ -35,7 +35,7 @@ pub enum IntegrationError {
     /// The contact problem has no solution.
     #[error(
         "no combination of stick and slip satisfies the contact conditions at t = {time:.6e} s; give rigid joints a \
-         stiffness (law `jenkins`), or use `harmonic-balance`"
+         stiffness (law `jenkins`); for an orbit, also try `harmonic-balance`"
     )]
     NoContactState {
         /// Time of the failure, s.
@@ -55,7 +55,7 @@ pub enum IntegrationError {
     /// The signals oscillate too fast relative to the period.
     #[error(
         "the search for the next transition reached its maximum number of steps at t = {time:.6e} s, because \
-         some modes are far faster than the excitation; lower their stiffnesses, or use `harmonic-balance`"
+         some modes are far faster than the excitation; lower their stiffnesses; for an orbit, also try `harmonic-balance`"
     )]
     TooFast {
         /// Time of the failure, s.
@@ -64,7 +64,7 @@ pub enum IntegrationError {
     /// The step size of a time integration became too small.
     #[error(
         "the step size of the time integration became too small at t = {time:.6e} s (step {step:.1e} s); make steep laws \
-         less steep, or use `harmonic-balance`"
+         less steep; for an orbit, also try `harmonic-balance`"
     )]
     Stalled {
         /// Time of the failure, s.
@@ -249,7 +249,7 @@ pub enum OrbitError {
     /// The evidence contradicts the orbit.
     #[error(
         "{method} rejected its orbit at {}: the energies supplied and dissipated in one period differ by a fraction of \
-         {energy_gap:.1e}; use more `samples`, a smaller `tolerance`, or another method",
+         {energy_gap:.1e}; use another method, or a smaller `tolerance` if this one has it",
         hertz(*omega)
     )]
     Evidence {

@@ -3,7 +3,7 @@
 
 use crate::run::basis_check::SlipReductionCheck;
 use crate::syntax::expression::quantity_text;
-use crate::syntax::format::format_significant;
+use crate::syntax::format::{format_significant, plural_suffix};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
@@ -327,7 +327,7 @@ impl Note {
 
     /// Returns the sentence, or `None` if there is nothing to report.
     pub(crate) fn text(&self) -> Option<String> {
-        let points = |count: usize| format!("{count} point{}", if count == 1 { "" } else { "s" });
+        let points = |count: usize| format!("{count} point{}", plural_suffix(count));
         match self {
             Note::Sentence(text) => Some(text.clone()),
             Note::Cases { cases, named, text } => {

@@ -6,6 +6,7 @@
 //! higher frequency.
 
 use crate::syntax::expression::quantity_text;
+use crate::syntax::format::plural_suffix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -127,19 +128,21 @@ impl SlipReductionCheck {
     pub(crate) fn text(&self, warning: &str) -> String {
         let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
         let SlipReductionCheck { points, up_to, again, .. } = self;
-        let slips = format!(
-            "joints slip at {points} point{}: `reduction_error` holds for forces up to {}, not for the higher \
-             harmonics of friction",
-            if *points == 1 { "" } else { "s" },
-            hertz(*up_to)
-        );
+        let slips = |joints: &str| {
+            format!(
+                "{joints} slip at {points} point{}: `reduction_error` holds for forces up to {}, not for the higher \
+                 harmonics of friction",
+                plural_suffix(*points),
+                hertz(*up_to)
+            )
+        };
         let twice = hertz(2.0 * up_to);
         match again {
             None => format!(
-                "J{}. Amplitudes may have an error of several percent if a harmonic excites a lightly damped mode, \
+                "{}. Amplitudes may have an error of several percent if a harmonic excites a lightly damped mode, \
                  if a joint is rigid or stiff, or if a joint is at the place of the excitation. Compare with \
                  reduce = {{ up_to = \"{twice}\" }} or with reduce = false.",
-                &slips[1..]
+                slips("Joints")
             ),
             Some(BasisDifference { error, place, point_text: at, solved_points: of, coordinates, up_to }) => {
                 let some = if *of == 1 { "one of them was".to_owned() } else { format!("{of} of them were") };
@@ -153,10 +156,11 @@ impl SlipReductionCheck {
                 // warning with advice.
                 match *error > 0.01 {
                     true => format!(
-                        "{warning}{slips}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
+                        "{warning}{}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
+                        slips("joints"),
                         hertz(*up_to)
                     ),
-                    false => format!("J{}; {solved}.", &slips[1..]),
+                    false => format!("{}; {solved}.", slips("Joints")),
                 }
             }
         }

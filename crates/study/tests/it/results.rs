@@ -475,8 +475,8 @@ kind = "shooting"
     assert!(notes.iter().any(|note| note.contains("`j0`") && note.contains("sticks permanently")), "{notes:?}");
 }
 
-/// Of many places, the figure of an orbit shows those with the largest range; the nodes of a
-/// contact only if there is nothing else.
+/// The figure of an orbit shows the 12 places with the largest range. It shows nodes of contacts
+/// only if no other place is observed.
 #[test]
 fn an_orbit_shows_few_curves() {
     let oscillator = |name: &str, force: f64| {

@@ -175,7 +175,7 @@ pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Resu
         }
     }
     if pairs.is_empty() {
-        let length = |mesh: f64| quantity_text(mesh * source.length, Some(Dimension::LENGTH));
+        let length = |in_mesh: f64| quantity_text(in_mesh * source.length, Some(Dimension::LENGTH));
         let (message, help) = match nearest.is_finite() {
             true => (
                 format!(

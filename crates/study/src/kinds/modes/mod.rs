@@ -101,8 +101,8 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
     let mass_places = model.masses.iter().map(|mass| mass.places().len());
     let masses = mass_places.chain(model.bodies.iter().map(|body| body.directions.len())).sum::<usize>() as u64;
     if number > masses && model.substructure.is_none() {
-        let plural = plural_suffix(masses as usize);
-        let message = format!("there is no mode {number}: the structure has {masses} degree{} of freedom", plural);
+        let degrees = format!("{masses} degree{} of freedom", plural_suffix(masses as usize));
+        let message = format!("there is no mode {number}: the structure has {degrees}");
         return Err(KeyError::new("mode", message, "modes count from 1, by ascending frequency"));
     }
     Ok(())

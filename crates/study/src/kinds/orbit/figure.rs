@@ -4,8 +4,8 @@ use crate::results::dataset::{Axis, Figure, Panel, Series};
 use crate::results::draw_panels;
 use crate::results::drawing::{CaseRows, FigureInput, MAX_PANELS, join_title, largest, numbers};
 use crate::syntax::format::{format_hertz, prefixed_unit};
+use std::collections::BTreeSet;
 use std::ops::Range;
-use stickslip::model::System;
 
 /// Returns the indices of the curves with the largest range, ascending.
 fn largest_ranges(curves: &[Vec<f64>]) -> Vec<usize> {
@@ -22,10 +22,10 @@ fn largest_ranges(curves: &[Vec<f64>]) -> Vec<usize> {
 
 /// Returns true for a direction of a node of a contact between faces, such as `pad_71_a.n` of the
 /// joint `pad_71`.
-fn is_contact_node(direction: &str, system: &System) -> bool {
+fn is_contact_node(direction: &str, joints: &BTreeSet<&str>) -> bool {
     let place = direction.split('.').next().unwrap_or_default();
     let joint = place.strip_suffix("_a").or_else(|| place.strip_suffix("_b"));
-    joint.is_some_and(|name| system.joints().iter().any(|joint| joint.name() == name))
+    joint.is_some_and(|name| joints.contains(name))
 }
 
 /// Draws displacements of the places and forces of the joints over time: two panels per orbit.
@@ -36,6 +36,7 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
     let Some(frequencies) = motion.numbers("frequency_Hz") else { return Figure::default() };
     let times_of = |rows: Range<usize>| numbers(motion, "time_s", rows);
     let longest = times_of(0..motion.rows()).into_iter().fold(0.0, f64::max);
+    let joint_names: BTreeSet<&str> = system.joints().iter().map(|joint| joint.name()).collect();
     let orbit_panels = |title: &str, rows: Range<usize>| {
         let times = times_of(rows.clone());
         // draws in one panel share one unit
@@ -66,9 +67,9 @@ pub(super) fn draw(drawing: &FigureInput<'_>) -> Figure {
         let mut panels = Vec::new();
         if !system.places().is_empty() {
             let shown = drawing.displacements(&system);
-            let own = |name: &&str| !is_contact_node(name, &system);
             let all = || shown.iter().map(|(name, _)| name.as_str());
-            let names = if all().any(|name| own(&name)) { all().filter(own).collect() } else { all().collect() };
+            let own: Vec<&str> = all().filter(|name| !is_contact_node(name, &joint_names)).collect();
+            let names = if own.is_empty() { all().collect() } else { own };
             panels.push(panel("displacement", drawing.unit("m"), names, "displacement_m", 0));
         }
         if !system.joints().is_empty() {
