@@ -77,8 +77,9 @@ impl BidirectionalSweep {
     }
 
     /// Sweeps the points in reverse, beginning at the last one with an orbit that is found
-    /// without initial guess. Returns the orbits that differ from the forward sweep, in the
-    /// order of the forward sweep. Ends early if `stop` is true.
+    /// without initial guess, or with that of the forward sweep if none is found. Returns the
+    /// orbits that differ from the forward sweep, in the order of the forward sweep. Ends early if
+    /// `stop` is true.
     ///
     /// # Errors
     /// The method does not support the system.
@@ -91,7 +92,7 @@ impl BidirectionalSweep {
         let Some(last) = self.points.last() else { return Ok(Vec::new()) };
         let mut solver = solver_with_alternatives(method, system)?;
         // A search without initial guess can find another orbit than the forward sweep.
-        let seed = solver.orbit(last.omega).ok().map(|orbit| orbit.seed());
+        let seed = solver.orbit(last.omega).ok().map(|orbit| orbit.seed()).or_else(|| last.seed.clone());
         let mut omegas = self.points.iter().rev().map(|point| point.omega);
         let mut others = Vec::new();
         reverse_sweep(method, system, seed, &mut omegas, stop, &mut |orbit| {

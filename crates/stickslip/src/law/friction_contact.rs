@@ -108,7 +108,9 @@ impl Law for FrictionContact {
         Some(Arc::new(FrictionContact { friction: factor * self.friction, ..*self }))
     }
     fn closed_stiffness(&self) -> Option<Vec<f64>> {
-        Some((0..self.tangents).map(|_| self.tangential).chain([self.normal]).collect())
+        // faces without friction never stick
+        let tangential = if self.friction > 0.0 { self.tangential } else { 0.0 };
+        Some((0..self.tangents).map(|_| tangential).chain([self.normal]).collect())
     }
     /// The slip limit at zero displacement; infinite without a preload or friction.
     fn force_scale(&self) -> f64 {

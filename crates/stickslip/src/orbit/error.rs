@@ -84,8 +84,8 @@ pub enum IntegrationError {
     },
     /// Integration with equal steps does not reach the tolerance, however short the steps.
     #[error(
-        "the estimated error with {steps} steps is {estimate:.1e}, above the tolerance {tolerance:.1e}; raise the \
-         tolerance, or reduce stiffnesses that are far above the others"
+        "the estimated error with {steps} steps is {estimate:.1e}, above the tolerance {tolerance:.1e}; raise \
+         `tolerance` of method `transient`, or reduce stiffnesses that are far above the others"
     )]
     Unresolved {
         /// Number of steps of the finest attempt.
@@ -366,6 +366,8 @@ pub enum ObservedMotion {
     Drifts {
         /// The place with the largest drift.
         place: Box<str>,
+        /// True for a rotation, whose speed is in rad/s, load in N m and spring in N m/rad.
+        is_rotation: bool,
         /// Number of periods of this drift.
         periods: u32,
         /// Its mean speed, m/s, negative against its direction.
@@ -414,12 +416,15 @@ impl std::fmt::Display for ObservedMotion {
             ObservedMotion::Repeats { periods } => {
                 write!(f, "repeats after {periods} periods of the excitation: set the option `period = {periods}`")
             }
-            ObservedMotion::Drifts { place, periods, speed, load, spring, joint, open_fraction } => {
-                let speed = speed_text(*speed);
-                write!(f, "drifts: `{place}` moves at {speed} over {periods} periods, ")?;
+            ObservedMotion::Drifts { place, is_rotation, periods, speed, load, spring, joint, open_fraction } => {
+                let (verb, speed, force, unit, of_spring) = match is_rotation {
+                    true => ("turns", format!("{speed:.3} rad/s"), "moment", "N m", "N m/rad"),
+                    false => ("moves", speed_text(*speed), "force", "N", "N/m"),
+                };
+                write!(f, "drifts: `{place}` {verb} at {speed} over {periods} periods, ")?;
                 match *load {
                     0.0 => write!(f, "pushed by its contacts alone")?,
-                    load => write!(f, "under a constant force of {load:.3} N along it")?,
+                    load => write!(f, "under a constant {force} of {load:.3} {unit} along it")?,
                 }
                 if *open_fraction >= 1.0 {
                     return write!(
@@ -431,7 +436,7 @@ impl std::fmt::Display for ObservedMotion {
                 }
                 write!(
                     f,
-                    "{}; hold it by a weak spring along this direction ({spring:.1e} N/m hardly changes the \
+                    "{}; hold it by a weak spring along this direction ({spring:.1e} {of_spring} hardly changes the \
                      vibration), increase the normal loads, or add damping",
                     apart(joint, *open_fraction)
                 )

@@ -65,7 +65,8 @@ pub struct Evidence {
     /// The algorithm that found the orbit: the method's name, or the successful search of harmonic
     /// balance.
     ///
-    /// These are `newton`, `interior-points`, `proximal-points`, `slip-limit-homotopy`, and
+    /// These are `newton`, `interior-points`, `proximal-points`, `slip-limit-homotopy`,
+    /// `growing-vibration`, where the excitation grows and stuck joints keep their history, and
     /// `time-integration`, where Newton's method starts from a motion that was followed in time. If
     /// several searches contributed, this is the last one that is not `newton`.
     pub found_by: &'static str,

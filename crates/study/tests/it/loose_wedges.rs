@@ -174,3 +174,79 @@ frequency = ["120 Hz", "150 Hz", "165 Hz", "175.5 Hz"]
         assert!((found / expected - 1.0).abs() < 5e-5, "{found} {expected}");
     }
 }
+
+/// A damper slips on both platforms while its vibration grows, and then sticks. No prescribed motion
+/// of each contact alone, from static equilibrium, ends in this state. The vibration is that of the
+/// structure with stuck contacts, with and without a neighbouring orbit.
+#[test]
+fn a_damper_that_slips_into_stick_vibrates_as_the_stuck_structure() {
+    let found = dataset(
+        r#"schema = 1
+[parameters]
+load = "12 g * 0.3 m * (2000 rpm/(1 rad))^2"
+[[mass]]
+repeat = { i = 2 }
+name = "platform{i}"
+mass = "0.35 kg"
+directions = ["x", "z"]
+[[body]]
+name = "damper"
+mass = "12 g"
+inertia = "150 g mm^2"
+directions = ["x", "z"]
+[[place]]
+repeat = { i = 2 }
+name = "side{i}"
+of = "damper"
+offset = ["(2*i - 3) * 5 mm", 0, "2.5 mm"]
+normal = ["(2*i - 3)*sin(35 deg)", 0, "cos(35 deg)"]
+[[place]]
+repeat = { i = 2 }
+name = "seat{i}"
+of = "platform{i}"
+normal = ["(2*i - 3)*sin(35 deg)", 0, "cos(35 deg)"]
+[[spring]]
+repeat = { i = 2 }
+between = ["platform{i}.x", "ground"]
+stiffness = "(480 + 20*i) * 1 N/mm"
+damping = "3 N s/m"
+[[spring]]
+repeat = { i = 2 }
+between = ["platform{i}.z", "ground"]
+stiffness = "8 N/um"
+damping = "30 N s/m"
+[[joint]]
+repeat = { i = 2 }
+name = "face{i}"
+between = ["side{i}", "seat{i}"]
+law = { kind = "friction-contact", tangential = "15 N/um", normal = "20 N/um", friction = 0.35, preload = "load/(2*cos(35 deg))" }
+[[force]]
+on = "damper.z"
+amplitude = "load"
+harmonic = 0
+[[force]]
+repeat = { i = 2 }
+on = "platform{i}.z"
+amplitude = "-load/2"
+harmonic = 0
+[[force]]
+repeat = { i = 2 }
+on = "platform{i}.x"
+amplitude = "(3 - 2*i) * 20 N"
+[study]
+kind = "response"
+frequency = ["185 Hz", "189 Hz"]
+[figure]
+references = true
+[method]
+kind = "harmonic-balance"
+"#,
+    );
+    let expected = [1.637_230_346_690_045e-6, 2.568_436_078_256_65e-6];
+    for (found, expected) in numbers(&found, "curve", "platform1_x_amplitude_m").iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
+    // constant forces do not keep a linear structure from having amplitudes
+    let free = numbers(&found, "references", "platform1_x_free_amplitude_m");
+    assert!(free.iter().all(|amplitude| amplitude.is_finite()), "{free:?}");
+}

@@ -176,11 +176,10 @@ fn a_roof_damper_has_its_orbits_at_all_speeds() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
-/// Newton's method does not reach an orbit from a guess, but it does from the motion of a time
-/// integration. The second method finds an orbit that depends on the history,
-/// and reports how much.
+/// Newton's method does not reach an orbit from a guess, but it does with a vibration that grows.
+/// The second method finds an orbit that depends on the history, and reports how much.
 #[test]
-fn orbits_are_found_from_a_time_integration_and_by_the_second_method() {
+fn orbits_are_found_by_a_growing_vibration_and_by_the_second_method() {
     let orbit_of = |damper: &LooseDamper, hertz: f64| {
         let away = |omega: &&f64| (*omega / TAU - hertz).abs();
         let omega = *damper.frequencies.iter().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap();
@@ -188,7 +187,7 @@ fn orbits_are_found_from_a_time_integration_and_by_the_second_method() {
     };
     let damper = loose_damper(66);
     let (omega, orbit) = orbit_of(&damper, 240.838);
-    assert_eq!(orbit.evidence.found_by, "time-integration");
+    assert_eq!(orbit.evidence.found_by, "growing-vibration");
     let amplitudes: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
     let distance = apart(&damper, &amplitudes, &damper.settled(omega, COURSES[1]).unwrap());
     let error = orbit.evidence.error_estimate.unwrap();

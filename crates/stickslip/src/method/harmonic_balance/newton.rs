@@ -199,7 +199,7 @@ impl Discretization {
         let mut coarse_derivatives = same_derivatives;
         let mut convergence = Convergence::new(first);
         // the proximal point method finds forces that do not settle
-        let patience = if ports.has_forces() { newton.stagnation_iterations } else { settings.iterations };
+        let patience = if ports.has_forces() { newton.stagnation_iterations } else { settings.patience };
         for _ in 0..settings.iterations {
             interrupt::check();
             if convergence.is_solved(solved) || self.is_budget_used(ports) || convergence.stagnates_beyond(patience) {

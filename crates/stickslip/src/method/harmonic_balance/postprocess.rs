@@ -313,8 +313,10 @@ fn sample_joints(
         for (i, (contact, force)) in contact.iter_mut().zip(force.iter()).enumerate() {
             let now: [f64; MAX_DIRECTIONS] = std::array::from_fn(|a| velocity.get(a).map_or(0.0, |v| v[i]));
             *contact = joint.law().contact_state(&now[..axes.len()], &force[..axes.len()]);
-            // a joint that dissipates nothing only touches its limit, up to which it slipped before
-            if contact.slips() && !dissipates {
+            // A joint that dissipates nothing only touches its limit, up to which it slipped
+            // before, unless it has no friction force at all.
+            let has_friction = (0..axes.len()).any(|a| joint.law().normal() != Some(a) && force[a] != 0.0);
+            if contact.slips() && !dissipates && has_friction {
                 *contact = Contact::Stick;
             }
         }

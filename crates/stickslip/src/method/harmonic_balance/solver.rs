@@ -1,6 +1,6 @@
 //! The solver of harmonic balance: one orbit after another, with warm starts.
 
-use super::aft::Ports;
+use super::aft::{Ports, StaticState};
 use super::budget::{WorkShare, is_affordable};
 use super::dynamics::banded::{self, BandedForm};
 use super::dynamics::linear_dynamics::LinearDynamics;
@@ -63,6 +63,8 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) orbit_check: OrbitCheck,
     /// False for orbits that no time integration checks.
     is_checked: bool,
+    /// History of the last orbit, if a growing vibration found it. The next search begins there.
+    pub(super) grown_history: Option<Vec<StaticState>>,
     /// State in static equilibrium: displacements, velocities (zero), internal states of the
     /// joints.
     pub(super) static_state: Option<Vec<f64>>,
@@ -80,9 +82,6 @@ pub(super) struct HarmonicBalanceSolver {
     /// Work of the present point that its discretizations do not count, as a fraction of the
     /// default limit: integrations in time, and searches before them.
     pub(super) earlier_work: f64,
-    /// By highest harmonic, in systems with many contacts: the last solution whose error was
-    /// estimated, and the finer solution with twice the harmonics.
-    pub(super) comparisons: BTreeMap<usize, [HarmonicSolution; 2]>,
 }
 
 impl HarmonicBalanceSolver {
@@ -132,6 +131,7 @@ impl HarmonicBalanceSolver {
             orbit_check: OrbitCheck::new(&system),
             is_checked: true,
             system,
+            grown_history: None,
             static_state: static_start,
             discretizations: BTreeMap::new(),
             point_limit: 1.0,
@@ -139,7 +139,6 @@ impl HarmonicBalanceSolver {
             failed_frequencies: Vec::new(),
             time_integrations: 0,
             earlier_work: 0.0,
-            comparisons: BTreeMap::new(),
         })
     }
 
@@ -242,7 +241,6 @@ impl HarmonicBalanceSolver {
         }
         self.steep = true;
         self.discretizations.clear();
-        self.comparisons.clear();
         self.solve_with_present_samples(top, omega, Some((top, &motion)))
     }
 
@@ -387,7 +385,7 @@ impl HarmonicBalanceSolver {
     }
 
     /// Returns the series of a seed as warm start, if it fits this system.
-    fn series_of(&self, seed: &Seed) -> Option<(usize, HarmonicSolution)> {
+    pub(super) fn series_of(&self, seed: &Seed) -> Option<(usize, HarmonicSolution)> {
         let series = seed.series.as_deref()?;
         let length = self.ports.count() * self.harmonic_set.up_to(series.highest_harmonic).len();
         (series.motions.len() == length).then(|| (series.highest_harmonic, HarmonicSolution::from_series(series)))
@@ -395,17 +393,27 @@ impl HarmonicBalanceSolver {
 
     /// Finds the orbit of a request within the work limit that is set.
     fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
+        if self.grown_history.is_some()
+            && let Some(orbit) = self.solve_with_growing_vibration(request, omega)
+        {
+            return Ok(orbit);
+        }
         let series = request.seed.and_then(|seed| self.series_of(seed));
         if let (ErrorEstimate::Skipped, Some((top, motion))) = (request.estimate, &series) {
             // the number of harmonics of the neighbouring orbit is sufficient
-            return self.solve_nearby(*top, omega, motion);
+            let found = self.solve_nearby(*top, omega, motion);
+            return found.or_else(|error| self.solve_with_growing_vibration(request, omega).ok_or(error));
         }
         // without a series, a time integration begins at the seed's state
         let warm = series.or_else(|| self.guess_from_state(&request.seed?.state, omega));
         let mut found = match self.converge(self.first, omega, warm) {
-            Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => self
-                .solve_or_classify(self.first, omega)
-                .unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error)),
+            Err(error @ (OrbitError::NotConverged { .. } | OrbitError::Drift { .. })) => {
+                if let Some(orbit) = self.solve_with_growing_vibration(request, omega) {
+                    return Ok(orbit);
+                }
+                self.solve_or_classify(self.first, omega)
+                    .unwrap_or_else(|| self.solve_after_integration(omega).ok_or(error))
+            }
             // a longer series was not reached from the shorter one
             Err(error @ OrbitError::Truncation { harmonics, needed: None, .. }) => {
                 let longer = self.harmonic_set.doubled(harmonics * self.periods);

@@ -39,6 +39,12 @@ struct SettlingSettings {
     settling_ratio: f64,
     /// Displacement over the window, in amplitudes, above which a place drifts.
     drift_distance: f64,
+    /// `drift_distance` of a slow drift, in amplitudes of the place. It is above rounding.
+    creep_distance: f64,
+    /// Largest relative difference of the displacements in both halves of the window, in a drift
+    /// and in a slow one. A transient with a decay time of 300 periods has 5 %.
+    drift_evenness: f64,
+    creep_evenness: f64,
     /// Instants of the last period at which the contacts are sampled.
     instants: usize,
 }
@@ -55,6 +61,9 @@ impl Default for SettlingSettings {
             equal_distance: 2e-3,
             settling_ratio: 0.9,
             drift_distance: 2.0,
+            creep_distance: 1e-4,
+            drift_evenness: 1.0,
+            creep_evenness: 0.05,
             instants: 128,
         }
     }
@@ -63,6 +72,8 @@ impl Default for SettlingSettings {
 /// A motion that was integrated.
 pub(crate) struct ClassifiedMotion {
     pub course: ObservedMotion,
+    /// A drift that is so slow that the motion counts as settled.
+    pub creep: Option<ObservedMotion>,
     /// The last period.
     pub path: Arc<dyn Path>,
     /// The state at the end.
@@ -119,11 +130,14 @@ pub(crate) fn classify_motion(
         let path = flow.path(&Arc::new(system.clone()), Symmetry::FullPeriod, period);
         let samples: Vec<_> =
             (0..settings.instants).map(|i| path.sample(period * i as f64 / settings.instants as f64)).collect();
-        let course = classified(system, omega, (count, returns.make_contiguous()), &samples);
+        let returns: &[Vec<f64>] = returns.make_contiguous();
+        let course = classified(system, omega, (count, returns), &samples);
         let may_settle = matches!(course, ObservedMotion::Settling { .. } | ObservedMotion::Irregular { .. });
         next *= 2;
         if !may_settle || next > settings.most_periods || multiplications(next) > most_multiplications {
-            return Some(ClassifiedMotion { course, path, state, multiplications: multiplications(count) });
+            let creep =
+                if course == ObservedMotion::Settles { slow_drift(system, omega, returns, &samples) } else { None };
+            return Some(ClassifiedMotion { course, creep, path, state, multiplications: multiplications(count) });
         }
     }
 }
@@ -136,7 +150,7 @@ fn classified(
 ) -> ObservedMotion {
     let settings = SettlingSettings::default();
     let n = system.dofs();
-    // displacements, and velocities over Ω
+    // displacements, and velocities divided by Ω
     let unit = |i: usize| if i < n { 1.0 } else { omega };
     let velocities = returns.iter().flat_map(|state| &state[n..]).chain(samples.iter().flat_map(|now| &now.velocity));
     let swing = velocities.fold(0.0, |m: f64, v| m.max(v.abs() / omega));
@@ -155,41 +169,75 @@ fn classified(
     {
         return ObservedMotion::Settling { periods };
     }
+    let (joint, open_fraction) = most_open_joint(system, samples);
+    // points of a body drift with it; a body comes before its points
+    let displacements = system.place_axes().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
+    let drifts = displacements.map(|(axis, place)| (drift(axis, returns, settings.drift_evenness), (axis, place)));
+    let farthest = drifts.reduce(|a, b| if b.0.abs() > 1.01 * a.0.abs() { b } else { a });
+    match farthest {
+        Some((drift, along)) if drift.abs() > settings.drift_distance * swing => {
+            drifting(system, omega, along, (drift, last), (joint, open_fraction))
+        }
+        _ => ObservedMotion::Irregular { periods, joint, open_fraction },
+    }
+}
+
+/// Returns the fastest drift of a motion that counts as settled, relative to the vibration of each
+/// place; `None` if there is none.
+fn slow_drift(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[Sample]) -> Option<ObservedMotion> {
+    let settings = SettlingSettings::default();
+    let places = system.place_axes().iter().zip(system.places());
+    let relative = places.map(|(axis, place)| {
+        let swing = samples.iter().map(|now| axis.component(&now.velocity).abs() / omega).fold(0.0, f64::max);
+        let drift = drift(axis, returns, settings.creep_evenness);
+        (if swing > 0.0 { drift.abs() / swing } else { 0.0 }, drift, (axis, place))
+    });
+    let (size, drift, along) = relative.reduce(|a, b| if b.0 > 1.01 * a.0 { b } else { a })?;
+    let (last, open) = (returns.len() - 1, most_open_joint(system, samples));
+    (size > settings.creep_distance).then(|| drifting(system, omega, along, (drift, last), open))
+}
+
+/// Returns the displacement along an axis over all returns, m (rad for a rotation); zero unless
+/// both halves of the returns have the same direction and, within `evenness`, the same size.
+fn drift(axis: &Axis, returns: &[Vec<f64>], evenness: f64) -> f64 {
+    let last = returns.len() - 1;
+    let at = |k: usize| axis.component(&returns[k]);
+    let halves = [at(last / 2) - at(0), at(last) - at(last / 2)];
+    let sum = halves[0] + halves[1];
+    let is_steady = halves[0] * halves[1] > 0.0 && (halves[0] - halves[1]).abs() <= 0.5 * evenness * sum.abs();
+    if is_steady { sum } else { 0.0 }
+}
+
+/// Returns the joint that is separated for the largest fraction of the samples, with this fraction.
+fn most_open_joint(system: &System, samples: &[Sample]) -> (String, f64) {
     let open = |j: usize| {
         samples.iter().filter(|now| now.joints[j].contact == Contact::Open).count() as f64 / samples.len() as f64
     };
     let widest = (0..system.joints().len()).map(|j| (j, open(j))).fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
-    let joint = system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned());
-    let share = widest.1;
-    // a drift has the same direction in both halves of the window
-    let moved =
-        |axis: &Axis, from: usize, to: usize| axis.component(&returns[to][..n]) - axis.component(&returns[from][..n]);
-    let displacements = system.place_axes().iter().zip(system.places()).filter(|(axis, _)| !axis.is_rotation());
-    let farthest = displacements.map(|(axis, place)| {
-        let halves = [moved(axis, 0, last / 2), moved(axis, last / 2, last)];
-        let steady =
-            halves[0] * halves[1] > 0.0 && halves[0].abs().min(halves[1].abs()) > 0.25 * (halves[0] + halves[1]).abs();
-        (if steady { halves[0] + halves[1] } else { 0.0 }, Some((axis, place)))
-    });
-    // points of a body drift with it; a body comes before its points
-    let farthest = farthest.fold((0.0, None), |a: (f64, _), b| if b.0.abs() > 1.01 * a.0.abs() { b } else { a });
-    if let (drift, Some((axis, place))) = farthest
-        && drift.abs() > settings.drift_distance * swing
-    {
-        let squares: f64 = axis.rows().iter().map(|(_, weight)| weight * weight).sum();
-        let mass = axis.rows().iter().map(|(row, weight)| weight * weight * system.structure().diagonal_mass(*row));
-        let mass = mass.sum::<f64>() / (squares * squares);
-        return ObservedMotion::Drifts {
-            place: place.as_str().into(),
-            periods: last as u32,
-            load: axis.component(system.constant_forces().as_slice()) / squares,
-            speed: drift * omega / (last as f64 * TAU),
-            spring: 0.01 * mass * omega * omega,
-            joint: joint.into(),
-            open_fraction: share,
-        };
+    (system.joints().get(widest.0).map_or_else(String::new, |joint| joint.name().to_owned()), widest.1)
+}
+
+/// Describes a drift over some periods.
+fn drifting(
+    system: &System,
+    omega: f64,
+    (axis, place): (&Axis, &String),
+    (drift, periods): (f64, usize),
+    (joint, open_fraction): (String, f64),
+) -> ObservedMotion {
+    let squares: f64 = axis.rows().iter().map(|(_, weight)| weight * weight).sum();
+    let mass = axis.rows().iter().map(|(row, weight)| weight * weight * system.structure().diagonal_mass(*row));
+    let mass = mass.sum::<f64>() / (squares * squares);
+    ObservedMotion::Drifts {
+        place: place.as_str().into(),
+        is_rotation: axis.is_rotation(),
+        periods: periods as u32,
+        load: axis.component(system.constant_forces().as_slice()) / squares,
+        speed: drift * omega / (periods as f64 * TAU),
+        spring: 0.01 * mass * omega * omega,
+        joint: joint.into(),
+        open_fraction,
     }
-    ObservedMotion::Irregular { periods, joint, open_fraction: share }
 }
 
 #[cfg(test)]
@@ -269,6 +317,16 @@ mod tests {
         assert_eq!(third, ObservedMotion::Repeats { periods: 3 });
         let slow = classified(&system, OMEGA, (settings.periods, &returns(&|k| (-0.02 * k as f64).exp())), &samples);
         assert_eq!(slow, ObservedMotion::Settling { periods: settings.periods });
+        // a thousandth of the amplitude per period counts as settled; if it goes on, the block
+        // creeps
+        let creeping = returns(&|k| 1e-3 * k as f64);
+        assert_eq!(classified(&system, OMEGA, (settings.periods, &creeping), &samples), ObservedMotion::Settles);
+        let Some(ObservedMotion::Drifts { speed, .. }) = slow_drift(&system, OMEGA, &creeping, &samples) else {
+            panic!("no drift")
+        };
+        assert!((speed / (1e-3 * OMEGA / TAU) - 1.0).abs() < 1e-9, "{speed}");
+        let decaying = returns(&|k| 1e-3 * (-0.02 * k as f64).exp());
+        assert_eq!(slow_drift(&system, OMEGA, &decaying, &samples), None);
         let none = classified(&system, OMEGA, (settings.periods, &returns(&|k| ((k * k) as f64).sin())), &samples);
         assert!(matches!(none, ObservedMotion::Irregular { periods, .. } if periods == settings.periods), "{none}");
     }

@@ -68,18 +68,17 @@ pub(super) fn references(work: &UnitTask<'_>, omegas: &[f64]) -> (TableBuilder, 
     let amplitudes = |orbit: Orbit| orbit.places.iter().map(|place| place.amplitude()).collect::<Vec<f64>>();
     let mut follow = |reference: LinearReference| -> Option<Vec<Option<Vec<f64>>>> {
         // the check of the study reports laws without a reference
-        let model = reference.model(&prepared.case.model).ok()?;
+        let mut model = reference.model(&prepared.case.model).ok()?;
+        // Constant forces only move the means. A structure that its joints alone hold against them
+        // has amplitudes without them.
+        model.forces.iter_mut().filter(|force| force.harmonic == 0).for_each(|force| force.amplitude = 0.0);
         let found = model.assemble().map_err(|error| error.to_string()).and_then(|system| {
             let mut solver = solver(prepared, &system).map_err(|error| error.to_string())?;
             Ok(omegas.iter().map(|omega| solver.orbit(*omega).map(amplitudes)).collect::<Vec<_>>())
         });
         let orbits = found.map_err(|why| absent.push(format!("{WARNING}{}", reference.no_reference(&why)))).ok()?;
         if let (true, Some(Err(error))) = (orbits.iter().all(Result::is_err), orbits.first()) {
-            absent.push(match reference {
-                // a linear structure that no spring holds; usual for a damper
-                LinearReference::Free => reference.no_reference("its joints alone hold some motion of the structure"),
-                LinearReference::Stuck => format!("{WARNING}{}", reference.no_reference(&error.to_string())),
-            });
+            absent.push(format!("{WARNING}{}", reference.no_reference(&error.to_string())));
         }
         Some(orbits.into_iter().map(Result::ok).collect())
     };

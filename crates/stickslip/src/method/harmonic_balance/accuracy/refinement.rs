@@ -86,7 +86,6 @@ impl HarmonicBalanceSolver {
     ) -> Result<(f64, HarmonicSolution), SolveError> {
         let settings = RefinementSettings::default();
         let double = self.harmonic_set.doubled(top);
-        let start = self.refined_guess(top, motion);
         let (few, many) = (self.harmonic_set.up_to(top), self.harmonic_set.up_to(double));
         let coarse = equations::with_harmonics(motion, &few, &many);
         let states = self.discretizations.get(&top).map(|discretization| discretization.search.states.clone());
@@ -98,19 +97,16 @@ impl HarmonicBalanceSolver {
         } else {
             StopCriterion::Share(settings.estimate_reduction)
         };
-        let better = match finer.solve_twice_the_samples(&self.ports, omega, &start, &coarse, states.as_deref()) {
+        let better = match finer.solve_twice_the_samples(&self.ports, omega, &coarse, states.as_deref()) {
             Some(better) => better,
             None => {
                 let settings = SearchSettings { goal, ..SearchSettings::default() };
-                let solved = finer.solve_with(&self.ports, omega, start, settings)?;
+                let solved = finer.solve_with(&self.ports, omega, coarse.clone(), settings)?;
                 finer
                     .correct_twice_the_samples(&self.ports, omega, &solved, &coarse)
                     .map_or(solved, |(motion, _)| motion)
             }
         };
-        if finer.uses_krylov() {
-            self.comparisons.insert(top, [motion.clone(), better.clone()]);
-        }
         let y = self.places(double, omega, &better)?;
         let finer = self.discretizations.get_mut(&double).expect("solved");
         let coarse = ComparedSolution { harmonics: &few, places: x, along: &motion.c };
@@ -124,25 +120,6 @@ impl HarmonicBalanceSolver {
             (finer, &better, &y),
         );
         Ok((error, better))
-    }
-
-    /// Returns an initial guess with twice the harmonics.
-    ///
-    /// It is the solution plus the correction that the finer series made at the last
-    /// comparison.
-    pub(crate) fn refined_guess(&self, top: usize, motion: &HarmonicSolution) -> HarmonicSolution {
-        let harmonics = |top: usize| self.harmonic_set.up_to(top);
-        let (few, many) = (harmonics(top), harmonics(self.harmonic_set.doubled(top)));
-        let mut start = equations::with_harmonics(motion, &few, &many);
-        if let Some([coarse, fine]) = self.comparisons.get(&top) {
-            let coarse = equations::with_harmonics(coarse, &few, &many);
-            let add = |to: &mut [Complex64], coarse: &[Complex64], fine: &[Complex64]| {
-                to.iter_mut().zip(fine.iter().zip(coarse)).for_each(|(to, (fine, coarse))| *to += fine - coarse);
-            };
-            add(&mut start.c, &coarse.c, &fine.c);
-            add(&mut start.force, &coarse.force, &fine.force);
-        }
-        start
     }
 
     /// Returns the first doubled number of harmonics that may meet the tolerance with rigid

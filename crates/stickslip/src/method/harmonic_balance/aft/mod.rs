@@ -353,6 +353,13 @@ impl Ports {
         }
     }
 
+    /// Sets other states from which the history of the joints begins, one for each port. For a
+    /// ring, `states` are those of the first sector.
+    pub fn set_history(&mut self, states: &[StaticState]) {
+        let of_ports = self.list.iter_mut().zip(states.iter().cycle());
+        of_ports.for_each(|(port, state)| port.static_state.clone_from(state));
+    }
+
     /// Returns the static states of all ports.
     pub fn static_states(&self) -> Vec<StaticState> {
         self.list.iter().map(|port| port.static_state.clone()).collect()

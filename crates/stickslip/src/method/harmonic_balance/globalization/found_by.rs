@@ -1,7 +1,7 @@
 //! The search that found a solution.
 
 /// The search that found a solution, in the order in which the searches are tried. All but the
-/// first and the last are rows of [`FALLBACKS`](super::FALLBACKS).
+/// first and the last two are rows of [`FALLBACKS`](super::FALLBACKS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum FoundBy {
     /// Newton's method from an initial guess or a warm start.
@@ -13,6 +13,8 @@ pub(crate) enum FoundBy {
     ProximalPoints,
     /// Homotopy in the slip limits, from limits at which all joints stick.
     SlipLimitHomotopy,
+    /// Newton's method with the history of a vibration that grows slowly.
+    GrowingVibration,
     /// Newton's method from a time integration.
     TimeIntegration,
 }
@@ -26,6 +28,7 @@ impl FoundBy {
             FoundBy::InteriorPoints => "interior-points",
             FoundBy::ProximalPoints => "proximal-points",
             FoundBy::SlipLimitHomotopy => "slip-limit-homotopy",
+            FoundBy::GrowingVibration => "growing-vibration",
             FoundBy::TimeIntegration => "time-integration",
         }
     }

@@ -2,8 +2,9 @@
 //!
 //! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
 //! [`FALLBACKS`] follow in their order. Each receives the same initial guess; the homotopy ignores
-//! it. If all of them fail, the solver begins once more from a time integration
-//! (`time_start`), which is no row of the table.
+//! it. If all of them fail, the solver lets the vibration grow (`growing_vibration`), and at last
+//! begins from a time integration (`time_start`). These two are no rows of the table, because they
+//! search several times.
 //!
 //! To add a search: its file and `mod` line, one row of [`FALLBACKS`], and a variant of [`FoundBy`]
 //! with its name, which [`Evidence::found_by`](crate::orbit::Evidence::found_by) and the book's
@@ -15,9 +16,11 @@
 //! - `proximal_point`: proximal point method for forces that the equations leave undetermined
 //! - `slip_limit_homotopy`: homotopy in the slip limits
 //! - `time_start`: initial guesses from time integration
+//! - `growing_vibration`: search with a vibration that grows slowly from static equilibrium
 //! - `found_by`: the search that found a solution
 
 pub(super) mod found_by;
+mod growing_vibration;
 pub(super) mod homotopy;
 pub(super) mod interior_point;
 pub(super) mod proximal_point;
@@ -72,6 +75,9 @@ const FALLBACKS: &[Fallback] = &[
 pub(super) struct SearchSettings {
     /// Largest number of Newton iterations. Default 60; 3 to 15 are usual.
     pub iterations: usize,
+    /// Largest number of iterations that do not halve the residual. With forces as unknowns, the
+    /// number of [`NewtonSettings`] applies.
+    pub patience: usize,
     /// Residual at which Newton's method ends. The fallbacks ignore it.
     pub goal: StopCriterion,
     /// True for an orbit between known ones. Only fallbacks that use the guess follow.
@@ -82,6 +88,7 @@ impl Default for SearchSettings {
     fn default() -> Self {
         SearchSettings {
             iterations: NewtonSettings::default().iterations,
+            patience: NewtonSettings::default().iterations,
             goal: StopCriterion::Solved,
             between_orbits: false,
         }
@@ -115,7 +122,8 @@ impl Discretization {
             Ok(()) => return Ok(motion),
             Err(failure) => failure,
         };
-        let near = settings.between_orbits || begin.found_by == FoundBy::TimeIntegration;
+        let near =
+            settings.between_orbits || matches!(begin.found_by, FoundBy::GrowingVibration | FoundBy::TimeIntegration);
         let follows = |fallback: &&Fallback| (fallback.applies)(ports) && (fallback.uses_guess || !near);
         for fallback in FALLBACKS.iter().filter(follows) {
             motion = HarmonicSolution { iterations: motion.iterations, ..begin.clone() };

@@ -70,6 +70,12 @@ impl HarmonicBalanceSolver {
         self.converge(top, omega, Some((top, motion))).ok()
     }
 
+    /// Gives the next search a budget as large as that of a point.
+    pub(super) fn begin_second_search(&mut self) {
+        (self.earlier_work, self.limit) = (self.work_fraction(), None);
+        self.discretizations.values_mut().for_each(Discretization::begin_point);
+    }
+
     /// Returns the state of static equilibrium, or the unloaded state if there is none.
     fn static_state_or_zero(&self) -> Vec<f64> {
         self.static_state.clone().unwrap_or_else(|| vec![0.0; 2 * self.system.dofs()])
@@ -126,14 +132,13 @@ impl HarmonicBalanceSolver {
         }
         let WorkSettings { multiplications: of_search, point, .. } = WorkSettings::default();
         let most = of_search * self.point_limit.min(1.0);
-        let ClassifiedMotion { course, path, state, multiplications } =
+        let ClassifiedMotion { course, creep, path, state, multiplications } =
             classify_motion(&self.system, omega, self.static_state_or_zero(), most)?;
         self.earlier_work += multiplications / (of_search * point.multiplications);
         if matches!(course, ObservedMotion::Settles | ObservedMotion::Settling { .. }) {
             // An orbit exists: searches from its motion get a budget as large as that of a point,
             // whatever the searches that failed have used.
-            (self.earlier_work, self.limit) = (self.work_fraction(), None);
-            self.discretizations.values_mut().for_each(Discretization::begin_point);
+            self.begin_second_search();
             // contacts that open and close may have no solution with few harmonics
             let mut top = top;
             for _ in 0..TimeStartSettings::default().series_lengths {
@@ -150,6 +155,7 @@ impl HarmonicBalanceSolver {
                 top = self.harmonic_set.doubled(top);
             }
         }
+        let course = creep.unwrap_or(course);
         self.failed_frequencies.push((omega, course.clone(), state.clone()));
         no_orbit(course, state)
     }
