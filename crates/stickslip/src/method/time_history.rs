@@ -81,6 +81,9 @@ pub struct TimeHistory {
     pub step: f64,
     /// Velocity over which exact laws are smoothed, m/s; without it, they stay exact.
     pub width: Option<f64>,
+    /// Relative error of the integration. Without it: 1e-9 per step if the steps are controlled,
+    /// and 1e-6 per interval in equal steps.
+    pub tolerance: Option<f64>,
 }
 
 /// The reason why a motion was not computed, or not to its end.
@@ -177,6 +180,7 @@ impl TimeHistory {
     ///     duration: std::f64::consts::TAU,
     ///     step: std::f64::consts::TAU,
     ///     width: None,
+    ///     tolerance: None,
     /// };
     /// let mut last = 0.0;
     /// let system = model.assemble().unwrap();
@@ -228,7 +232,7 @@ impl TimeHistory {
         visitor: &mut dyn FnMut(TimeSample<'_>) -> bool,
     ) -> Result<(), TimeHistoryError> {
         let mut interval = excitation(0.0);
-        let mut flow = TimeHistory::flow(&interval.system, self.width)?;
+        let mut flow = TimeHistory::flow(&interval.system, self.width, self.tolerance)?;
         flow.set_recording(true);
         let mut state = [self.displacement.as_slice(), &self.velocity].concat();
         if state.len() + self.states.len() == flow.states() {
@@ -305,7 +309,7 @@ impl TimeHistory {
             // a sample at the very start needs a short motion behind it
             let length = if since(last) > 0.0 { since(last) } else { 0.5 * reached };
             // a new flow, without memory of the failed attempt
-            let mut flow = TimeHistory::flow(&interval.system, self.width).ok()?;
+            let mut flow = TimeHistory::flow(&interval.system, self.width, self.tolerance).ok()?;
             flow.set_recording(true);
             flow.set_excitation(&interval.system, interval.omega);
             match flow.run_accurately(&mut start.to_vec(), length) {
@@ -325,12 +329,16 @@ impl TimeHistory {
     /// # Errors
     /// Returns [`MethodError`] if no integration takes the system.
     pub fn check(system: &System, width: Option<f64>) -> Result<(), MethodError> {
-        TimeHistory::flow(system, width).map(drop)
+        TimeHistory::flow(system, width, None).map(drop)
     }
 
-    fn flow(system: &System, width: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
-        integrator_choice::integrator(system, width, TOLERANCE, NAME)
-            .map_err(|error| error.with_alternatives(alternatives(system)))
+    fn flow(system: &System, width: Option<f64>, tolerance: Option<f64>) -> Result<Box<dyn Flow>, MethodError> {
+        let mut flow = integrator_choice::integrator(system, width, TOLERANCE, NAME)
+            .map_err(|error| error.with_alternatives(alternatives(system)))?;
+        if let Some(tolerance) = tolerance {
+            flow.set_tolerance(tolerance);
+        }
+        Ok(flow)
     }
 
     /// Returns the excitation frequency of the cycle that begins at `time`.
@@ -395,6 +403,7 @@ mod tests {
                 duration,
                 step: 1.0,
                 width: None,
+                tolerance: None,
             };
             let (mut time, mut cycles) = (0.0, 0.0);
             let rate = (to / from).ln() / duration;
@@ -437,6 +446,7 @@ mod tests {
             duration: 3.0 * TAU / omega,
             step: TAU / omega / 40.0,
             width: None,
+            tolerance: None,
         };
         // the preload pushes against the closing direction
         let static_position = -preload / (k + kn);
@@ -470,6 +480,7 @@ mod tests {
             duration: 3.0 * end,
             step: end / 100.5,
             width: None,
+            tolerance: None,
         };
         let mut count = 0;
         let run = motion.run(&model.assemble().unwrap(), &mut |time, _, sample| {
@@ -524,6 +535,7 @@ mod tests {
             duration: 1.0,
             step: TAU / omega / 64.0,
             width: None,
+            tolerance: None,
         };
         let samples = |motion: &TimeHistory| {
             let mut samples = Vec::new();
@@ -570,6 +582,7 @@ mod tests {
                 duration,
                 step,
                 width: None,
+                tolerance: None,
             };
             let mut motion = Vec::new();
             run_up

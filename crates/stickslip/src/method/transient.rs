@@ -18,7 +18,8 @@ use super::{Method, MethodError, MethodInfo, MethodOption, Solver, WIDTH};
 use crate::dimension::Dimension;
 use crate::model::System;
 
-const NAME: &str = "transient";
+/// Name of the method.
+pub const NAME: &str = "transient";
 
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
@@ -29,7 +30,8 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "estimated relative distance to the orbit at which the motion counts as settled; default 1e-7",
+            doc: "estimated relative distance to the orbit at which the motion counts as settled; default 1e-7; for kind \
+                  `transient`, relative error of the integration",
         },
         MethodOption {
             key: "periods",

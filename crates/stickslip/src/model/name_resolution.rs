@@ -168,7 +168,10 @@ impl Places {
             let places = self.stated.iter().map(|place| place.name.as_str());
             let own = places.filter(|place| place.split_once('.').is_some_and(|(node, _)| node == name));
             let places: Vec<String> = own.map(|place| format!("`{place}`")).collect();
-            let message = format!("`{name}` has several directions; name one of them: {}", places.join(", "));
+            let message = match &places[..] {
+                [place] => format!("`{name}` stands for all of its directions; name the direction: {place}"),
+                _ => format!("`{name}` has several directions; name one of them: {}", places.join(", ")),
+            };
             return Err(ModelError::new(element, key, message));
         }
         let node = name.split_once('.').filter(|(node, _)| self.directions.contains_key(*node));

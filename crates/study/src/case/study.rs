@@ -33,7 +33,7 @@ use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Options};
+use stickslip::method::{self, Options, transient};
 use stickslip::model::{Model, ModelError};
 
 /// A study file, read and checked.
@@ -128,6 +128,13 @@ pub struct MethodChoice {
     pub name: String,
     /// The options that were given, in SI.
     pub options: Options,
+}
+
+impl MethodChoice {
+    /// Returns the relative error of time histories: the `tolerance` of method `transient`.
+    pub(crate) fn time_history_tolerance(&self) -> Option<f64> {
+        self.options.get("tolerance").filter(|_| self.name == transient::NAME).copied()
+    }
 }
 
 /// The value of a varied parameter in one case.

@@ -42,6 +42,9 @@ pub enum ExpectedTime {
         seconds: f64,
         /// The probes in words.
         probes: String,
+        /// True if the probes later in the study were not computed, or a point of them was not
+        /// finished: its points may take longer.
+        is_least: bool,
         /// Computations that the probes do not contain, in words.
         excluded: Option<String>,
     },
@@ -59,8 +62,9 @@ pub enum ExpectedTime {
 impl fmt::Display for ExpectedTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            ExpectedTime::Extrapolated { seconds, probes, excluded } => {
-                write!(f, "{} on one thread", format_estimate(*seconds))?;
+            ExpectedTime::Extrapolated { seconds, probes, is_least, excluded } => {
+                let least = if *is_least && *seconds >= 1.0 { "at least " } else { "" };
+                write!(f, "{least}{} on one thread", format_estimate(*seconds))?;
                 if *seconds >= 1.0 {
                     write!(f, ", from {probes}")?;
                 }
@@ -247,6 +251,7 @@ impl Plan {
         if all.is_empty() {
             return Some(self.more_than_limit());
         }
+        let is_least = all.len() < self.selections().len() || all.iter().any(|one| one.points == 0);
         let mean = |of: &dyn Fn(&Measurement) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
         let (parts, units) = (self.parts() as f64, self.units.len() as f64);
         let (first, other) = (mean(&|one| one.first), mean(&|one| one.other));
@@ -277,7 +282,7 @@ impl Plan {
             (None, true) => Some("the check of the reduction".to_owned()),
             (excluded, false) => excluded.filter(|_| seconds >= 1.0).map(str::to_owned),
         };
-        seconds.is_finite().then_some(ExpectedTime::Extrapolated { seconds, probes, excluded })
+        seconds.is_finite().then_some(ExpectedTime::Extrapolated { seconds, probes, is_least, excluded })
     }
 }
 
@@ -304,7 +309,14 @@ fn measure_on_one_thread(
             };
             match measure(study, first.as_ref(), plan.probe, selection, &limits) {
                 ProbeOutcome::Measured(one) => all.push(one),
-                ProbeOutcome::Nothing => break,
+                // one point of this probe takes longer than this
+                ProbeOutcome::Nothing(seconds) if !all.is_empty() => {
+                    let one =
+                        Measurement { preparing: 0.0, first: seconds, other: seconds, points: 0, complete: false };
+                    all.push(one);
+                    break;
+                }
+                ProbeOutcome::Nothing(_) => break,
                 ProbeOutcome::Failed => return None,
             }
         }
@@ -327,8 +339,8 @@ struct Limits<'a> {
 /// The result of a probe.
 enum ProbeOutcome {
     Measured(Measurement),
-    /// The time limit came before the first point.
-    Nothing,
+    /// The time limit came before the first point, after this time of computation, s.
+    Nothing(f64),
     /// The method refuses the model of a case.
     Failed,
 }
@@ -393,7 +405,7 @@ fn measure(
     let stamps = finished.lock().unwrap_or_else(PoisonError::into_inner);
     match probe {
         Probe::Points { .. } => {
-            let Some(cold) = stamps.first() else { return ProbeOutcome::Nothing };
+            let Some(cold) = stamps.first() else { return ProbeOutcome::Nothing(ended.seconds_since(prepared)) };
             let (first, rest) = (cold.seconds_since(prepared), ended.seconds_since(*cold));
             // the work after the last point belongs to all points in equal parts
             let (first, other) = match stamps.len() {
@@ -407,7 +419,7 @@ fn measure(
             let first = ended.seconds_since(prepared) / share;
             match share > 0.0 {
                 true => ProbeOutcome::Measured(Measurement { preparing, first, other: first, points: 1, complete }),
-                false => ProbeOutcome::Nothing,
+                false => ProbeOutcome::Nothing(ended.seconds_since(prepared)),
             }
         }
     }
@@ -453,20 +465,23 @@ mod tests {
     fn times_are_extrapolated_to_all_points() {
         let plan = Plan::new(couple(&[]).study());
         // four blocks of frequencies per case begin without a warm start
-        let time = plan.extrapolate(&[measurement(1.0, 0.1), measurement(3.0, 0.1)]).unwrap();
+        let time = plan.extrapolate(&[measurement(1.0, 0.1), measurement(2.0, 0.1), measurement(3.0, 0.1)]).unwrap();
         let ExpectedTime::Extrapolated { seconds, .. } = &time else { panic!("{time:?}") };
         assert!((seconds - (16.0 * 2.0 + 948.0 * 0.1)).abs() < 1e-9, "{seconds}");
-        let words = "about 2 minutes on one thread, from 4 probe points, without the refinement of peaks";
+        let words = "about 2 minutes on one thread, from 6 probe points, without the refinement of peaks";
         assert_eq!(time.to_string(), words);
         assert_eq!(time.announcement(), None);
         let long = plan.extrapolate(&[measurement(20.0, 10.0)]).unwrap();
         assert!(long.announcement().unwrap().contains("Ctrl-C"), "{long}");
         // a quick run needs no remark, unless points of a reduced structure are solved again
-        let quick = plan.extrapolate(&[measurement(1e-4, 1e-4)]).unwrap();
+        let quick = plan.extrapolate(&[measurement(1e-4, 1e-4); 3]).unwrap();
         assert_eq!(quick.to_string(), "less than a second on one thread");
-        let reduced = Plan { checks_reduction: true, ..plan }.extrapolate(&[measurement(1e-4, 1e-4)]).unwrap();
+        let reduced = Plan { checks_reduction: true, ..plan }.extrapolate(&[measurement(1e-4, 1e-4); 3]).unwrap();
         let words = "less than a second on one thread, without the refinement of peaks and the check of the reduction";
         assert_eq!(reduced.to_string(), words);
+        // the last probe was not computed
+        let least = plan.extrapolate(&[measurement(1.0, 0.1), measurement(1.0, 0.1)]).unwrap();
+        assert!(least.to_string().starts_with("at least about 2 minutes on one thread"), "{least}");
         let unknown = plan.extrapolate(&[]).unwrap();
         assert_eq!(unknown.to_string(), "more than 1 s on one thread for one of 964 points");
     }

@@ -359,18 +359,21 @@ fn preloads_of_a_static_step_are_those_of_the_nodes() {
     assert!(summary.to_string().contains(&words), "{words}: {summary}");
     // node 13 is open by 2 µm, at 300 N/mm^3 a preload of -0.6 MPa; the gap of a pressed node does not count
     let opened = |number: i64| if number == 13 { 0.0 } else { pressure(number) };
-    let mut files = preloaded("pressure_MPa", |number, _| opened(number), "data = \"static\"");
-    files[0] = files[0]
-        .lines()
-        .map(|line| line.to_owned() + if line.starts_with("node") { ",gap_um\n" } else { ",2\n" })
-        .collect();
-    let joints: String = pads()
-        .map(|(number, at)| match number {
-            13 => by_hand_with_preload(number, at, "nodes = [\"104\"]", -0.6 * area(at)),
-            _ => joint(1.0, (number, at)),
-        })
-        .collect();
-    check_equal(&computed(&files).0, &dataset(folder.path(), &[&head, STUDY, &joints]), 1e-12);
+    for (scale, factor) in [("1", 1.0), ("mu/0.6", 0.5)] {
+        let stated = format!("data = \"static\", scale = \"{scale}\"");
+        let mut files = preloaded("pressure_MPa", |number, _| opened(number), &stated);
+        files[0] = files[0]
+            .lines()
+            .map(|line| line.to_owned() + if line.starts_with("node") { ",gap_um\n" } else { ",2\n" })
+            .collect();
+        let joints: String = pads()
+            .map(|(number, at)| match number {
+                13 => by_hand_with_preload(number, at, "nodes = [\"104\"]", factor * -0.6 * area(at)),
+                _ => joint(factor, (number, at)),
+            })
+            .collect();
+        check_equal(&computed(&files).0, &dataset(folder.path(), &[&head, STUDY, &joints]), 1e-12);
+    }
     // half of the forces, by a parameter
     let half = "data = \"static\", scale = \"mu/0.6\"";
     let (found, _) = computed(&preloaded("force_N", |number, at| pressure(number) * area(at), half));

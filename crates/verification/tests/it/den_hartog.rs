@@ -223,6 +223,7 @@ fn theory_7_free_decay() {
         duration: 20.0 * half,
         step: half,
         width: None,
+        tolerance: None,
     };
     let mut found = Vec::new();
     motion

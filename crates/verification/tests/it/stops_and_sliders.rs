@@ -45,6 +45,7 @@ fn free(model: &Model, start: f64, step: f64, duration: f64) -> Vec<f64> {
         duration,
         step,
         width: None,
+        tolerance: None,
     };
     let mut all = Vec::new();
     let mut keep = |_: f64, _: f64, state: &Sample| {
@@ -513,6 +514,7 @@ fn rigid_contacts_side_by_side_start_as_one() {
                     duration: 2.0,
                     step: 0.01371,
                     width: None,
+                    tolerance: None,
                 };
                 let mut samples = Vec::new();
                 let mut keep = |_: f64, _: f64, sample: &Sample| {
@@ -564,6 +566,7 @@ fn creeping_to_a_stop_is_no_chatter() {
                     duration: 2000.0,
                     step: 10.0,
                     width: None,
+                    tolerance: None,
                 };
                 motion.run(&system, &mut |_, _, _| true).unwrap();
             }

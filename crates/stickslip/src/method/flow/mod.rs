@@ -41,7 +41,8 @@ pub(crate) trait Flow: Send {
     fn weights(&self) -> Vec<f64>;
     /// Returns the square root of an energy that the loads can supply, √J.
     fn energy_scale(&self) -> f64;
-    /// Sets the error per step, relative to the state, of a flow with controlled steps.
+    /// Sets the error relative to the state: per step of a flow with controlled steps, per
+    /// interval of [`Flow::run_accurately`] in equal steps.
     fn set_tolerance(&mut self, _tolerance: f64) {}
     /// Tells whether the flow takes equal steps, whose error it does not control.
     fn has_equal_steps(&self) -> bool {

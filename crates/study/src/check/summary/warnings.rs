@@ -112,10 +112,12 @@ const NO_EQUILIBRIUM: &str = "no static equilibrium was found under the constant
 /// preloads move their faces apart: these may have been meant to press the contacts.
 fn open_under_load(one: &SurveyedCase) -> Option<String> {
     let slips = one.survey.first_slip();
+    // next to preloaded contacts, those without preload or with a gap may be open
+    let has_preload = slips.iter().any(|slip| slip.preload > Some(0.0));
     let opens = |slip: &&FirstSlip| match slip.preload {
         Some(preload) if preload > 0.0 => slip.equilibrium_force.is_some_and(|force| force <= 0.0),
-        Some(_) => slip.constant_force < 0.0,
-        None => false,
+        Some(0.0) => !has_preload && slip.constant_force < 0.0,
+        _ => false,
     };
     let found = || slips.iter().filter(opens);
     let preloaded = found().any(|slip| slip.preload > Some(0.0));

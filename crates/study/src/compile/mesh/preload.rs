@@ -2,7 +2,8 @@
 //!
 //! The preload of a joint is the pressure at its node times the area of the node, or the force of
 //! the node. A node without a row has no preload. A node without pressure and with a `gap` has the
-//! negative preload that closes at this gap.
+//! negative preload that closes at this gap. `scale` multiplies gaps too: faces without an initial
+//! gap lift off in proportion to the load.
 //!
 //! These are the forces after the static step has deformed the structure, so that displacements
 //! count from there: constant forces on both places of a joint balance its preload. They stand for
@@ -13,6 +14,7 @@ use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledEntry, CompiledQuantity, CompiledTable, CompiledValue};
 use crate::data::{ColumnError, DataTable};
 use crate::syntax::error::{Location, Problem};
+use crate::syntax::expression::Expression;
 use crate::syntax::format::format_significant;
 use crate::syntax::key::Bounds;
 use std::collections::{BTreeMap, HashSet};
@@ -137,7 +139,10 @@ impl NodalPreload {
         }
         let stiffness = law.entry("normal").map(|entry| &entry.value);
         let quantity = match (self.gaps.get(&node), stiffness) {
-            (Some(gap), Some(CompiledValue::Quantity { quantity, .. })) => times(quantity, -gap, Dimension::LENGTH),
+            (Some(gap), Some(CompiledValue::Quantity { quantity: normal, .. })) => {
+                let pressure = times(normal, -gap, Dimension::LENGTH);
+                CompiledQuantity { expression: pressure.expression.times(&self.scale.expression), ..pressure }
+            }
             _ => times(&self.scale, pressure, Dimension::PRESSURE),
         };
         let within = Bounds::Finite;
@@ -189,9 +194,11 @@ impl NodalPreload {
             let number = |force: f64| format_significant(force, 4);
             let message =
                 format!("the forces of the joints sum to {} N, but `total` is {} N", number(total), number(stated));
+            // pressures at the edge of a partly closed contact belong to parts of the nodes' areas
+            let forces = if self.is_force { "" } else { "; forces of nodes are more accurate than pressures" };
             let help = format!(
                 "check the units of the columns and the set of the contact: {} rows belong to no joint, and {} of {} \
-                 joints have no row",
+                 joints have no row{forces}",
                 summary.rows_without_joint,
                 summary.joints_without_row,
                 joints.len()
@@ -204,5 +211,5 @@ impl NodalPreload {
 
 /// Returns a stated quantity times another one.
 fn times(stated: &CompiledQuantity, si: f64, dimension: Dimension) -> CompiledQuantity {
-    CompiledQuantity { expression: stated.expression.times(si, dimension), ..stated.clone() }
+    CompiledQuantity { expression: stated.expression.times(&Expression::quantity(si, dimension)), ..stated.clone() }
 }

@@ -8,7 +8,7 @@ use crate::syntax::error::Problem;
 
 /// Returns the places that an entry of `[[place]]` states.
 pub(crate) fn expand(place: CompiledTable, source: &MeshSource) -> Result<Vec<CompiledTable>, Problem> {
-    let Some(set) = place.text("set") else { return Ok(vec![with_nodes_of_sets(place, source)]) };
+    let Some(set) = place.text("set") else { return Ok(vec![with_nodes_of_sets(place, source)?]) };
     let location = place.location_of("set", None);
     if let Some(other) = ["of", "dof", "dofs", "nodes", "sum"].into_iter().find_map(|key| place.entry(key)) {
         let message = format!("`set` and `{}` exclude each other", other.key);
@@ -35,21 +35,23 @@ pub(crate) fn places_of_nodes(place: &CompiledTable, numbers: &[i64]) -> Vec<Com
 }
 
 /// Replaces the names of sets in `nodes` by their nodes.
-fn with_nodes_of_sets(mut place: CompiledTable, source: &MeshSource) -> CompiledTable {
+fn with_nodes_of_sets(mut place: CompiledTable, source: &MeshSource) -> Result<CompiledTable, Problem> {
     for entry in place.entries.iter_mut().filter(|entry| entry.key == "nodes") {
         if let CompiledValue::Names(names) = &mut entry.value {
-            *names = std::mem::take(names)
-                .into_iter()
-                .flat_map(|(name, location)| match source.mesh.nodes_of(&name) {
-                    Ok(nodes) => {
+            let mut nodes = Vec::with_capacity(names.len());
+            for (name, location) in std::mem::take(names) {
+                match source.mesh.nodes_of(&name) {
+                    Ok(members) => {
                         let number = |node| (source.number(node).to_string(), location.clone());
-                        nodes.into_iter().map(number).collect()
+                        nodes.extend(members.into_iter().map(number));
                     }
-                    // the number of a node, or an error that the structure reports
-                    Err(_) => vec![(name, location)],
-                })
-                .collect();
+                    // the structure reports unknown numbers of nodes
+                    Err(_) if name.parse::<i64>().is_ok() => nodes.push((name, location)),
+                    Err(error) => return Err(set_problem(error, "nodes", &location)),
+                }
+            }
+            *names = nodes;
         }
     }
-    place
+    Ok(place)
 }

@@ -98,7 +98,8 @@ const TARGET: &[Key] = &[
         ValueType::Text,
         "1 % of largest",
         "standard deviation of the measured values, which weights the residuals: `relative 2 %`, `1 % of largest` \
-         value in the group, or a quantity such as `0.1 m/s^2`",
+         value in the group, or a quantity such as `0.1 m/s^2`; `relative` makes values near zero count most, which \
+         biases a fit to a loop",
         "\"relative 2 %\"",
     ),
     default("mode", ValueType::Count(1, 600), "1", "for a backbone: number of the mode", "1"),

@@ -100,6 +100,7 @@ impl Target for RingDown {
             duration: self.step * (self.measured.len() as f64 - 0.5),
             step: self.step,
             width: case.method.options.get(WIDTH).copied(),
+            tolerance: case.method.time_history_tolerance(),
         };
         let mut fitted = Vec::with_capacity(self.measured.len());
         let run = history.run(&system, &mut |_, _, sample| {

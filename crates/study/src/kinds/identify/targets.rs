@@ -167,7 +167,9 @@ impl TargetInput<'_> {
         let missing = self.rows.iter().find(|row| !all.get(**row).is_some_and(|value| value.is_finite()));
         if let Some(row) = missing {
             let message = format!("row {} of `{}` has no number in the column `{role}`", row + 1, self.data.name);
-            return Err(ColumnError { message, help: "remove the row, or state `groups` without it".to_owned() });
+            let help = "remove the row (of a ring-down, whose steps are equal: interpolate it), or state `groups` \
+                        without it";
+            return Err(ColumnError { message, help: help.to_owned() });
         }
         Ok(self.rows.iter().map(|row| all[*row]).collect())
     }

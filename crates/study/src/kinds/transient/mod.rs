@@ -291,6 +291,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             duration,
             step,
             width: case.method.options.get(WIDTH).copied(),
+            tolerance: case.method.time_history_tolerance(),
         };
         let (mut sampled, mut stopped) = (false, false);
         // largest displacement of every place, and its time

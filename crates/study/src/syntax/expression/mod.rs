@@ -53,12 +53,17 @@ impl Expression {
         Expression { steps: vec![(Operation::Push(ExpressionValue::bare(value)), 0..0)] }
     }
 
-    /// Returns the expression times a quantity.
-    pub(crate) fn times(&self, si: f64, dimension: Dimension) -> Self {
-        let mut steps = self.steps.clone();
-        steps.push((Operation::Push(ExpressionValue::new(si, dimension)), 0..0));
-        steps.push((Operation::Multiply, 0..0));
-        Expression { steps }
+    /// Returns the expression of one quantity.
+    pub(crate) fn quantity(si: f64, dimension: Dimension) -> Self {
+        Expression { steps: vec![(Operation::Push(ExpressionValue::new(si, dimension)), 0..0)] }
+    }
+
+    /// Returns the product with another expression of the same parameters. Its errors point into
+    /// the text of this one.
+    pub(crate) fn times(&self, factor: &Expression) -> Self {
+        let of_factor = factor.steps.iter().map(|(operation, _)| (*operation, 0..0));
+        let steps = self.steps.iter().cloned().chain(of_factor).chain([(Operation::Multiply, 0..0)]);
+        Expression { steps: steps.collect() }
     }
 
     /// Compiles `text`. A name means the parameter at its index in `parameters`.

@@ -25,8 +25,8 @@ pub(crate) struct EqualStepSettings {
     /// Largest number of steps of an interval. Linear motion then has an error below 1e-9, and a
     /// run takes about 0.1 s for one joint.
     pub max_steps: usize,
-    /// Relative error of an interval of a transient: the change of the extrapolated limit from two
-    /// step sizes when both are halved.
+    /// Default relative error of an interval of a transient: the change of the extrapolated limit
+    /// from two step sizes when both are halved.
     pub tolerance: f64,
     /// Fraction of the tolerance below which the next interval tries half as many steps. Halving
     /// the steps reduces the error to a sixteenth without kinks, and to a quarter with kinks.
@@ -57,6 +57,8 @@ pub(crate) struct AverageAccelerationFlow {
     pub excitation: HarmonicExcitation,
     /// Number of steps of a run; the run uses the fraction `share` of it.
     pub count: usize,
+    /// Relative error of an interval, see [`EqualStepSettings::tolerance`].
+    tolerance: f64,
     share: f64,
     keep: bool,
     steps: StepRecord,
@@ -101,6 +103,7 @@ impl AverageAccelerationFlow {
         Ok(AverageAccelerationFlow {
             excitation: HarmonicExcitation::default(),
             count: settings.initial_steps,
+            tolerance: settings.tolerance,
             share: 1.0,
             keep: false,
             steps: StepRecord::new(vec![(1.0, 1.0)], &assembly),
@@ -272,13 +275,13 @@ impl Flow for AverageAccelerationFlow {
                 let change: Vec<f64> = end.iter().zip(&before).map(|(a, b)| a - b).collect();
                 let size = norm(&weights, &end).max(norm(&weights, state)).max(rest).max(f64::MIN_POSITIVE);
                 let error = norm(&weights, &change) / size;
-                if error <= settings.tolerance {
+                if error <= self.tolerance {
                     state.copy_from_slice(&end);
                     self.steps = coarse.1.extrapolated(&fine.1);
                     // the next interval begins with the same number of steps, or with half of
                     // it
                     self.count = (self.count
-                        / if error < settings.coarsening_fraction * settings.tolerance { 8 } else { 4 })
+                        / if error < settings.coarsening_fraction * self.tolerance { 8 } else { 4 })
                     .max(settings.min_steps);
                     return Ok(());
                 }
@@ -286,7 +289,7 @@ impl Flow for AverageAccelerationFlow {
                     return Err(IntegrationError::Unresolved {
                         steps: self.count,
                         estimate: error,
-                        tolerance: settings.tolerance,
+                        tolerance: self.tolerance,
                     });
                 }
             }
@@ -306,6 +309,10 @@ impl Flow for AverageAccelerationFlow {
 
     fn set_recording(&mut self, keep: bool) {
         self.keep = keep;
+    }
+
+    fn set_tolerance(&mut self, tolerance: f64) {
+        self.tolerance = tolerance;
     }
 
     fn path(&self, system: &Arc<System>, symmetry: Symmetry, period: f64) -> Arc<dyn Path> {
