@@ -4,6 +4,7 @@
 use stickslip_study::dataset::{Dataset, Table};
 use stickslip_study::read_study;
 use stickslip_study::run::{Context, run};
+use stickslip_study::summary::ModelSummary;
 
 fn dataset(text: &str) -> Dataset {
     let found = run(&read_study("study.toml", text, &[]).unwrap(), &Context::without_progress(1)).unwrap();
@@ -249,4 +250,50 @@ kind = "harmonic-balance"
     // constant forces do not keep a linear structure from having amplitudes
     let free = numbers(&found, "references", "platform1_x_free_amplitude_m");
     assert!(free.iter().all(|amplitude| amplitude.is_finite()), "{free:?}");
+}
+
+/// A pressed contact without friction slips all the time, and does not hold the block along its face.
+#[test]
+fn a_contact_without_friction_never_sticks() {
+    let text = r#"schema = 1
+[[mass]]
+name = "block"
+mass = "1 kg"
+directions = ["x", "z"]
+[[spring]]
+between = ["block.x", "ground"]
+stiffness = "100 N/mm"
+damping = "20 N s/m"
+[[spring]]
+between = ["block.z", "ground"]
+stiffness = "100 N/mm"
+damping = "20 N s/m"
+[[place]]
+name = "foot"
+of = "block"
+normal = [0, 0, 1]
+[[joint]]
+name = "contact"
+between = ["foot", "ground"]
+law = { kind = "friction-contact", tangential = "1 N/um", normal = "1 N/um", friction = 0, preload = "50 N" }
+[[force]]
+on = "block.x"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = ["40 Hz", "60 Hz"]
+[method]
+kind = "harmonic-balance"
+"#;
+    let found = dataset(text);
+    assert!(!found.notes.iter().any(|note| note.contains("sticks permanently")), "{:?}", found.notes);
+    assert_eq!(numbers(&found, "curve", "contact_slip_fraction"), [1.0, 1.0]);
+    for (hertz, found) in [40.0, 60.0].into_iter().zip(numbers(&found, "curve", "block_x_amplitude_m")) {
+        let omega = std::f64::consts::TAU * hertz;
+        let expected = 1.0 / (1e5 - omega * omega).hypot(20.0 * omega);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{hertz} Hz: {found} {expected}");
+    }
+    let summary = ModelSummary::new(&read_study("study.toml", text, &[]).unwrap()).unwrap().to_string();
+    // √(1e5 N/m / 1 kg) along the face, also with all joints stuck
+    assert!(summary.contains("joints stuck   50.329,"), "{summary}");
 }

@@ -331,7 +331,8 @@ impl Statistics {
         }
         (!reached).then(|| {
             format!(
-                "the search did not converge: it ended about {:.1} standard errors from the minimum; use more `starts`, or narrower ranges",
+                "the search did not converge: it ended about {:.1} standard errors from the minimum; use more `starts`, or \
+                 narrower ranges, and subtract an offset or a trend of the measured values",
                 self.distance
             )
         })
