@@ -346,8 +346,8 @@ impl Note {
             )),
             Note::Truncated(count, largest) => Some(format!(
                 "At {} the series is too short: its estimated error is up to {largest:.1e} and exceeds the \
-                 `tolerance` of the method. Remove or raise `harmonics`, raise `tolerance` if this error is \
-                 acceptable, or use `event-driven` if it accepts all laws.",
+                 `tolerance` of the method. Remove or raise `harmonics` if it is stated, raise `tolerance` if this \
+                 error is acceptable, or use `event-driven` if it accepts all laws.",
                 points(*count)
             )),
             Note::LargeRotation { points: count, place, largest } => Some(format!(

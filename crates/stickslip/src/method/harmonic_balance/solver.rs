@@ -63,7 +63,8 @@ pub(super) struct HarmonicBalanceSolver {
     pub(super) orbit_check: OrbitCheck,
     /// False for orbits that no time integration checks.
     is_checked: bool,
-    /// History of the last orbit, if a growing vibration found it. The next search begins there.
+    /// History of the last orbit, if a growing vibration found it: orbits between it and the next
+    /// one begin there.
     pub(super) grown_history: Option<Vec<StaticState>>,
     /// State in static equilibrium: displacements, velocities (zero), internal states of the
     /// joints.
@@ -393,17 +394,18 @@ impl HarmonicBalanceSolver {
 
     /// Finds the orbit of a request within the work limit that is set.
     fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
-        if self.grown_history.is_some()
-            && let Some(orbit) = self.solve_with_growing_vibration(request, omega)
-        {
-            return Ok(orbit);
-        }
         let series = request.seed.and_then(|seed| self.series_of(seed));
         if let (ErrorEstimate::Skipped, Some((top, motion))) = (request.estimate, &series) {
+            if self.grown_history.is_some()
+                && let Some(orbit) = self.solve_with_growing_vibration(request, omega)
+            {
+                return Ok(orbit);
+            }
             // the number of harmonics of the neighbouring orbit is sufficient
             let found = self.solve_nearby(*top, omega, motion);
             return found.or_else(|error| self.solve_with_growing_vibration(request, omega).ok_or(error));
         }
+        self.grown_history = None;
         // without a series, a time integration begins at the seed's state
         let warm = series.or_else(|| self.guess_from_state(&request.seed?.state, omega));
         let mut found = match self.converge(self.first, omega, warm) {

@@ -41,8 +41,8 @@ impl Default for GrowthSettings {
 
 impl HarmonicBalanceSolver {
     /// Searches with the history of a vibration that grows, with a budget as large as that of a
-    /// point. If the last orbit was found in this way, its history is tried first. Returns `None`
-    /// if no law has a history or no orbit is found.
+    /// point. An orbit between others has the history of the last orbit that was found in this
+    /// way, if it exists. Returns `None` if no law has a history or no orbit is found.
     pub(in crate::method::harmonic_balance) fn solve_with_growing_vibration(
         &mut self,
         request: &Request<'_>,
