@@ -396,14 +396,13 @@ impl HarmonicBalanceSolver {
     fn solve_point(&mut self, request: &Request<'_>, omega: f64) -> Result<Orbit, OrbitError> {
         let series = request.seed.and_then(|seed| self.series_of(seed));
         if let (ErrorEstimate::Skipped, Some((top, motion))) = (request.estimate, &series) {
-            if self.grown_history.is_some()
-                && let Some(orbit) = self.solve_with_growing_vibration(request, omega)
-            {
-                return Ok(orbit);
-            }
             // the number of harmonics of the neighbouring orbit is sufficient
-            let found = self.solve_nearby(*top, omega, motion);
-            return found.or_else(|error| self.solve_with_growing_vibration(request, omega).ok_or(error));
+            let nearby = |solver: &mut Self| solver.solve_nearby(*top, omega, motion);
+            let growing = |solver: &mut Self| solver.solve_with_growing_vibration(request, omega);
+            return match self.grown_history {
+                Some(_) => growing(self).map_or_else(|| nearby(self), Ok),
+                None => nearby(self).or_else(|error| growing(self).ok_or(error)),
+            };
         }
         self.grown_history = None;
         // without a series, a time integration begins at the seed's state
