@@ -21,8 +21,8 @@ const MAX_STUCK_CASES: usize = 4;
 
 /// Says which orbit of a continuum is reported.
 const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibrium, after the constant loads grew together from \
-    zero, and at `found_by = growing-vibration` the vibration after them. A permanently stuck rigid joint has the position that the search found; method `transient` reports the \
-    orbit that its run reached.";
+    zero, and at `found_by = growing-vibration` the vibration after them. A permanently stuck rigid joint has the \
+    position that the search found; method `transient` reports the orbit that its run reached.";
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

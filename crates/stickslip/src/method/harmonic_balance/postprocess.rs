@@ -315,8 +315,8 @@ fn sample_joints(
             *contact = joint.law().contact_state(&now[..axes.len()], &force[..axes.len()]);
             // A joint that dissipates nothing only touches its limit, up to which it slipped
             // before, unless it has no friction force at all.
-            let has_friction = (0..axes.len()).any(|a| joint.law().normal() != Some(a) && force[a] != 0.0);
-            if contact.slips() && !dissipates && has_friction {
+            let has_friction = || (0..axes.len()).any(|a| joint.law().normal() != Some(a) && force[a] != 0.0);
+            if contact.slips() && !dissipates && has_friction() {
                 *contact = Contact::Stick;
             }
         }
