@@ -6,7 +6,7 @@ use super::dynamics::linear_dynamics::LinearDynamics;
 use super::equations::{Discretization, HarmonicSolution};
 use crate::law::{Contact, MAX_DIRECTIONS};
 use crate::method::orbit_search::evidence::{OrbitCheck, ReturnEvidence};
-use crate::model::{Axis, CyclicSymmetry, MovedPlace, System};
+use crate::model::{Axis, CyclicSymmetry, System};
 use crate::orbit::postprocess::{ContactFractions, ContactSummary, PathSignals, results};
 use crate::orbit::{
     Accuracy, Energy, Evidence, JointSample, Orbit, Path, Sample, Symmetry, history_dependent_joints, laws,
@@ -195,16 +195,15 @@ fn orbit_of_all(
     let stuck_names = measured.stuck_names();
     let path =
         FourierPath { system: system.clone(), omega, harmonics, x, force, contact, stuck: measured.stuck.clone() };
-    let ReturnEvidence { derivative, defect, displacement_error } = orbit_check
-        .map_or_else(ReturnEvidence::default, |orbit_check| {
-            orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck)
-        });
+    let ReturnEvidence { derivative, defect, step } = orbit_check.map_or_else(ReturnEvidence::default, |orbit_check| {
+        orbit_check.check(system, omega, (&path, symmetry), &start, &path.stuck)
+    });
     // If a normal force changes the slip limit, or vanishes, a series with twice the harmonics
     // may be as wrong as the shorter one. The time integration shows it. It compares one instant of
     // the period, at which the error may be below its maximum.
     let joints = system.joints().iter().zip(&measured.joints);
     let rubs = joints.filter(|(joint, _)| joint.law().normal().is_some()).any(|(_, moved)| moved.stick_fraction < 1.0);
-    let returned = displacement_error.filter(|_| rubs).map_or(0.0, |error| 1.5 * error);
+    let returned = step.filter(|_| rubs).map_or(0.0, |step| 1.5 * distance_at_places(&path, step.as_slice()));
     let truncation = truncation.map(|error| error.max(returned));
     Some(Orbit {
         method: super::NAME,
@@ -239,6 +238,20 @@ fn orbit_of_all(
         path: Arc::new(path),
         series: None,
     })
+}
+
+/// Returns the largest displacement of a place in this step of a state, relative to the largest
+/// vibration of a place.
+fn distance_at_places(path: &FourierPath, step: &[f64]) -> f64 {
+    let largest = |values: &dyn Fn(&Axis) -> f64| {
+        let lengths = path.system.place_axes().iter().map(|axis| axis.length_scale() * values(axis));
+        lengths.fold(0.0, f64::max)
+    };
+    let vibration = |axis: &Axis| {
+        let moving = path.harmonics.iter().zip(&path.x).filter(|(h, _)| **h > 0);
+        moving.map(|(_, x)| axis.complex_component(x).norm_sqr()).sum::<f64>().sqrt()
+    };
+    largest(&|axis| axis.component(step).abs()) / largest(&vibration).max(f64::MIN_POSITIVE)
 }
 
 /// Joint forces and contact states at the samples of a period, and the internal states at
@@ -490,11 +503,6 @@ pub(super) fn energies_balance(system: &System, orbit: &Orbit) -> bool {
         || (work_in - viscous - friction).abs() <= negligible_energy(system, orbit.omega)
 }
 
-/// Returns the harmonic `h` of an imposed motion.
-fn imposed_amplitude(place: &MovedPlace, h: usize) -> Complex64 {
-    amplitude_at(&place.motion, h)
-}
-
 /// Returns the amplitude of harmonic `h`, or zero.
 fn amplitude_at(harmonics: &[(u32, Complex64)], h: usize) -> Complex64 {
     harmonics.iter().find(|(k, _)| *k as usize == h).map_or(ZERO, |(_, g)| *g)
@@ -505,7 +513,7 @@ fn linear_reaction(system: &System, m: usize, h: usize, s: Complex64, x: &DVecto
     let place = &system.moved_places()[m];
     let mut force = -amplitude_at(&place.force, h);
     for (other, (k, c)) in place.stiffness.1.iter().zip(&place.damping.1).enumerate() {
-        force += imposed_amplitude(&system.moved_places()[other], h) * (*k + s * *c + s * s * place.mass.1[other]);
+        force += amplitude_at(&system.moved_places()[other].motion, h) * (*k + s * *c + s * s * place.mass.1[other]);
     }
     for i in 0..x.len() {
         force += x[i] * (place.stiffness.0[i] + s * place.damping.0[i] + s * s * place.mass.0[i]);
@@ -528,7 +536,7 @@ impl Path for FourierPath {
                 a[i] += (s * s * z).re;
             }
             for (m, now) in moved_now.iter_mut().enumerate() {
-                now.0 += (imposed_amplitude(&self.system.moved_places()[m], h) * turn).re;
+                now.0 += (amplitude_at(&self.system.moved_places()[m].motion, h) * turn).re;
                 now.1 += (linear_reaction(&self.system, m, h, s, amplitude) * turn).re;
             }
         }
@@ -597,5 +605,57 @@ impl Path for FourierPath {
 
     fn return_defect(&self, start: &[f64], symmetry: Symmetry) -> Option<f64> {
         OrbitCheck::of_any_size(&self.system).defect(&self.system, self.omega, (self, symmetry), start)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::law::FrictionContact;
+    use crate::method::Method;
+    use crate::method::harmonic_balance::HarmonicBalance;
+    use crate::model::{Axis, System};
+    use crate::structure::Structure;
+    use nalgebra::{DMatrix, DVector, dmatrix};
+    use num_complex::Complex64;
+    use std::f64::consts::TAU;
+    use std::sync::Arc;
+
+    /// Returns a blade with a stiff pad whose contact is pressed by a varying force, in the
+    /// coordinates q of `x = transformation q`. The coordinates x are blade, pad and normal
+    /// direction.
+    fn pressed(transformation: &DMatrix<f64>) -> System {
+        let project = |matrix: DMatrix<f64>| transformation.transpose() * matrix * transformation;
+        let mass = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.01, 0.1]));
+        let stiffness = dmatrix![1.01e6, -1e6, 0.0; -1e6, 1e6, 0.0; 0.0, 0.0, 1e5];
+        let names = ["a", "b", "c"].map(str::to_owned).to_vec();
+        let damping = 1e-4 * &stiffness;
+        let structure = Structure::new(names, project(mass), project(damping), project(stiffness)).unwrap();
+        let axis = |x: usize| Axis::new((0..3).map(|q| (q, transformation[(x, q)])).collect());
+        let law = FrictionContact { tangential: 1e5, normal: 1e5, friction: 0.5, preload: 4.0, tangents: 1 };
+        let mut builder = System::builder(structure).joint("face", Arc::new(law), vec![axis(1), axis(2)]);
+        for (x, name) in ["blade", "pad", "normal"].into_iter().enumerate() {
+            builder = builder.place(name, axis(x));
+        }
+        for (x, force) in [(0, Complex64::new(5.0, 0.0)), (2, Complex64::new(0.0, 3.0))] {
+            for q in 0..3 {
+                builder = builder.force(q, 1, transformation[(x, q)] * force);
+            }
+        }
+        builder.build().unwrap()
+    }
+
+    /// The estimate concerns places. A reduced structure has coordinates of large stiffness, whose
+    /// energy is no measure of the motion of any place.
+    #[test]
+    fn the_error_estimate_is_independent_of_the_coordinates() {
+        let pad_relative_to_blade = dmatrix![1.0, 0.0, 0.0; 1.0, 1.0, 0.0; 0.0, 0.0, 1.0];
+        let estimate = |transformation: DMatrix<f64>| {
+            let method = HarmonicBalance { harmonics: Some(5), ..HarmonicBalance::default() };
+            let orbit = method.solver(&pressed(&transformation)).unwrap().orbit(TAU * 14.0).unwrap();
+            assert!(orbit.joints[0].slip_fraction > 0.1);
+            orbit.evidence.error_estimate.unwrap()
+        };
+        let (own, relative) = (estimate(DMatrix::identity(3, 3)), estimate(pad_relative_to_blade));
+        assert!((own / relative - 1.0).abs() < 1e-6, "{own:e} {relative:e}");
     }
 }

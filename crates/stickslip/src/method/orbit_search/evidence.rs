@@ -85,9 +85,9 @@ pub(crate) struct ReturnEvidence {
     pub derivative: Option<DMatrix<f64>>,
     /// Distance between the state and its return in the energy norm, relative to the vibration.
     pub defect: Option<f64>,
-    /// Displacements of one Newton step from the state to the orbit of the integration, in the
-    /// energy norm and relative to those of the vibration. `None` without a derivative.
-    pub displacement_error: Option<f64>,
+    /// One Newton step from the state to the orbit of the integration: displacements, velocities,
+    /// states of the joints. `None` without a derivative.
+    pub step: Option<DVector<f64>>,
 }
 
 impl OrbitCheck {
@@ -238,13 +238,10 @@ impl OrbitCheck {
             );
             of_return = near.or(of_return);
         }
-        let displacement_error = of_return.as_ref().filter(|_| known).map(|derivative| {
-            let step = newton_step(derivative, &gap, back.sign, &weights);
-            let displacements = &weights[..system.dofs()];
-            norm(displacements, step.as_slice()) / vibration_share::size(path, TAU / omega, displacements, rest)
-        });
+        let step = of_return.as_ref().filter(|_| known);
+        let step = step.map(|derivative| newton_step(derivative, &gap, back.sign, &weights));
         ReturnEvidence {
-            displacement_error,
+            step,
             derivative: of_return.map(|derivative| back.over_full_cycle(&derivative, system.dofs())),
             defect,
         }

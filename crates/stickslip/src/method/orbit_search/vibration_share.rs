@@ -30,8 +30,8 @@ pub(crate) fn fraction(
 }
 
 /// Returns the size of a vibration, without its mean, in the energy norm of displacements and
-/// velocities, or of displacements alone if there are no more `weights`. It is at least `rest`.
-pub(crate) fn size(path: &dyn Path, period: f64, weights: &[f64], rest: f64) -> f64 {
+/// velocities. It is at least `rest`.
+fn size(path: &dyn Path, period: f64, weights: &[f64], rest: f64) -> f64 {
     // Instants per period at which the motion is sampled. The energy oscillates between
     // displacement and velocity; the largest sample is accurate to some percent.
     let count = 32;
