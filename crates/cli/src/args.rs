@@ -235,7 +235,7 @@ pub enum ListTopic {
     Templates,
     /// Study kinds
     Studies,
-    /// Outputs for the key `output` of a study
+    /// Columns that the key `output` of a study adds to its tables
     Outputs,
 }
 

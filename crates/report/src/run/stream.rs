@@ -33,9 +33,9 @@ impl FromStr for Shard {
             Some((number, total)) if (1..=total).contains(&number) && total <= max_shards => {
                 Ok(Shard { number, total })
             }
-            _ => Err(format!(
-                "expected a shard such as 3/16 (number/total, at most {max_shards} shards), found `{text}`"
-            )),
+            _ => {
+                Err(format!("expected a part such as 3/16 (number/total, at most {max_shards} parts), found `{text}`"))
+            }
         }
     }
 }

@@ -37,7 +37,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             key: "periods",
             dimension: Dimension::NONE,
             count: true,
-            doc: "most periods before the search fails; default 50000",
+            doc: "most periods of the search, which ends earlier if the decay is too slow; default 50000",
         },
         MethodOption {
             key: WIDTH,

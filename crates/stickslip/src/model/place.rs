@@ -133,9 +133,7 @@ pub enum FrameError {
     #[error("the {0} must be three finite numbers, not all zero")]
     NoDirection(&'static str),
     /// The tangent is parallel to the normal.
-    #[error(
-        "the angle between tangent and normal is {angle:.1} degrees; it must be more than {MIN_TANGENT_ANGLE} degrees"
-    )]
+    #[error("the angle between tangent and normal is {angle:.1}°; it must exceed {MIN_TANGENT_ANGLE}°")]
     Parallel {
         /// Angle between tangent and normal, degrees.
         angle: f64,
@@ -217,7 +215,7 @@ mod tests {
         }
         let no = |normal, tangent| Frame::new(normal, tangent).unwrap_err().to_string();
         assert!(no([0.0; 3], None).contains("not all zero"));
-        assert!(no([0.0, 0.0, 1.0], Some([0.0, 0.01, 2.0])).contains("0.3 degrees"));
+        assert!(no([0.0, 0.0, 1.0], Some([0.0, 0.01, 2.0])).contains("0.3°"));
         assert!(no([0.0, f64::NAN, 1.0], None).contains("finite"));
     }
 }

@@ -213,8 +213,8 @@ pub enum OrbitError {
     },
     /// The motion does not settle.
     #[error(
-        "{method} at {}: the motion has not settled after {returns} returns, each of `period` cycles; it still changes by a \
-         fraction of {change:.1e} per return{}",
+        "{method} at {}: the motion has not settled after {returns} periods, each of `period` cycles; it still changes by a \
+         fraction of {change:.1e} per period{}",
         hertz(*omega), settling_advice(*.repeats, *.needed, .advice)
     )]
     Unsettled {
@@ -458,15 +458,15 @@ fn speed_text(speed: f64) -> String {
 
 /// Describes a motion that does not settle, and gives advice.
 fn settling_advice(repeats: Option<usize>, needed: Option<f64>, advice: &str) -> String {
-    let by_newton = if advice.is_empty() { String::new() } else { format!("{advice}, which needs no settling") };
+    let by_newton = if advice.is_empty() { String::new() } else { format!("{advice} (no settling needed)") };
     match repeats {
         // A motion that repeats after one return is settled, so `repeats` is at least 2.
         Some(repeats) => {
-            format!("; it repeats after {repeats} returns: set `period` to {repeats} times its value (default 1)")
+            format!("; it repeats after {repeats} periods: set `period` to {repeats} times its value (default 1)")
         }
         None => match needed {
             Some(needed) => {
-                format!("; from its decay, it would settle after about {needed:.0} returns: raise `periods`{by_newton}")
+                format!("; from its decay, it would settle after about {needed:.0} periods: raise `periods`{by_newton}")
             }
             None => {
                 format!("; it does not decay: add damping, or examine it with kind = \"transient\"{by_newton}")

@@ -187,19 +187,19 @@ mod tests {
     #[test]
     fn a_node_stands_for_its_directions_or_names_them() {
         let names = ModelNames::places(&model()).with_joints(&model());
-        assert_eq!(names.labels("only", "mass", "tip").unwrap(), ["tip.x", "tip.z"]);
-        assert_eq!(names.labels("only", "mass", "rub").unwrap(), ["rub.x", "rub.z"]);
+        assert_eq!(names.labels("only", "place", "tip").unwrap(), ["tip.x", "tip.z"]);
+        assert_eq!(names.labels("only", "place", "rub").unwrap(), ["rub.x", "rub.z"]);
         assert_eq!(
-            (names.single_label("start", "mass", "tip.z"), names.single_label("start", "mass", "root")),
+            (names.single_label("start", "place", "tip.z"), names.single_label("start", "mass", "root")),
             (Ok("tip.z"), Ok("root"))
         );
         let help = |found: Result<&str, KeyError>| found.unwrap_err().help.unwrap();
         for wrong in ["tip", "tip.y"] {
-            assert_eq!(help(names.single_label("start", "mass", wrong)), "write `tip.x` or `tip.z`", "{wrong}");
+            assert_eq!(help(names.single_label("start", "place", wrong)), "write `tip.x` or `tip.z`", "{wrong}");
         }
-        let wrong = names.single_label("start", "mass", "tip.y").unwrap_err();
-        assert_eq!(wrong.message, "there is no mass `tip.y`: `tip` has no direction y");
-        assert_eq!(help(names.single_label("start", "mass", "roof")), "did you mean `root`?");
-        assert!(help(names.single_label("start", "mass", "q")).contains("`root`"));
+        let wrong = names.single_label("start", "place", "tip.y").unwrap_err();
+        assert_eq!(wrong.message, "there is no place `tip.y`: `tip` has no direction y");
+        assert_eq!(help(names.single_label("start", "place", "roof")), "did you mean `root`?");
+        assert!(help(names.single_label("start", "place", "q")).contains("`root`"));
     }
 }

@@ -128,10 +128,10 @@ impl SlipReductionCheck {
     pub(crate) fn text(&self, warning: &str) -> String {
         let hertz = |omega: f64| quantity_text(omega, Some(Dimension::FREQUENCY));
         let SlipReductionCheck { points, up_to, again, .. } = self;
-        let slips = |joints: &str| {
+        let limited = |first: &str| {
             format!(
-                "{joints} slip at {points} point{}: `reduction_error` holds for forces up to {}, not for the higher \
-                 harmonics of friction",
+                "{first} {points} point{} with slip, harmonics of friction lie above {}, for which `reduction_error` \
+                 does not hold",
                 plural_suffix(*points),
                 hertz(*up_to)
             )
@@ -142,7 +142,7 @@ impl SlipReductionCheck {
                 "{}. Amplitudes may have an error of several percent if a harmonic excites a lightly damped mode, \
                  if a joint is rigid or stiff, or if a joint is at the place of the excitation. Compare with \
                  reduce = {{ up_to = \"{twice}\" }} or with reduce = false.",
-                slips("Joints")
+                limited("At")
             ),
             Some(BasisDifference { error, place, point_text: at, solved_points: of, coordinates, up_to }) => {
                 let some = if *of == 1 { "one of them was".to_owned() } else { format!("{of} of them were") };
@@ -157,10 +157,10 @@ impl SlipReductionCheck {
                 match *error > 0.01 {
                     true => format!(
                         "{warning}{}; {solved}. Write reduce = {{ up_to = \"{}\" }} or reduce = false.",
-                        slips("joints"),
+                        limited("at"),
                         hertz(*up_to)
                     ),
-                    false => format!("{}; {solved}.", slips("Joints")),
+                    false => format!("{}; {solved}.", limited("At")),
                 }
             }
         }

@@ -57,8 +57,8 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     },
     OutputColumns {
         name: "contact",
-        doc: "share of the period in which every joint sticks, and share in which its faces are apart, in addition to the \
-            slip share",
+        doc: "fraction of the period in which every joint sticks, and in which its faces are apart, in addition to the \
+            fraction with slip",
         columns: |_, system| {
             let joints = system.joints().iter();
             joints

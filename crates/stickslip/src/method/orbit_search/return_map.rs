@@ -198,7 +198,8 @@ fn settle(
     let broke = |cause| OrbitError::Breakdown { method: aim.method, omega: aim.omega, cause };
     let n = start.len();
     let mut state = start.to_vec();
-    let mut changes = Vec::new(); // relative change of the state in every return
+    // Change of the state in every return. If a motion grows steadily, its relative change falls.
+    let mut changes = Vec::new();
     let mut last_states = VecDeque::with_capacity(settings.repeats + 1);
     let mut hopeless = 0;
     // A change per return below this value is rounding.
@@ -214,7 +215,8 @@ fn settle(
         }
         let change: Vec<f64> = state.iter().zip(&before).map(|(a, b)| a - b).collect();
         let size = norm(map.weights(), &state).max(aim.rest).max(f64::MIN_POSITIVE);
-        let residual = norm(map.weights(), &change) / size;
+        let changed = norm(map.weights(), &change);
+        let residual = changed / size;
         if residual.is_nan() {
             // later returns have no size either
             return Err(broke(IntegrationError::OutOfRange { time: 0.0 }));
@@ -224,7 +226,7 @@ fn settle(
         }
         map.report_change(residual);
         smallest = f64::min(smallest, residual);
-        changes.push(residual);
+        changes.push(changed);
         last_states.push_front(before);
         last_states.truncate(settings.repeats);
         if count >= settings.first_progress_check && count.is_power_of_two() {
@@ -235,7 +237,7 @@ fn settle(
             // the first of these states is one return old
             let repeats =
                 last_states.iter().position(|earlier| distance(earlier) <= settings.repeat_distance * residual);
-            let needed = returns_needed(&changes, tolerance);
+            let needed = returns_needed(&changes, tolerance * size);
             hopeless = if needed <= (returns - count) as f64 { 0 } else { hopeless + 1 };
             if residual > tolerance && (repeats.is_some() || hopeless == settings.failed_checks) {
                 let (method, omega) = (aim.method, aim.omega);
@@ -253,7 +255,7 @@ fn settle(
         }
         let Some(window) = window(count) else { continue };
         let of = |last: usize| changes[count - last - window..count - last].iter().sum::<f64>();
-        let (earlier, last) = (of(window), of(0));
+        let (earlier, last) = (of(window) / size, of(0) / size);
         // decay over a whole window; all later changes form a geometric series
         let decay: f64 = if earlier > 0.0 { last / earlier } else { 0.0 };
         let mut missing = if decay < 1.0 { last * decay / (1.0 - decay) } else { f64::INFINITY };
@@ -287,8 +289,8 @@ fn window(count: usize) -> Option<usize> {
     count.is_multiple_of(2 * settings.first_window).then_some(count / 2)
 }
 
-/// Returns the number of further returns to the tolerance if the changes keep their decay over
-/// the last half of all returns. Infinite if they do not decay.
+/// Returns the number of further returns until the remaining change is `tolerance`, if the changes
+/// keep their decay over the last half of all returns. Infinite if they do not decay.
 fn returns_needed(changes: &[f64], tolerance: f64) -> f64 {
     let window = changes.len() / 4;
     let of = |last: usize| changes[changes.len() - last - window..changes.len() - last].iter().sum::<f64>();

@@ -159,7 +159,7 @@ pub enum ReductionError {
         n: usize,
     },
     /// A matrix is not symmetric, although it must be.
-    #[error("the {matrix} matrix is not symmetric: rows {row} and {column} (from 0) differ across the diagonal")]
+    #[error("the {matrix} matrix is not symmetric: its entries ({}, {}) and ({}, {}) differ; export the whole matrix", .row + 1, .column + 1, .column + 1, .row + 1)]
     NotSymmetric {
         /// Name of the matrix.
         matrix: &'static str,
@@ -169,7 +169,7 @@ pub enum ReductionError {
         column: usize,
     },
     /// A port is zero, out of range, or not finite.
-    #[error("port {port} (from 0) is invalid: it needs finite weights, not all zero, for rows below {n}")]
+    #[error("place {} is invalid: it needs finite weights, not all zero, of rows 1 to {n}", .port + 1)]
     Port {
         /// Index of the port, from 0.
         port: usize,
@@ -177,7 +177,7 @@ pub enum ReductionError {
         n: usize,
     },
     /// The structure has no ports.
-    #[error("the structure has no port; name at least one joint, force or observed place")]
+    #[error("the structure has no place to keep; name at least one joint, force or observed place")]
     NoPorts,
     /// A parameter of damping or of a range is invalid.
     #[error("{what} is {value}; it must be {must}")]

@@ -61,7 +61,7 @@ impl Reader {
     ) -> Option<&'static T> {
         let words: Vec<&str> = rows.iter().map(name).collect();
         let Some(entry) = table.get("kind") else {
-            let message = format!("`kind` is missing in {what}: one of {}", alternatives(words));
+            let message = format!("`kind` is missing in {what}; expected one of {}", alternatives(words));
             self.problems
                 .push(Problem::new(&table.location, "kind", message).help(format!("add kind = \"{example}\"")));
             return None;

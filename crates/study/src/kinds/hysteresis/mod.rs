@@ -98,7 +98,7 @@ fn check(values: &Values, model: &Model, _: usize) -> Result<(), KeyError> {
         known.labels("loop", "joint or moved place", name)?;
     }
     if let Some(name) = values.text("against") {
-        ModelNames::displacements(model).single_label("against", "mass", name)?;
+        ModelNames::displacements(model).single_label("against", "place", name)?;
     }
     if values.flag("sum") == Some(true) && values.text("against").is_none() {
         let wanted = requested_loops(values, model);

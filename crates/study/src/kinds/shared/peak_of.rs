@@ -27,7 +27,7 @@ pub(in crate::kinds) const PEAK_OF: Key = optional(
 pub(in crate::kinds) fn check_peak_of(values: &Values, model: &Model) -> Result<(), KeyError> {
     let masses = ModelNames::displacements(model);
     let mut named = values.names("peak_of").unwrap_or_default().iter().filter(|name| *name != ALL);
-    named.try_for_each(|name| masses.labels(PEAK_OF.name, "mass", name).map(drop))
+    named.try_for_each(|name| masses.labels(PEAK_OF.name, "place", name).map(drop))
 }
 
 /// Returns the places that the key names; empty if the key is absent.
@@ -38,7 +38,7 @@ pub(in crate::kinds) fn named_places(prepared: &PreparedCase) -> Vec<usize> {
         return displacements(&prepared.system);
     }
     let masses = ModelNames::displacements(&prepared.case.model);
-    let meant = names.iter().filter_map(|name| masses.labels(PEAK_OF.name, "mass", name).ok()).flatten();
+    let meant = names.iter().filter_map(|name| masses.labels(PEAK_OF.name, "place", name).ok()).flatten();
     let mut found: Vec<usize> = Vec::new();
     for place in meant.filter_map(|name| places.iter().position(|place| place == name)) {
         // the list may contain a place and its node

@@ -24,7 +24,7 @@ pub(crate) fn assembly(system: &System, width: Option<f64>, method: &'static str
             .rate()
             .map(|rate| (rate.states(), rate.state_scale()))
             .or_else(|| carries_nothing(&law).then_some((0, 1.0)))
-            .ok_or("it is not smooth: it is not defined by a differential equation")?;
+            .ok_or("its switch between stick and slip is not smooth")?;
         Ok((law, states, scale))
     })
 }
