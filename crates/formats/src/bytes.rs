@@ -135,18 +135,10 @@ impl NumberType {
     /// Reads the next number as an index or count from zero.
     pub fn index(self, bytes: &mut ByteCursor) -> Result<usize, Error> {
         let before = bytes.clone();
-        let value = match self {
-            Self::I8 => bytes.i8()?.into(),
-            Self::U8 => bytes.u8()?.into(),
-            Self::I16 => bytes.i16()?.into(),
-            Self::U16 => bytes.u16()?.into(),
-            Self::I32 => bytes.i32()?.into(),
-            Self::U32 => bytes.u32()?.into(),
-            Self::I64 => bytes.i64()?,
-            Self::U64 => i64::try_from(bytes.u64()?).unwrap_or(-1),
-            Self::F32 | Self::F64 => -1,
-        };
-        usize::try_from(value).map_err(|_| before.malformed("an index from zero", value))
+        let value = self.real(bytes)?;
+        // no file holds 2^53 entries, beyond which a number may be rounded
+        let is_index = value >= 0.0 && value.fract() == 0.0 && value < (1u64 << 53) as f64;
+        if is_index { Ok(value as usize) } else { Err(before.malformed("an index from zero", value)) }
     }
 }
 

@@ -5,7 +5,7 @@
 //! units may stand between both. Lines above the titles are a preamble.
 
 use super::column::split_unit;
-use super::{Column, DataFile, DataFormat};
+use super::{Column, DataFile, DataFormat, decoded};
 use crate::error::{Error, ErrorKind, Location};
 use crate::text::{Line, Lines, quoted, real};
 use std::borrow::Cow;
@@ -178,15 +178,6 @@ fn strip_comment(text: &[u8]) -> &[u8] {
     let text = text.trim_ascii();
     let start = text.iter().position(|byte| !b"#%!".contains(byte)).unwrap_or(text.len());
     text[start..].trim_ascii()
-}
-
-/// Returns text that is UTF-8, or Latin-1 if it is not.
-fn decoded(text: &[u8]) -> String {
-    let text = text.trim_ascii();
-    match std::str::from_utf8(text) {
-        Ok(text) => text.to_owned(),
-        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
-    }
 }
 
 /// Units without brackets that make a line one of units.

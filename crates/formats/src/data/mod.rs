@@ -145,6 +145,15 @@ fn decode_utf16(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(String::from_utf16_lossy(&units).into_bytes())
 }
 
+/// Returns text without blanks at its ends, which is UTF-8, or Latin-1 if it is not.
+fn decoded(text: &[u8]) -> String {
+    let text = text.trim_ascii();
+    match std::str::from_utf8(text) {
+        Ok(text) => text.to_owned(),
+        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

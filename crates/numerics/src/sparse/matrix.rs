@@ -1,6 +1,5 @@
 //! A square sparse matrix in compressed column storage.
 
-use num_complex::Complex64;
 use std::ops::Range;
 
 /// Maximum number of rows and entries. Indices have 32 bits, which halves the
@@ -200,19 +199,6 @@ impl SparseMatrix {
         }
         product
     }
-
-    /// Returns `A x` for a complex `x`.
-    ///
-    /// # Panics
-    /// If `x` does not have n entries.
-    pub fn multiply_complex(&self, x: &[Complex64]) -> Vec<Complex64> {
-        assert_eq!(x.len(), self.n, "the vector must have as many entries as the matrix has columns");
-        let mut product = vec![Complex64::new(0.0, 0.0); self.n];
-        for (row, column, value) in self.entries() {
-            product[row] += x[column] * value;
-        }
-        product
-    }
 }
 
 /// Column, row, value.
@@ -275,10 +261,6 @@ mod tests {
         for (i, y) in matrix.multiply(&x).iter().enumerate() {
             let row: f64 = (0..n).filter(|k| (i * n + k) % 3 == 0).map(|k| value(i, k) * x[k]).sum();
             assert!((y - row).abs() < 1e-13, "{y} {row}");
-        }
-        let twisted: Vec<Complex64> = x.iter().map(|x| Complex64::new(*x, -2.0 * x)).collect();
-        for (z, y) in matrix.multiply_complex(&twisted).iter().zip(matrix.multiply(&x)) {
-            assert!((z - Complex64::new(y, -2.0 * y)).norm() < 1e-12);
         }
     }
 }

@@ -116,44 +116,22 @@ impl AxisRange {
     }
 }
 
-/// Returns the logarithm to base 10 of a positive number.
-///
-/// The function uses additions, multiplications and divisions only, so that a figure has the
-/// same bytes on every machine. The logarithms of system libraries differ in the last bit.
-///
-/// `log v = e log 2 + 2 atanh((m - 1)/(m + 1)) log e` for `v = m 2^e`, m between 1/√2 and √2.
-/// The error after 13 terms is 1e-20.
+/// Returns the logarithm to base 10 of a positive number, with the same bits on every machine. The
+/// logarithms of system libraries differ in the last bit.
 pub(crate) fn log10(value: f64) -> f64 {
-    if value <= 0.0 || !value.is_finite() {
-        return if value > 0.0 { f64::INFINITY } else { f64::NEG_INFINITY };
+    if value <= 0.0 {
+        return f64::NEG_INFINITY;
     }
-    // Subnormal numbers are scaled up first, because their mantissa is short.
-    let (value, shift) = if value < f64::MIN_POSITIVE { (value * (1u64 << 54) as f64, -54.0) } else { (value, 0.0) };
-    let bits = value.to_bits();
-    let mut exponent = ((bits >> 52) & 0x7ff) as f64 - 1023.0 + shift;
-    let mut mantissa = f64::from_bits((bits & 0x000f_ffff_ffff_ffff) | 0x3ff0_0000_0000_0000);
-    if mantissa > std::f64::consts::SQRT_2 {
-        mantissa /= 2.0;
-        exponent += 1.0;
-    }
-    let s = (mantissa - 1.0) / (mantissa + 1.0);
-    let square = s * s;
-    let series = (0..13).rev().fold(0.0, |sum, k| sum * square + 1.0 / f64::from(2 * k + 1));
-    let log = exponent * std::f64::consts::LOG10_2 + 2.0 * s * series * std::f64::consts::LOG10_E;
+    let log = libm::log10(value);
     // The logarithm of a power of ten is an integer.
     let whole = log.round();
-    if log != whole && (log - whole).abs() < 1e-14 * whole.abs() && power_of_ten(whole as i32) == value {
-        return whole;
-    }
-    log
+    let is_power = (log - whole).abs() < 1e-14 * whole.abs() && power_of_ten(whole as i32) == value;
+    if is_power { whole } else { log }
 }
 
-/// Returns ten to a power, by additions and multiplications only: the inverse of [`log10`].
+/// Returns ten to a power, with the same bits on every machine: the inverse of [`log10`].
 fn exp10(power: f64) -> f64 {
-    let whole = power.floor();
-    let x = (power - whole) * std::f64::consts::LN_10;
-    // For x < 2.4, the terms up to x²⁹ give exp x to the last bits.
-    power_of_ten(whole as i32) * (1..30).rev().fold(1.0, |sum, k| 1.0 + sum * x / f64::from(k))
+    libm::exp10(power)
 }
 
 /// Returns a correctly rounded power of ten, which may underflow to zero or overflow to

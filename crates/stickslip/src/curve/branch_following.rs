@@ -24,12 +24,13 @@ pub fn is_followed(system: &System) -> bool {
     system.dofs() + directions <= 24 && !system.is_incrementally_stable()
 }
 
-/// Returns a solver with branch following for systems that use it; otherwise the method's own
-/// solver.
+/// Returns a solver for [`solve_sequence`](super::sweep::solve_sequence). For systems that use
+/// branch following, it continues the branch of its seed in smaller steps before it changes to
+/// another branch; otherwise it is the method's own solver.
 ///
 /// # Errors
 /// The method does not support the system.
-pub(crate) fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
+pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = solver_with_alternatives(method, system)?;
     Ok(if is_followed(system) {
         Box::new(BranchFollower { solver, end: None, work_limit_reached: false })
@@ -82,8 +83,8 @@ impl BranchFollower<'_> {
             let target = if arrives { omega } else { from + share * (omega - from) };
             let estimate = if arrives { request.estimate } else { ErrorEstimate::Skipped };
             let found = self.solver.solve(&Request { omega: target, seed: Some(&last), estimate }, budget);
-            // Work limit of all steps in an interval, as a fraction of the work limit of a
-            // point. After it is exceeded, no interval is repeated in smaller steps.
+            // After the work limit of all steps of an interval, no interval is repeated in smaller
+            // steps.
             self.work_limit_reached =
                 budget.is_used_up() || matches!(found, Err(OrbitError::NotConverged { work_limit_reached: true, .. }));
             let next = found.ok().map(|orbit| (orbit.seed(), orbit));

@@ -8,7 +8,8 @@
 //! then solved in reverse, from the first orbit found after them. A point that is found from
 //! neither side is solved without a seed.
 
-use super::{PointBudget, branch_following};
+use super::PointBudget;
+pub use super::branch_following::solver;
 use crate::method::{Method, MethodError, OrbitError, Request, Solver};
 use crate::model::System;
 use crate::orbit::{Orbit, Seed};
@@ -82,15 +83,6 @@ pub fn sweep<R: Send>(
 
 /// Receives an outcome at a frequency (rad/s); `None` if the sweep was stopped before.
 pub type Observer<'a> = dyn FnMut(f64, Option<Result<&Orbit, &OrbitError>>) + 'a;
-
-/// Returns a solver for [`solve_sequence`]. For systems that use branch following, it continues
-/// the branch of its initial guess in smaller steps before it changes to another branch.
-///
-/// # Errors
-/// The method does not support the system.
-pub fn solver<'a>(method: &dyn Method, system: &'a System) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
-    branch_following::solver(method, system)
-}
 
 /// Solves at several frequencies (rad/s) in sequence, each with the previous orbit as seed.
 /// Points without an orbit from there are solved in reverse from the next orbit. `see`

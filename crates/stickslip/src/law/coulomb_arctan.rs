@@ -5,6 +5,7 @@
 //! Source: Pust, Pesek, Radolfova (2015), Eq. (2). The paper's alpha = 25 s/mm is 25 000 s/m in
 //! SI.
 
+use super::interface::prox::resolve_saturating;
 use super::{Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion, SampleMeans};
 use crate::dimension::Dimension;
 use num_complex::Complex64;
@@ -87,26 +88,23 @@ impl RateLaw for CoulombArctan {
 
 impl ProxView for CoulombArctan {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
-        let (value, rise) = resolve(y[0] / self.limit, self.alpha * self.limit / penalty);
+        let (value, rise) =
+            resolve_saturating(y[0] / self.limit, self.alpha * self.limit / penalty, arctangent_with_slope);
         (force[0], slope[0]) = (self.limit * value, rise);
     }
     fn force_at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
-        let scaled = self.alpha * velocity;
-        let size = self.limit * FRAC_2_PI;
-        Some((size * scaled.atan(), size * self.alpha / (1.0 + scaled * scaled)))
+        let (value, slope) = arctangent_with_slope(self.alpha * velocity);
+        Some((self.limit * value, self.limit * self.alpha * slope))
     }
     fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<SampleMeans> {
         let mean = mean_of_arctangent(self.alpha * velocity, self.alpha * e);
-        let size = self.limit * FRAC_2_PI;
-        let (force, slope) = (size, size * self.alpha);
-        Some(SampleMeans {
-            zeroth: force * mean.zeroth,
-            first: force * mean.first,
-            slope: slope * mean.slope,
-            slope_first: slope * mean.slope_first,
-            slope_second: slope * mean.slope_second,
-        })
+        Some(mean.scaled(self.limit * FRAC_2_PI, self.alpha))
     }
+}
+
+/// Returns `(2/π) arctan x` and its derivative.
+fn arctangent_with_slope(x: f64) -> (f64, f64) {
+    (FRAC_2_PI * x.atan(), FRAC_2_PI / (1.0 + x * x))
 }
 
 /// Returns means of `arctan(y + eξ)` over `-1 < ξ < 1`, in closed form, or by quadrature if the
@@ -122,25 +120,4 @@ fn mean_of_arctangent(y: f64, e: f64) -> SampleMeans {
         let (atan, log) = (x.atan(), (x * x).ln_1p());
         [atan, x * atan - 0.5 * log, 0.5 * (x * x - 1.0) * atan + 0.5 * x - 0.5 * x * log]
     })
-}
-
-/// Returns `λ` and `dλ/dy` of `λ + w = y`, `λ = (2/π) atan(s w)`.
-fn resolve(y: f64, s: f64) -> (f64, f64) {
-    let target = y.abs();
-    // The left side is increasing and concave in w, so Newton's method from below converges
-    // monotonically.
-    let mut w = (target - 1.0).max(target / (1.0 + FRAC_2_PI * s));
-    // Upper bound on the iterations of `resolve`; they converge quadratically.
-    for _ in 0..60 {
-        let left = w + FRAC_2_PI * (s * w).atan() - target;
-        let slope = 1.0 + FRAC_2_PI * s / (1.0 + s * s * w * w);
-        let step = left / slope;
-        w -= step;
-        // rounding of the left side; NaN also ends the loop
-        if step.abs() <= 4.0 * f64::EPSILON * target || step.is_nan() {
-            break;
-        }
-    }
-    let slope = FRAC_2_PI * s / (1.0 + s * s * w * w);
-    ((target - w).copysign(y), slope / (1.0 + slope))
 }

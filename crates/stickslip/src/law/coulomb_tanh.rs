@@ -6,6 +6,7 @@
 //! Source: Andersson, Söderberg, Björklund (2007), "Friction models for sliding dry, boundary
 //! and mixed lubricated contacts", Tribology International 40, 580-587.
 
+use super::interface::prox::resolve_saturating;
 use super::{Law, LawInfo, Parameter, ProxView, RateLaw, RateView, RelativeMotion, SampleMeans};
 use crate::dimension::Dimension;
 use std::f64::consts::{LN_2, PI};
@@ -75,7 +76,8 @@ impl RateLaw for CoulombTanh {
 
 impl ProxView for CoulombTanh {
     fn resolve(&self, y: &[f64], penalty: f64, force: &mut [f64], slope: &mut [f64]) {
-        let (value, rise) = resolve(y[0] / self.limit, self.limit / (penalty * self.velocity));
+        let (value, rise) =
+            resolve_saturating(y[0] / self.limit, self.limit / (penalty * self.velocity), tanh_with_slope);
         (force[0], slope[0]) = (self.limit * value, rise);
     }
     fn force_at_velocity(&self, velocity: f64) -> Option<(f64, f64)> {
@@ -84,14 +86,7 @@ impl ProxView for CoulombTanh {
     }
     fn mean_at_velocity(&self, velocity: f64, e: f64) -> Option<SampleMeans> {
         let mean = mean_of_tanh(velocity / self.velocity, e / self.velocity);
-        let (force, slope) = (self.limit, self.limit / self.velocity);
-        Some(SampleMeans {
-            zeroth: force * mean.zeroth,
-            first: force * mean.first,
-            slope: slope * mean.slope,
-            slope_first: slope * mean.slope_first,
-            slope_second: slope * mean.slope_second,
-        })
+        Some(mean.scaled(self.limit, 1.0 / self.velocity))
     }
 }
 
@@ -149,27 +144,6 @@ fn dilogarithm_of_negative(q: f64) -> f64 {
     -series - 0.5 * log * log
 }
 
-/// Returns `λ` and `dλ/dy` of `λ + w = y`, `λ = tanh(s w)`.
-fn resolve(y: f64, s: f64) -> (f64, f64) {
-    let target = y.abs();
-    // The left side is increasing and concave in w, so Newton's method from below converges
-    // monotonically. Both bounds follow from tanh x ≤ min(1, x).
-    let mut w = (target - 1.0).max(target / (1.0 + s));
-    let mut rise = s;
-    // Upper bound on the iterations; they converge quadratically.
-    for _ in 0..60 {
-        let (value, slope) = tanh_with_slope(s * w);
-        rise = s * slope;
-        let step = (w + value - target) / (1.0 + rise);
-        w -= step;
-        // rounding of the left side; NaN also ends the loop
-        if step.abs() <= 4.0 * f64::EPSILON * target || step.is_nan() {
-            break;
-        }
-    }
-    ((target - w).copysign(y), rise / (1.0 + rise))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -210,13 +184,15 @@ mod tests {
     fn the_resolvent_solves_its_equation() {
         for s in [1e-6, 0.3, 1.0, 50.0, 1e9] {
             for y in [-7.0, -1.0, -1e-3, 0.0, 1e-9, 0.4, 0.999, 1.0, 1.001, 3.0] {
-                let (value, rise) = resolve(y, s);
+                let (value, rise) = resolve_saturating(y, s, tanh_with_slope);
                 let w: f64 = y - value;
                 // both differences round to the last digit of y, and the slope at w is at most s
                 let rounding = f64::EPSILON * (1.0 + y.abs()) * (1.0 + s);
                 assert!((value - (s * w).tanh()).abs() <= rounding, "{s} {y}: {value}");
                 let step = 1e-6;
-                let difference = (resolve(y + step, s).0 - resolve(y - step, s).0) / (2.0 * step);
+                let difference = (resolve_saturating(y + step, s, tanh_with_slope).0
+                    - resolve_saturating(y - step, s, tanh_with_slope).0)
+                    / (2.0 * step);
                 // near the limit of a steep law the slope changes within the step
                 let smooth = s < 100.0 || (y.abs() - 1.0).abs() > 0.01;
                 assert!(!smooth || (rise - difference).abs() < 1e-6, "{s} {y}: {rise} {difference}");

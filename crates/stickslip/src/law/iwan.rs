@@ -20,7 +20,7 @@
 //! need discrete sliders. The force of first loading is then exact at the edges of the bins and
 //! too large between them.
 
-use super::interface::describing_function::{self, Views};
+use super::interface::describing_function;
 use super::interface::ideal_elements::UNREACHABLE_LIMIT;
 use super::interface::masing::{
     MAX_LEGS, MasingView, advance_legs, complex_stiffness, first_unreversed_leg, leg_count, leg_force,
@@ -186,10 +186,7 @@ impl Law for Iwan {
         match (self.masing(), amplitude > 0.0) {
             (Some(law), true) => complex_stiffness(law, amplitude),
             (Some(_), false) => self.stiffness.into(),
-            (None, _) => {
-                let views = Views { ideal_elements: self.ideal_elements(), directions: 1, ..Views::default() };
-                describing_function::complex_stiffness(views, amplitude, omega)
-            }
+            (None, _) => describing_function::complex_stiffness(self, amplitude, omega),
         }
     }
     fn is_incrementally_passive(&self) -> bool {

@@ -13,7 +13,7 @@
 
 use super::flow::average_acceleration::law_step;
 use super::harmonic_balance;
-use crate::law::{IdealElement, Jenkins, Jenkins2d, Law, MAX_DIRECTIONS, RelativeMotion, SharedLaw};
+use crate::law::{IdealElement, Jenkins, Jenkins2d, Law, MAX_DIRECTIONS, SharedLaw};
 use crate::model::{Axis, System, SystemJoint};
 use crate::orbit::Orbit;
 use num_complex::Complex64;
@@ -229,18 +229,10 @@ fn rigid_friction_spring(system: &System, joint: &SystemJoint) -> Option<SharedL
 
 /// Returns true if a law has a force before its joint moves.
 fn is_preloaded(law: &dyn Law) -> bool {
-    let rest = [0.0; MAX_DIRECTIONS];
-    let force = match (law.step(), law.rate()) {
-        (Some(step), _) => step.advance_values(&rest, &rest, &mut vec![0.0; step.states()]),
-        (None, Some(rate)) => {
-            let mut z = vec![0.0; rate.states()];
-            rate.evaluate_values(&RelativeMotion { displacement: rest, velocity: rest }, &z.clone(), &mut z)
-        }
-        (None, None) => rest,
-    };
     let pressed =
         |piece: &IdealElement| matches!(piece, IdealElement::Stop { gap, stiffness } if *gap < 0.0 && *stiffness > 0.0);
-    force != rest || law.ideal_elements().is_some_and(|pieces| pieces.iter().any(pressed))
+    law.force_at_rest() != [0.0; MAX_DIRECTIONS]
+        || law.ideal_elements().is_some_and(|pieces| pieces.iter().any(pressed))
 }
 
 /// Returns the internal states of all joints at other displacements (m), after a straight and

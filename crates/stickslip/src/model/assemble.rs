@@ -31,11 +31,6 @@ impl Model {
         names
     }
 
-    /// Returns the names of all places except the ground.
-    pub fn moving_names(&self) -> Vec<String> {
-        self.place_names().split_off(1)
-    }
-
     /// Returns the labels of the axes of every joint in results: its name, or `joint.direction`
     /// for joints between nodes.
     ///

@@ -507,11 +507,6 @@ impl UnitParser<'_> {
     }
 }
 
-/// Lists all units for the documentation: (name, whether it takes prefixes).
-pub fn all_units() -> Vec<(&'static str, bool)> {
-    UNITS.iter().map(|row| (row.name, row.prefixes)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,8 +1,9 @@
 //! Datasets 151 (title) and 164 (units).
 
 use super::fields::{Widths, append_numbers, integer_at};
-use super::{TextSet, text_of, words};
+use super::{TextSet, words};
 use crate::data::DataFile;
+use crate::data::decoded;
 use crate::error::Error;
 
 /// Reads dataset 151: lines of text.
@@ -20,7 +21,7 @@ pub(super) fn read_units(set: &TextSet<'_>, file: &mut DataFile) -> Result<(), E
         append_numbers(line, Widths(&[25]), &mut factors)?;
     }
     let code = integer_at(&line, 0, 10);
-    let name = text_of(line.columns(10, 30));
+    let name = decoded(line.columns(10, 30));
     let factors = match factors[..] {
         [length, force, ..] => format!("; 1 m is {length} and 1 N is {force} in them"),
         _ => String::new(),

@@ -7,8 +7,9 @@
 //! Columns: `N.x`, and `N.y` or `N.real` and `N.imaginary`; N is the position of the dataset.
 
 use super::fields::{Widths, append_numbers, integer_at, integers};
-use super::{TextSet, is_delimiter, text_of, words};
+use super::{TextSet, is_delimiter, words};
 use crate::bytes::{ByteCursor, ByteOrder, NumberType};
+use crate::data::decoded;
 use crate::data::{Column, DataFile};
 use crate::error::{Error, ErrorKind, Location};
 use crate::text::{Line, Lines};
@@ -151,7 +152,7 @@ fn entity_label(line: &Line<'_>) -> String {
     let kind = integer_at(line, 0, 5);
     let name = usize::try_from(kind).ok().and_then(|kind| FUNCTIONS.get(kind)).copied();
     let point = |name: (usize, usize), node: (usize, usize), direction: (usize, usize)| {
-        let entity = text_of(line.columns(name.0, name.1));
+        let entity = decoded(line.columns(name.0, name.1));
         let node = integer_at(line, node.0, node.1);
         let direction = match integer_at(line, direction.0, direction.1) {
             0 => String::new(),
@@ -174,7 +175,7 @@ fn entity_label(line: &Line<'_>) -> String {
 /// Reads the texts of an axis: `I10, 3I5, 2(1X, 20A1)`.
 fn axis(line: &Line<'_>) -> AxisText {
     let text = |from: usize, to: usize| {
-        let text = text_of(line.columns(from, to));
+        let text = decoded(line.columns(from, to));
         if text.eq_ignore_ascii_case("none") { String::new() } else { text }
     };
     AxisText { name: text(26, 46), unit: text(47, 67) }

@@ -15,7 +15,7 @@ mod function;
 mod nodal_data;
 mod nodes;
 
-use super::{DataFile, DataFormat};
+use super::{DataFile, DataFormat, decoded};
 use crate::error::{Error, ErrorKind, Location};
 use crate::text::{Line, Lines};
 
@@ -121,15 +121,7 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
 
 /// Returns text of a line without blanks at its ends: UTF-8, or Latin-1 if it is not UTF-8.
 fn words(line: &Line<'_>) -> String {
-    text_of(line.text)
-}
-
-fn text_of(text: &[u8]) -> String {
-    let text = text.trim_ascii();
-    match std::str::from_utf8(text) {
-        Ok(text) => text.to_owned(),
-        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
-    }
+    decoded(line.text)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The describing function of a law: the first harmonic of its periodic force under a harmonic
 //! motion.
 
-use crate::law::{IdealElement, MAX_DIRECTIONS, ProxView, RatePoint, RateView, RelativeMotion, Slider, StepView};
+use crate::law::{IdealElement, Law, MAX_DIRECTIONS, RatePoint, RateView, RelativeMotion, Slider};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
@@ -15,32 +15,20 @@ const SAMPLES: usize = 128;
 /// to it.
 const CYCLES: usize = 3;
 
-/// The views of a law from which its describing function follows.
-#[derive(Default)]
-pub(in crate::law) struct Views<'a> {
-    pub(in crate::law) ideal_elements: Option<Vec<IdealElement>>,
-    pub(in crate::law) rate: Option<&'a dyn RateView>,
-    pub(in crate::law) step: Option<&'a dyn StepView>,
-    pub(in crate::law) prox: Option<&'a dyn ProxView>,
-    /// Number of directions of the law.
-    pub(in crate::law) directions: usize,
-}
-
 /// Returns the complex stiffness, N/m, at an amplitude (m) and a frequency (rad/s). It uses the
-/// first available view, in the order of the fields.
-pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega: f64) -> Complex64 {
-    let Views { ideal_elements, rate, step, prox, directions } = views;
+/// first view that the law has: ideal elements, rate, step, resolvent.
+pub(in crate::law) fn complex_stiffness<L: Law + ?Sized>(law: &L, amplitude: f64, omega: f64) -> Complex64 {
     // At zero amplitude, use a tiny amplitude. The limit of small motion would need a length
     // scale of the law.
     let a = if amplitude > 0.0 { amplitude } else { f64::MIN_POSITIVE.sqrt() };
-    if let Some(ideal_elements) = ideal_elements {
+    if let Some(ideal_elements) = law.ideal_elements() {
         return ideal_elements.iter().map(|element| slider_or_stop(element, amplitude)).sum();
     }
-    if let Some(rate) = rate {
+    if let Some(rate) = law.rate() {
         let at_once = if rate.is_batched() { batched_rate_law(rate, a, omega) } else { None };
         return at_once.unwrap_or_else(|| rate_law(rate, a, omega));
     }
-    if let Some(step) = step {
+    if let Some(step) = law.step() {
         let mut z = vec![0.0; step.states()];
         let mut before = [0.0; MAX_DIRECTIONS];
         return first_harmonic(a, |theta| {
@@ -50,14 +38,14 @@ pub(in crate::law) fn complex_stiffness(views: Views<'_>, amplitude: f64, omega:
             force
         });
     }
-    let Some(prox) = prox else { return ZERO };
+    let Some(prox) = law.prox() else { return ZERO };
     // Penalty times velocity amplitude. The resolvent then evaluates the law at a velocity that
-    // differs by `λ / STEEP` of the velocity amplitude.
+    // differs by `1e-6 λ` of the velocity amplitude.
     let penalty = 1e6 / (a * omega);
     let rigid = first_harmonic(a, |theta| {
         let y = -penalty * a * omega * theta.sin();
         let (mut force, mut slope) = ([0.0; MAX_DIRECTIONS], [0.0; MAX_DIRECTIONS * MAX_DIRECTIONS]);
-        prox.resolve(&[y, 0.0, 0.0][..directions], penalty, &mut force, &mut slope);
+        prox.resolve(&[y, 0.0, 0.0][..law.directions()], penalty, &mut force, &mut slope);
         force[0]
     });
     // add the spring in series

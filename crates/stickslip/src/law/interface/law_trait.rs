@@ -1,6 +1,6 @@
 //! The trait of all laws, and the description of a law in the table.
 
-use super::describing_function::{Views, complex_stiffness};
+use super::describing_function::complex_stiffness;
 use super::ideal_elements::{IdealElement, Slider};
 use crate::law::{Contact, MasingView, Parameter, ProxView, RateView, SlidingView, StepView};
 use num_complex::Complex64;
@@ -170,14 +170,7 @@ pub trait Law: Debug + Send + Sync {
     /// Returns the complex stiffness (N/m) of the first harmonic under `u = amplitude cos Ωt` in
     /// the first direction. Methods build initial guesses from it.
     fn describing_function(&self, amplitude: f64, omega: f64) -> Complex64 {
-        let views = Views {
-            ideal_elements: self.ideal_elements(),
-            rate: self.rate(),
-            step: self.step(),
-            prox: self.prox(),
-            directions: self.directions(),
-        };
-        complex_stiffness(views, amplitude, omega)
+        complex_stiffness(self, amplitude, omega)
     }
     /// Returns the smooth law that converges to this one as `width` (m/s) goes to zero. `width`
     /// is the velocity over which friction changes its sign.

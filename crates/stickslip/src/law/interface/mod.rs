@@ -15,7 +15,7 @@ pub(in crate::law) mod ideal_elements;
 mod law_trait;
 pub(in crate::law) mod masing;
 pub(in crate::law) mod parameter;
-mod prox;
+pub(super) mod prox;
 mod rate;
 mod relative_motion;
 mod sliding;

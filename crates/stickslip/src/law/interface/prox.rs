@@ -61,6 +61,18 @@ pub struct SampleMeans {
 }
 
 impl SampleMeans {
+    /// Returns the means of `size g(rate v)`, where these are the means of `g`.
+    pub(crate) fn scaled(self, size: f64, rate: f64) -> Self {
+        let slope = size * rate;
+        SampleMeans {
+            zeroth: size * self.zeroth,
+            first: size * self.first,
+            slope: slope * self.slope,
+            slope_first: slope * self.slope_first,
+            slope_second: slope * self.slope_second,
+        }
+    }
+
     /// Computes the means by quadrature. `g` returns the function's value and its derivative.
     #[inline]
     pub fn by_quadrature(y: f64, e: f64, g: impl Fn(f64) -> (f64, f64)) -> Self {
@@ -98,4 +110,26 @@ impl SampleMeans {
             slope_second: slope - 2.0 * first / reach,
         }
     }
+}
+
+/// Returns `λ` and `dλ/dy` of `λ + w = y`, `λ = g(s w)`. The odd function `g`, which the closure
+/// returns with its derivative, tends to one and is concave for positive arguments.
+pub(crate) fn resolve_saturating(y: f64, s: f64, g: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
+    let target = y.abs();
+    // The left side is increasing and concave in w, so Newton's method from below converges
+    // monotonically. Both bounds follow from g(x) ≤ min(1, g'(0) x).
+    let mut rise = s * g(0.0).1;
+    let mut w = (target - 1.0).max(target / (1.0 + rise));
+    // Upper bound on the iterations; they converge quadratically.
+    for _ in 0..60 {
+        let (value, slope) = g(s * w);
+        rise = s * slope;
+        let step = (w + value - target) / (1.0 + rise);
+        w -= step;
+        // rounding of the left side; NaN also ends the loop
+        if step.abs() <= 4.0 * f64::EPSILON * target || step.is_nan() {
+            break;
+        }
+    }
+    ((target - w).copysign(y), rise / (1.0 + rise))
 }

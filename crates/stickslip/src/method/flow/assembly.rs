@@ -2,7 +2,7 @@
 //! with the indices of their axes and states.
 
 use super::excitation::HarmonicExcitation;
-use crate::law::SharedLaw;
+use crate::law::{RelativeMotion, SharedLaw};
 use crate::method::{IntegrationError, MethodError};
 use crate::model::{Axis, System};
 use crate::structure::Matrices;
@@ -142,6 +142,36 @@ impl Assembly {
         let (g, speed) = excitation.relative_at(axis, time);
         let (x, v) = state.split_at(self.n);
         (self.axes[axis].component(x) + g, self.axes[axis].component(v) + speed)
+    }
+
+    /// Returns the relative motion of a joint.
+    pub fn motion_of(
+        &self,
+        joint: &IndexedLaw,
+        state: &[f64],
+        excitation: &HarmonicExcitation,
+        time: f64,
+    ) -> RelativeMotion<f64> {
+        let mut motion = RelativeMotion::along(0.0, 0.0);
+        for (d, axis) in joint.axes().enumerate() {
+            (motion.displacement[d], motion.velocity[d]) = self.relative(axis, state, excitation, time);
+        }
+        motion
+    }
+
+    /// Returns the largest error relative to the scales of displacement and velocity and to the
+    /// internal states; infinite if an error is not finite.
+    pub fn error_size(&self, error: &[f64], state: &[f64], scale: (f64, f64)) -> f64 {
+        if error.iter().any(|e| !e.is_finite()) {
+            return f64::INFINITY;
+        }
+        let n = self.n;
+        let moving = (0..n).map(|i| (error[i].abs() / scale.0).max(error[n + i].abs() / scale.1));
+        let internal = self.joints.iter().flat_map(|joint| {
+            let size = move |s: usize| joint.state_scale + state[2 * n + s].abs();
+            joint.internal().map(move |s| error[2 * n + s].abs() / size(s))
+        });
+        moving.chain(internal).fold(0.0, f64::max)
     }
 
     /// Computes the acceleration (length n) of a state under loads and joint forces. `net_force`

@@ -50,19 +50,12 @@ impl HarmonicExcitation {
 
     /// Collects the excitation at this frequency; at zero, only the constant forces.
     pub fn at(system: &System, contacts: &[usize], omega: f64) -> Self {
-        if omega > 0.0 {
-            HarmonicExcitation::new(system, contacts, omega)
-        } else {
-            HarmonicExcitation::without_harmonics(system, contacts)
+        let mut excitation = HarmonicExcitation::new(system, contacts, omega);
+        if omega == 0.0 {
+            excitation.rates.clear();
+            excitation.forces.clear();
+            excitation.imposed.clear();
         }
-    }
-
-    /// Collects the constant forces alone.
-    fn without_harmonics(system: &System, contacts: &[usize]) -> Self {
-        let mut excitation = HarmonicExcitation::new(system, contacts, 0.0);
-        excitation.rates.clear();
-        excitation.forces.clear();
-        excitation.imposed.clear();
         excitation
     }
 

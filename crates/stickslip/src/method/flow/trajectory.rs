@@ -155,11 +155,7 @@ impl Trajectory {
     fn joints(&self, step: usize, s: f64, time: f64, state: &[f64], sign: f64) -> Vec<JointSample> {
         let count = self.steps.nodes.len();
         let sample = |(q, joint): (usize, &IndexedLaw)| {
-            let mut motion = RelativeMotion::along(0.0, 0.0);
-            for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) =
-                    self.assembly.relative(axis, state, &self.excitation, time);
-            }
+            let mut motion = self.assembly.motion_of(joint, state, &self.excitation, time);
             let mut force = self.forces(joint, (step, s), &motion);
             for values in [&mut motion.displacement, &mut motion.velocity, &mut force] {
                 values.iter_mut().for_each(|value| *value *= sign);

@@ -234,10 +234,8 @@ impl Discretization {
             }
         }
         if convergence.residual > solved && convergence.least < f64::INFINITY {
-            let iterations = motion.iterations;
             motion.c.clone_from(&self.workspace.best.c);
             motion.force.clone_from(&self.workspace.best.force);
-            motion.iterations = iterations;
             convergence.residual = self.evaluate(context, motion, length, DerivativeScope::None);
         }
         self.search.reuses_states = false;

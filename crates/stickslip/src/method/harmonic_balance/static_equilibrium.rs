@@ -80,21 +80,9 @@ pub(super) fn static_equilibrium(
     let banded = BandedForm::new(system, ports, &harmonics);
     let mut discretization = Discretization::new(harmonics, SAMPLES, ports, banded);
     discretization.set_frequency(system, ports, dynamics, omega).ok()?;
-    let start = if discretization.is_held_by_contacts() {
-        discretization.static_solution(1.0)
-    } else {
-        discretization.frictionless_motion()
-    };
-    let mut solution = start;
+    let mut solution = discretization.static_solution(1.0);
     solve_static(&mut discretization, ports, omega, &mut solution)?;
-    let mut states = vec![StaticState::default(); ports.len()];
-    for (p, port) in ports.iter().enumerate() {
-        discretization.sample(ports, p, omega, &solution);
-        states[p].states.clone_from(&discretization.aft.state);
-        for (to, c) in states[p].displacement.iter_mut().zip(&solution.c[port.range()]) {
-            *to = c.re;
-        }
-    }
+    let states = (0..ports.len()).map(|p| discretization.initial_state_of(ports, p, omega, &solution)).collect();
     let x = postprocess::places(&mut discretization, dynamics, omega, &solution).ok()?;
     let setting = postprocess::OrbitInput {
         system,

@@ -167,13 +167,7 @@ impl Model {
             let (stuck, closed) = with_faces(&held, &faces, &stuck);
             return Survey { free, stuck, closed, at_rest, system: system.clone(), joints, loose, unpressed };
         }
-        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
-        let ends = |between: &[String; 2]| -> Vec<(usize, f64)> {
-            let ends = between.iter().zip([1.0, -1.0]);
-            let rows =
-                ends.filter_map(|(name, sign)| Some((system.place_axes()[*index.get(name.as_str())?].rows(), sign)));
-            rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
-        };
+        let ends = relative_displacement(system);
         let springs: Vec<SpringDamper> = self
             .springs
             .iter()
@@ -188,6 +182,17 @@ impl Model {
         };
         let (stuck, closed) = with_faces(&held, &faces, &stuck);
         Survey { system: system.clone(), joints, free, stuck, closed, at_rest, loose, unpressed }
+    }
+}
+
+/// Returns the displacement between two places as a sum of degrees of freedom. The ground does not
+/// move.
+fn relative_displacement(system: &System) -> impl Fn(&[String; 2]) -> Vec<(usize, f64)> {
+    let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
+    move |between| {
+        let ends = between.iter().zip([1.0, -1.0]);
+        let rows = ends.filter_map(|(name, sign)| Some((system.place_axes()[*index.get(name.as_str())?].rows(), sign)));
+        rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
     }
 }
 

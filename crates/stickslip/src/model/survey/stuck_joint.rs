@@ -30,7 +30,7 @@ impl StuckAxis {
     pub(super) fn of_joint(index: usize, joint: &SystemJoint, law: &dyn Law) -> Vec<Self> {
         let axes = joint.labels().zip(joint.axes()).enumerate();
         axes.map(|(axis, (name, along))| {
-            let pressed = (law.normal() == Some(axis)).then(|| force_at_rest(law, axis));
+            let pressed = (law.normal() == Some(axis)).then(|| law.force_at_rest()[axis]);
             let state =
                 pressed.map_or_else(|| StuckState::of(law, axis), |force| StuckState::pressed(law, axis, force));
             let closed = match state {
@@ -162,19 +162,6 @@ fn small_damping(law: &dyn Law, axis: usize) -> f64 {
     point.force_slope(axis)[count + axis]
 }
 
-/// Returns the force of a law along an axis at zero displacement, N.
-fn force_at_rest(law: &dyn Law, axis: usize) -> f64 {
-    let rest = [0.0; MAX_DIRECTIONS];
-    match (law.step(), law.rate()) {
-        (Some(step), _) => step.advance_values(&rest, &rest, &mut vec![0.0; step.states()])[axis],
-        (None, Some(rate)) => {
-            let mut z = vec![0.0; rate.states()];
-            rate.evaluate_values(&RelativeMotion { displacement: rest, velocity: rest }, &z.clone(), &mut z)[axis]
-        }
-        (None, None) => 0.0,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,7 +185,7 @@ mod tests {
         // a stop carries force when it is pressed, but not when it only touches
         let stop = |gap: f64| {
             let law = Gap { gap, stiffness: 1e4 };
-            StuckState::pressed(&law, 0, force_at_rest(&law, 0))
+            StuckState::pressed(&law, 0, (&law as &dyn Law).force_at_rest()[0])
         };
         assert!(matches!(stop(-1e-3), StuckState::Spring { stiffness: 1e4, .. }), "{:?}", stop(-1e-3));
         assert_eq!([0.0, 1e-3].map(stop), [StuckState::Nothing; 2]);

@@ -8,7 +8,7 @@
 
 use super::linear_modes::{LinearStructure, MAX_DOFS, SpringDamper, separate_by_damping};
 use super::stuck_joint::{StuckAxis, StuckState};
-use super::{LinearModes, Model, ModelError, NaturalMode, System};
+use super::{LinearModes, Model, ModelError, NaturalMode, System, relative_displacement};
 use crate::model::{Body, Mass, Place};
 use crate::structure::reduction::Row;
 use crate::structure::{Structure, unit_root};
@@ -71,6 +71,29 @@ impl WaveRows {
             part.into_iter().filter(|(i, weight)| *weight != 0.0 && *i < copies * self.dofs).collect()
         };
         parts.into_iter().take(copies).map(row).filter(|row| !row.is_empty()).collect()
+    }
+
+    /// Returns the springs and dampers along the rows of the wave.
+    fn links(&self, at: &[(usize, f64)], stiffness: f64, damping: f64) -> Vec<SpringDamper> {
+        self.rows(at).into_iter().map(|at| SpringDamper { at, stiffness, damping }).collect()
+    }
+
+    /// Returns the dampers of the free joints, and the links and rigid directions of the stuck
+    /// ones.
+    fn joint_links(&self, joints: &[StuckAxis]) -> (Vec<SpringDamper>, Vec<SpringDamper>, Vec<Row>) {
+        let of = |one: SpringDamper| self.links(&one.at, one.stiffness, one.damping);
+        let dampers = joints.iter().filter_map(StuckAxis::free_link).flat_map(of).collect();
+        let (mut held, mut rigid) = (Vec::new(), Vec::new());
+        for joint in joints {
+            match joint.state {
+                StuckState::Nothing if joint.closed > 0.0 => held.extend(self.links(&joint.at, joint.closed, 0.0)),
+                StuckState::Nothing | StuckState::Spring { .. } => {
+                    held.extend(joint.stuck_link().into_iter().flat_map(of));
+                }
+                StuckState::Rigid { .. } => rigid.extend(self.rows(&joint.at)),
+            }
+        }
+        (dampers, held, rigid)
     }
 
     /// Combines the modes of both joint states, with shapes at the places.
@@ -244,13 +267,7 @@ impl Model {
         if n == 0 || 2 * n > MAX_DOFS {
             return None;
         }
-        let index: HashMap<&str, usize> = system.places().iter().enumerate().map(|(i, p)| (p.as_str(), i)).collect();
-        let ends = |between: &[String; 2]| -> Row {
-            let ends = between.iter().zip([1.0, -1.0]);
-            let rows =
-                ends.filter_map(|(name, sign)| Some((system.place_axes()[*index.get(name.as_str())?].rows(), sign)));
-            rows.flat_map(|(rows, sign)| rows.iter().map(move |(row, weight)| (*row, sign * weight))).collect()
-        };
+        let ends = relative_displacement(system);
         let springs = &self.springs[..self.springs.len() / sectors];
         let joints = &system.joints()[..system.joints().len() / sectors];
         let stuck: Vec<StuckAxis> =
@@ -261,23 +278,9 @@ impl Model {
             let double = !(2 * diameter).is_multiple_of(sectors);
             let turned = WaveRows { dofs: n, sectors, diameter, double };
             let mass = if double { [own.clone(), own.clone()].concat() } else { own.clone() };
-            let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<SpringDamper> {
-                turned.rows(at).into_iter().map(|at| SpringDamper { at, stiffness, damping }).collect()
-            };
             let springs: Vec<SpringDamper> =
-                springs.iter().flat_map(|s| link(&ends(&s.between), s.stiffness, s.damping)).collect();
-            let of = |one: SpringDamper| link(&one.at, one.stiffness, one.damping);
-            let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free_link).flat_map(of).collect();
-            let (mut held, mut rigid) = (Vec::new(), Vec::new());
-            for joint in &stuck {
-                match joint.state {
-                    StuckState::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
-                    StuckState::Nothing | StuckState::Spring { .. } => {
-                        held.extend(joint.stuck_link().into_iter().flat_map(of))
-                    }
-                    StuckState::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
-                }
-            }
+                springs.iter().flat_map(|s| turned.links(&ends(&s.between), s.stiffness, s.damping)).collect();
+            let (dampers, held, rigid) = turned.joint_links(&stuck);
             let weigh = |x: &DVector<f64>| x.component_mul(&DVector::from_column_slice(&mass));
             let once = |linear: LinearStructure| turned.select_modes(linear.modes, linear.shapes, lowest, &weigh);
             let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();
@@ -318,21 +321,7 @@ fn of_matrices(system: &System, sectors: usize, lowest: usize, places: &[Row]) -
         let wave = sector.wave(diameter).ok()?;
         let (structure, double) = (wave.structure(), wave.is_double());
         let turned = WaveRows { dofs: sector.dofs(), sectors, diameter, double };
-        let link = |at: &[(usize, f64)], stiffness: f64, damping: f64| -> Vec<SpringDamper> {
-            turned.rows(at).into_iter().map(|at| SpringDamper { at, stiffness, damping }).collect()
-        };
-        let of = |one: SpringDamper| link(&one.at, one.stiffness, one.damping);
-        let dampers: Vec<SpringDamper> = stuck.iter().filter_map(StuckAxis::free_link).flat_map(of).collect();
-        let (mut held, mut rigid) = (Vec::new(), Vec::new());
-        for joint in &stuck {
-            match joint.state {
-                StuckState::Nothing if joint.closed > 0.0 => held.extend(link(&joint.at, joint.closed, 0.0)),
-                StuckState::Nothing | StuckState::Spring { .. } => {
-                    held.extend(joint.stuck_link().into_iter().flat_map(of))
-                }
-                StuckState::Rigid { .. } => rigid.extend(turned.rows(&joint.at)),
-            }
-        }
+        let (dampers, held, rigid) = turned.joint_links(&stuck);
         let modes = |links: &[SpringDamper], rigid: &[Row]| -> Option<SelectedModes> {
             if structure.dofs() <= MAX_DOFS {
                 let rigid: Vec<&[(usize, f64)]> = rigid.iter().map(Vec::as_slice).collect();

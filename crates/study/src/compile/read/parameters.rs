@@ -333,8 +333,8 @@ impl Reader {
         }
     }
 
-    /// Returns the parameter that an entry of `vary` or of a sample names.
-    fn parameter(&mut self, entry: &TomlEntry, what: &str) -> Option<usize> {
+    /// Returns the parameter that an entry of `vary`, of `fit` or of a sample names.
+    pub(super) fn parameter(&mut self, entry: &TomlEntry, what: &str) -> Option<usize> {
         if let Some(&index) = self.index.get(&entry.key) {
             return Some(index);
         }

@@ -43,7 +43,8 @@ impl Reader {
         }
         for key in keys.iter().filter(|key| key.presence == Presence::Required) {
             if table.get(key.name).is_none() && !misspelt.contains(&key.name) {
-                let message = format!("`{}` is missing in {owner}: {}", key.name, schema::describe_value(&key.takes));
+                let message =
+                    format!("`{}` is missing in {owner}; expected {}", key.name, schema::describe_value(&key.takes));
                 let help = match key.takes {
                     ValueType::Study => "add a table [study] with kind = \"response\" and a frequency".to_owned(),
                     _ => format!("add {} = {}", key.name, key.example),
@@ -271,15 +272,7 @@ impl Reader {
     fn fit(&mut self, key: &Key, table: &TomlTable) -> Option<CompiledValue> {
         let mut ranges = Vec::new();
         for entry in &table.entries {
-            if !self.index.contains_key(&entry.key) {
-                let message = format!("there is no parameter `{}` to fit", excerpt(&entry.key));
-                let help = match suggest(&entry.key, self.names.iter().map(String::as_str)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("add it to [parameters] and use it in the model: {} = \"…\"", excerpt(&entry.key)),
-                };
-                self.problems.push(Problem::new(&entry.key_location, excerpt(&entry.key), message).help(help));
-                return None;
-            }
+            self.parameter(entry, "fit")?;
             let TomlValue::Table(range) = &entry.node.value else {
                 let message = format!("expected a range, found {}", entry.node.value.described());
                 let help = format!("write it as in {} = {}", key.name, key.example);
@@ -295,14 +288,7 @@ impl Reader {
                 stated.entry("scale").map(|entry| &entry.value),
                 Some(CompiledValue::Fixed(ResolvedValue::Text(text))) if text == "log"
             );
-            let mut take = |key: &str| {
-                let at = stated.entries.iter().position(|entry| entry.key == key)?;
-                match stated.entries.swap_remove(at).value {
-                    CompiledValue::Quantity { quantity, .. } => Some(quantity),
-                    _ => None,
-                }
-            };
-            let (from, to) = (take("from")?, take("to")?);
+            let (from, to) = (take_quantity(&mut stated, "from")?, take_quantity(&mut stated, "to")?);
             ranges.push(CompiledFitRange {
                 name: entry.key.clone(),
                 location: entry.key_location.clone(),
@@ -349,14 +335,7 @@ impl Reader {
             return None;
         }
         let mut stated = self.table(table, schema::ADAPTIVE_RANGE, &format!("the range of `{}`", excerpt(key.name)));
-        let mut take = |key: &str| {
-            let at = stated.entries.iter().position(|entry| entry.key == key)?;
-            match stated.entries.swap_remove(at).value {
-                CompiledValue::Quantity { quantity, .. } => Some(quantity),
-                _ => None,
-            }
-        };
-        let (from, to, tolerance) = (take("from"), take("to"), take("tolerance"));
+        let [from, to, tolerance] = ["from", "to", "tolerance"].map(|key| take_quantity(&mut stated, key));
         if self.problems.len() > before {
             return None;
         }
@@ -544,6 +523,15 @@ pub(super) struct StatedRange {
     pub to: CompiledQuantity,
     pub points: usize,
     pub scale: RangeScale,
+}
+
+/// Removes a quantity from a table.
+fn take_quantity(table: &mut CompiledTable, key: &str) -> Option<CompiledQuantity> {
+    let at = table.entries.iter().position(|entry| entry.key == key)?;
+    match table.entries.swap_remove(at).value {
+        CompiledValue::Quantity { quantity, .. } => Some(quantity),
+        _ => None,
+    }
 }
 
 /// Returns the limits of the frequencies in a range with these keys.

@@ -35,7 +35,8 @@ pub(super) fn agreements(problem: &FitProblem, fitted: &[Fitted]) -> Vec<Agreeme
     let mut found = Vec::new();
     for (index, (target, fitted)) in problem.targets.iter().zip(fitted).enumerate() {
         let names = target.quantities();
-        let rows: Vec<_> = target.measured().chunks(names.len()).zip(fitted.values.chunks(names.len())).collect();
+        let rows: Vec<_> =
+            target.measured().values.chunks(names.len()).zip(fitted.values.chunks(names.len())).collect();
         for group in rows.chunk_by(|a, b| a.0[0].group == b.0[0].group) {
             let shown: Vec<_> = group
                 .iter()
@@ -76,14 +77,14 @@ pub(super) fn agreements(problem: &FitProblem, fitted: &[Fitted]) -> Vec<Agreeme
 /// Returns a sentence for each group of the targets that were predicted: the largest value and its
 /// place, and the typical deviation.
 pub(super) fn predictions(problem: &FitProblem, agreements: &[Agreement]) -> Vec<String> {
-    let predicted = agreements.iter().filter(|found| problem.targets[found.target].is_predicted());
+    let predicted = agreements.iter().filter(|found| problem.targets[found.target].measured().is_predicted);
     let sentence = |found: &Agreement| {
         let target = &problem.targets[found.target];
         let (measured, predicted) = (found.measured, found.fitted);
         format!(
             "prediction of `{}`, group {}: largest value {:.6}, measured {:.6} ({:+.2} %), at {} {:.6}, measured {:.6} \
              ({:+.3} %); rms deviation of the rows {:.2} % of the largest value.",
-            target.data(),
+            target.measured().data,
             found.group,
             predicted.value,
             measured.value,

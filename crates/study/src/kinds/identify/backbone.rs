@@ -3,7 +3,7 @@
 //! The nonlinear mode is computed at amplitudes with equal ratios, and interpolated at those of
 //! the rows by cubic Hermite polynomials over the logarithm of the amplitude.
 
-use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
+use super::targets::{Fitted, MeasuredRows, Quantity, RowStates, Target, TargetInput};
 use crate::case::study::Case;
 use crate::case::values::hertz;
 use crate::data::ColumnError;
@@ -17,16 +17,14 @@ const LEAST_POINTS: usize = 9;
 /// Rows of a backbone.
 #[derive(Debug)]
 pub(super) struct Backbone {
-    data: String,
     place: String,
     quantity: Quantity,
     mode: usize,
-    predict: bool,
     /// Amplitudes of the quantity, and frequencies that convert them to displacements.
     amplitudes: Vec<f64>,
     omegas: Vec<f64>,
     has_damping: bool,
-    measured: Vec<Measured>,
+    measured: MeasuredRows,
 }
 
 impl Backbone {
@@ -55,23 +53,18 @@ impl Backbone {
             }
         }
         Ok(Backbone {
-            data: input.data.name.clone(),
             place: input.at.to_owned(),
             quantity: input.quantity,
             mode: input.values.count("mode").unwrap_or(1) as usize - 1,
-            predict: input.predict,
             amplitudes,
             omegas,
             has_damping: damping.is_some(),
-            measured,
+            measured: input.measured_rows(measured),
         })
     }
 }
 
 impl Target for Backbone {
-    fn data(&self) -> &str {
-        &self.data
-    }
     fn abscissa(&self) -> &'static str {
         match self.quantity.derivatives {
             0 => "amplitude_m",
@@ -83,11 +76,8 @@ impl Target for Backbone {
         let frequency = "frequency_Hz".to_owned();
         if self.has_damping { vec![frequency, "damping_ratio".to_owned()] } else { vec![frequency] }
     }
-    fn measured(&self) -> &[Measured] {
+    fn measured(&self) -> &MeasuredRows {
         &self.measured
-    }
-    fn is_predicted(&self) -> bool {
-        self.predict
     }
 
     fn fitted(&self, case: &Case, _: &RowStates) -> Result<Fitted, String> {

@@ -5,7 +5,7 @@
 //! is a separate record that begins unloaded.
 
 use super::law_path::{LoadPath, forces_along};
-use super::targets::{Fitted, Measured, RowStates, Target, TargetInput};
+use super::targets::{Fitted, MeasuredRows, RowStates, Target, TargetInput};
 use crate::case::study::Case;
 use crate::data::ColumnError;
 use stickslip::dimension::Dimension;
@@ -13,13 +13,11 @@ use stickslip::dimension::Dimension;
 /// Rows of a loop.
 #[derive(Debug)]
 pub(super) struct LoopTarget {
-    data: String,
     joint: String,
-    predict: bool,
     cycle: bool,
     /// The path of each group, in the order of the rows.
     paths: Vec<LoadPath>,
-    measured: Vec<Measured>,
+    measured: MeasuredRows,
 }
 
 impl LoopTarget {
@@ -54,12 +52,10 @@ impl LoopTarget {
             time: time.as_ref().map(|time| rows.iter().map(|row| time[*row]).collect()),
         };
         let target = LoopTarget {
-            data: input.data.name.clone(),
             joint: input.at.to_owned(),
-            predict: input.predict,
             cycle: input.values.flag("cycle") == Some(true),
             paths: groups.iter().map(path).collect(),
-            measured,
+            measured: input.measured_rows(measured),
         };
         // a law that cannot follow a path is refused before the run
         target
@@ -70,20 +66,14 @@ impl LoopTarget {
 }
 
 impl Target for LoopTarget {
-    fn data(&self) -> &str {
-        &self.data
-    }
     fn abscissa(&self) -> &'static str {
         "displacement_m"
     }
     fn quantities(&self) -> Vec<String> {
         vec!["force_N".to_owned()]
     }
-    fn measured(&self) -> &[Measured] {
+    fn measured(&self) -> &MeasuredRows {
         &self.measured
-    }
-    fn is_predicted(&self) -> bool {
-        self.predict
     }
 
     fn fitted(&self, case: &Case, _: &RowStates) -> Result<Fitted, String> {
@@ -97,7 +87,7 @@ impl Target for LoopTarget {
             [a, b] if [b, a] == [&own.between[0], &own.between[1]] => Some(-1.0),
             _ => None,
         };
-        let mut values = Vec::with_capacity(self.measured.len());
+        let mut values = Vec::with_capacity(self.measured.values.len());
         for path in &self.paths {
             let whole = if self.cycle { path.twice() } else { path.clone() };
             let skipped = whole.displacement.len() - path.displacement.len();

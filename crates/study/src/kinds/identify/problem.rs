@@ -137,11 +137,12 @@ impl FitProblem {
 
     /// Returns the residuals `(fitted - measured)/deviation` of the fitted targets.
     pub fn residuals_of(&self, fitted: &[Fitted]) -> Vec<f64> {
-        let fitted = self.targets.iter().zip(fitted).filter(|(target, _)| !target.is_predicted());
+        let fitted = self.targets.iter().zip(fitted).filter(|(target, _)| !target.measured().is_predicted);
         fitted
             .flat_map(|(target, fitted)| {
                 target
                     .measured()
+                    .values
                     .iter()
                     .zip(&fitted.values)
                     .map(|(measured, value)| (value - measured.value) / measured.deviation)
@@ -155,16 +156,16 @@ impl FitProblem {
     /// Motions over time are compared at their beginning, before a wrong frequency matters.
     pub fn scale_differences(&self, fitted: &[Fitted]) -> Vec<String> {
         let mut sentences = Vec::new();
-        for (target, fitted) in self.targets.iter().zip(fitted).filter(|(target, _)| !target.is_predicted()) {
+        for (target, fitted) in self.targets.iter().zip(fitted).filter(|(target, _)| !target.measured().is_predicted) {
             let names = target.quantities();
             let rows = beginning(&**target);
             for (k, name) in names.iter().enumerate() {
-                let measured = target.measured().iter().map(|measured| measured.value).skip(k);
+                let measured = target.measured().values.iter().map(|measured| measured.value).skip(k);
                 let measured = measured.step_by(names.len()).take(rows);
                 let computed = fitted.values.iter().copied().skip(k).step_by(names.len()).take(rows);
                 let product: f64 = measured.clone().zip(computed.clone()).map(|(a, b)| a * b).sum();
                 let (measured, computed) = (sum_of_squares(measured), sum_of_squares(computed));
-                let values = format!("the measured values of `{name}` in `{}`", target.data());
+                let values = format!("the measured values of `{name}` in `{}`", target.measured().data);
                 // Correlation of -0.5: noise and a poor model hardly reach it.
                 if product < -0.5 * (measured * computed).sqrt() {
                     let advice = match target.first_cycles() {
@@ -193,8 +194,8 @@ impl FitProblem {
     /// Returns the parts of the data that successive minimizations use, from the first cycles of
     /// the motions over time to all rows. Without such motions, all rows are used at once.
     pub fn stages(&self) -> Vec<UsedRows> {
-        let fitted = self.targets.iter().filter(|target| !target.is_predicted());
-        let ratio = |target: &dyn Target| Some(target.measured().len() / target.first_cycles()?.max(1));
+        let fitted = self.targets.iter().filter(|target| !target.measured().is_predicted);
+        let ratio = |target: &dyn Target| Some(target.measured().values.len() / target.first_cycles()?.max(1));
         let longest = fitted.filter_map(|target| ratio(&**target)).max().unwrap_or(1);
         // Three times the cycles: the frequency of the last minimum is accurate enough not to lose
         // a cycle, and a record of a hundred cycles takes five minimizations.
@@ -206,7 +207,7 @@ impl FitProblem {
     /// Tells for every residual whether it is used.
     pub fn is_used(&self, rows: UsedRows) -> Vec<bool> {
         let of = |target: &dyn Target| {
-            let count = target.measured().len();
+            let count = target.measured().values.len();
             let used = match (rows, target.first_cycles()) {
                 // enough rows to determine the parameters
                 (UsedRows::Beginnings(cycles), Some(first)) => (cycles * first).max(4 * self.ranges.len()),
@@ -214,17 +215,21 @@ impl FitProblem {
             };
             (0..count).map(move |row| row < used)
         };
-        self.targets.iter().filter(|target| !target.is_predicted()).flat_map(|target| of(&**target)).collect()
+        self.targets.iter().filter(|target| !target.measured().is_predicted).flat_map(|target| of(&**target)).collect()
     }
 
     /// Returns the number of residuals.
     pub fn count(&self) -> usize {
-        self.targets.iter().filter(|target| !target.is_predicted()).map(|target| target.measured().len()).sum()
+        self.targets
+            .iter()
+            .filter(|target| !target.measured().is_predicted)
+            .map(|target| target.measured().values.len())
+            .sum()
     }
 
     /// Returns the residuals; NaN if the model has none.
     pub fn residuals(&self, x: &[f64]) -> Vec<f64> {
-        let fit = |target: &dyn Target| !target.is_predicted();
+        let fit = |target: &dyn Target| !target.measured().is_predicted;
         let states = self.states.lock().map(|states| states.clone()).unwrap_or_default();
         match self.fitted_from(x, &states, &fit) {
             Ok(found) => {
@@ -249,13 +254,13 @@ impl FitProblem {
     /// each; of predicted targets only for [`DerivativesOf::AllTargets`]. NaN where the model has
     /// none.
     pub fn derivatives(&self, x: &[f64], columns: &[usize], which: DerivativesOf) -> Vec<DMatrix<f64>> {
-        let used = |target: &dyn Target| which == DerivativesOf::AllTargets || !target.is_predicted();
+        let used = |target: &dyn Target| which == DerivativesOf::AllTargets || !target.measured().is_predicted;
         let before = self.states.lock().map(|states| states.clone()).unwrap_or_default();
         let (states, here) = match self.fitted_from(x, &before, &used) {
             Ok(found) => found.into_iter().map(|fitted| (fitted.states, fitted.values)).unzip(),
             Err(_) => (before, Vec::new()),
         };
-        let none = || self.targets.iter().map(|target| vec![f64::NAN; target.measured().len()]).collect();
+        let none = || self.targets.iter().map(|target| vec![f64::NAN; target.measured().values.len()]).collect();
         let column = |k: usize| -> Vec<Vec<f64>> {
             let at = |steps: f64| {
                 let mut x = x.to_vec();
@@ -299,8 +304,10 @@ impl FitProblem {
     fn jacobian_of(&self, columns: usize, derivatives: &[DMatrix<f64>]) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.count(), columns);
         let mut at = 0;
-        for (target, derivatives) in self.targets.iter().zip(derivatives).filter(|(target, _)| !target.is_predicted()) {
-            for (row, measured) in target.measured().iter().enumerate() {
+        for (target, derivatives) in
+            self.targets.iter().zip(derivatives).filter(|(target, _)| !target.measured().is_predicted)
+        {
+            for (row, measured) in target.measured().values.iter().enumerate() {
                 for k in 0..columns {
                     jacobian[(at, k)] = derivatives[(row, k)] / measured.deviation;
                 }
@@ -337,8 +344,8 @@ impl FitRange {
 /// targets.
 fn beginning(target: &dyn Target) -> usize {
     let Some(two_cycles) = target.first_cycles() else { return usize::MAX };
-    let largest = target.measured().iter().fold(0.0f64, |largest, row| largest.max(row.value.abs()));
-    let first = target.measured()[0].value.abs();
+    let largest = target.measured().values.iter().fold(0.0f64, |largest, row| largest.max(row.value.abs()));
+    let first = target.measured().values[0].value.abs();
     if first > 0.25 * largest { 1 } else { (two_cycles / 8).max(1) }
 }
 

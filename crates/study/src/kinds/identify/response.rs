@@ -5,7 +5,7 @@
 //! to the force, positive where the quantity leads.
 
 use super::orbit_rows::{ForcedOrbit, OrbitRow, OrbitRows};
-use super::targets::{Fitted, Measured, RowStates, Target, TargetInput};
+use super::targets::{Fitted, MeasuredRows, RowStates, Target, TargetInput};
 use crate::case::study::Case;
 use crate::case::values::hertz;
 use crate::data::ColumnError;
@@ -15,14 +15,12 @@ use stickslip::dimension::Dimension;
 /// Rows of a frequency response.
 #[derive(Debug)]
 pub(super) struct ResponseTarget {
-    data: String,
     place: String,
     quantity: super::targets::Quantity,
     per_force: bool,
-    predict: bool,
     complex: bool,
     rows: OrbitRows,
-    measured: Vec<Measured>,
+    measured: MeasuredRows,
 }
 
 impl ResponseTarget {
@@ -46,14 +44,12 @@ impl ResponseTarget {
             }
         }
         Ok(ResponseTarget {
-            data: input.data.name.clone(),
             place: input.at.to_owned(),
             quantity,
             per_force,
-            predict: input.predict,
             complex,
             rows,
-            measured,
+            measured: input.measured_rows(measured),
         })
     }
 }
@@ -90,9 +86,6 @@ fn complex_values(input: &TargetInput<'_>, dimension: Dimension) -> Result<Respo
 }
 
 impl Target for ResponseTarget {
-    fn data(&self) -> &str {
-        &self.data
-    }
     fn abscissa(&self) -> &'static str {
         "frequency_Hz"
     }
@@ -101,14 +94,11 @@ impl Target for ResponseTarget {
             if self.per_force { format!("{}_per_N", self.quantity.column) } else { self.quantity.column.to_owned() };
         if self.complex { vec![name.clone(), name] } else { vec![name] }
     }
-    fn measured(&self) -> &[Measured] {
+    fn measured(&self) -> &MeasuredRows {
         &self.measured
     }
     fn is_complex(&self) -> bool {
         self.complex
-    }
-    fn is_predicted(&self) -> bool {
-        self.predict
     }
 
     fn fitted(&self, case: &Case, starts: &RowStates) -> Result<Fitted, String> {

@@ -3,7 +3,7 @@
 //!
 //! The first row is the initial instant. The rows have equal distances.
 
-use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
+use super::targets::{Fitted, MeasuredRows, Quantity, RowStates, Target, TargetInput};
 use crate::case::initial_state::{Start, StartKeys};
 use crate::case::study::Case;
 use crate::data::ColumnError;
@@ -17,12 +17,10 @@ use stickslip_formats::data::Column;
 pub(super) struct RingDown {
     /// Index of the target, from 0.
     index: usize,
-    data: String,
     place: String,
     quantity: Quantity,
-    predict: bool,
     step: f64,
-    measured: Vec<Measured>,
+    measured: MeasuredRows,
 }
 
 impl RingDown {
@@ -48,36 +46,28 @@ impl RingDown {
             (0..time.len()).map(|i| input.measured(i, time[i] - time[0], response[i], deviations[i])).collect();
         Ok(RingDown {
             index: input.index,
-            data: input.data.name.clone(),
             place: input.at.to_owned(),
             quantity,
-            predict: input.predict,
             step: sampling.step,
-            measured,
+            measured: input.measured_rows(measured),
         })
     }
 }
 
 impl Target for RingDown {
-    fn data(&self) -> &str {
-        &self.data
-    }
     fn abscissa(&self) -> &'static str {
         "time_s"
     }
     fn quantities(&self) -> Vec<String> {
         vec![self.quantity.column.to_owned()]
     }
-    fn measured(&self) -> &[Measured] {
+    fn measured(&self) -> &MeasuredRows {
         &self.measured
-    }
-    fn is_predicted(&self) -> bool {
-        self.predict
     }
 
     fn first_cycles(&self) -> Option<usize> {
-        let mean = self.measured.iter().map(|row| row.value).sum::<f64>() / self.measured.len() as f64;
-        let above: Vec<bool> = self.measured.iter().map(|row| row.value > mean).collect();
+        let mean = self.measured.values.iter().map(|row| row.value).sum::<f64>() / self.measured.values.len() as f64;
+        let above: Vec<bool> = self.measured.values.iter().map(|row| row.value > mean).collect();
         // two cycles cross the mean four times
         let mut crossings = (1..above.len()).filter(|row| above[*row] != above[row - 1]);
         Some(crossings.nth(3).unwrap_or(above.len()))
@@ -97,12 +87,12 @@ impl Target for RingDown {
             states: start.states,
             excitation: Excitation::Free,
             // half a step more, so that the last row is not lost by rounding
-            duration: self.step * (self.measured.len() as f64 - 0.5),
+            duration: self.step * (self.measured.values.len() as f64 - 0.5),
             step: self.step,
             width: case.method.options.get(WIDTH).copied(),
             tolerance: case.method.time_history_tolerance(),
         };
-        let mut fitted = Vec::with_capacity(self.measured.len());
+        let mut fitted = Vec::with_capacity(self.measured.values.len());
         let run = history.run(&system, &mut |_, _, sample| {
             let of = match self.quantity.derivatives {
                 0 => &sample.displacement,
@@ -110,11 +100,11 @@ impl Target for RingDown {
                 _ => &sample.acceleration,
             };
             fitted.push(along.component(of));
-            fitted.len() < self.measured.len()
+            fitted.len() < self.measured.values.len()
         });
         run.map_err(|error| error.to_string())?;
-        if fitted.len() < self.measured.len() {
-            return Err(format!("the decay ends after {} of {} rows", fitted.len(), self.measured.len()));
+        if fitted.len() < self.measured.values.len() {
+            return Err(format!("the decay ends after {} of {} rows", fitted.len(), self.measured.values.len()));
         }
         Ok(Fitted { values: fitted, states: Vec::new() })
     }

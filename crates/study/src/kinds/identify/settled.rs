@@ -2,7 +2,7 @@
 //! per cycle, at excitation frequencies.
 
 use super::orbit_rows::{ForcedOrbit, OrbitRow, OrbitRows};
-use super::targets::{Fitted, Measured, Quantity, RowStates, Target, TargetInput};
+use super::targets::{Fitted, MeasuredRows, Quantity, RowStates, Target, TargetInput};
 use crate::case::study::Case;
 use crate::case::values::hertz;
 use crate::data::ColumnError;
@@ -28,14 +28,12 @@ impl SettledValue {
 /// Rows of settled vibrations.
 #[derive(Debug)]
 pub(super) struct Settled {
-    data: String,
     /// A place, or a joint for its dissipation.
     at: String,
     quantity: Quantity,
-    predict: bool,
     rows: OrbitRows,
     values: Vec<SettledValue>,
-    measured: Vec<Measured>,
+    measured: MeasuredRows,
 }
 
 impl Settled {
@@ -64,13 +62,11 @@ impl Settled {
             }
         }
         Ok(Settled {
-            data: input.data.name.clone(),
             at: input.at.to_owned(),
             quantity: input.quantity,
-            predict: input.predict,
             rows,
             values,
-            measured,
+            measured: input.measured_rows(measured),
         })
     }
 
@@ -96,9 +92,6 @@ impl Settled {
 const INSTANTS: usize = 1024;
 
 impl Target for Settled {
-    fn data(&self) -> &str {
-        &self.data
-    }
     fn abscissa(&self) -> &'static str {
         "frequency_Hz"
     }
@@ -110,11 +103,8 @@ impl Target for Settled {
         };
         self.values.iter().map(name).collect()
     }
-    fn measured(&self) -> &[Measured] {
+    fn measured(&self) -> &MeasuredRows {
         &self.measured
-    }
-    fn is_predicted(&self) -> bool {
-        self.predict
     }
 
     fn fitted(&self, case: &Case, starts: &RowStates) -> Result<Fitted, String> {

@@ -519,8 +519,8 @@ impl Undetermined {
 /// Returns the correlation of residuals in neighbouring rows of the same group.
 fn autocorrelation(problem: &FitProblem, residuals: &[f64]) -> f64 {
     let (mut products, mut squares, mut at) = (0.0, 0.0, 0);
-    for target in problem.targets.iter().filter(|target| !target.is_predicted()) {
-        let (measured, per_row) = (target.measured(), target.quantities().len());
+    for target in problem.targets.iter().filter(|target| !target.measured().is_predicted) {
+        let (measured, per_row) = (&target.measured().values, target.quantities().len());
         for i in 0..measured.len() {
             let here = residuals[at + i];
             squares += here * here;

@@ -61,7 +61,7 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &FitProblem, outcome: &FitOutc
     let derivatives = problem.derivatives(&outcome.found.x, &problem.all(), DerivativesOf::AllTargets);
     for (number, (target, fitted)) in problem.targets.iter().zip(outcome.fitted).enumerate() {
         let (per_row, names) = (target.quantities().len(), target.quantities());
-        let rows = target.measured().chunks(per_row).zip(fitted.values.chunks(per_row));
+        let rows = target.measured().values.chunks(per_row).zip(fitted.values.chunks(per_row));
         for (row, (measured, values)) in rows.enumerate() {
             let slopes =
                 |part: usize| -> Vec<f64> { derivatives[number].row(row * per_row + part).iter().copied().collect() };
@@ -144,11 +144,11 @@ pub(super) fn write(work: &UnitTask<'_>, problem: &FitProblem, outcome: &FitOutc
 
 /// Returns the number and the data of a target, as the tables name it.
 fn label(problem: &FitProblem, target: usize) -> String {
-    format!("{} {}", target + 1, problem.targets[target].data())
+    format!("{} {}", target + 1, problem.targets[target].measured().data)
 }
 
 fn use_of(target: &dyn Target) -> &'static str {
-    if target.is_predicted() { "prediction" } else { "fit" }
+    if target.measured().is_predicted { "prediction" } else { "fit" }
 }
 
 fn correlation(correlations: &DMatrix<f64>, k: usize, l: usize) -> f64 {

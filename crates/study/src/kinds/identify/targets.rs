@@ -47,23 +47,30 @@ pub(super) struct Measured {
     pub deviation: f64,
 }
 
+/// The measured rows of a target.
+#[derive(Debug)]
+pub(super) struct MeasuredRows {
+    /// Name of the data.
+    pub data: String,
+    /// True if the rows are predicted only, not fitted.
+    pub is_predicted: bool,
+    /// The measured numbers, all numbers of a row one after the other.
+    pub values: Vec<Measured>,
+}
+
 /// Measured rows, and the model in their place.
 pub(super) trait Target: Debug + Send + Sync {
-    /// Returns the name of the data.
-    fn data(&self) -> &str;
     /// Returns the column name of the abscissa, with its unit at the end.
     fn abscissa(&self) -> &'static str;
     /// Returns the column name of the measured quantity, with its unit at the end. If several
     /// numbers belong to a row, there is one name for each of them.
     fn quantities(&self) -> Vec<String>;
-    /// Returns the measured numbers, all numbers of a row one after the other.
-    fn measured(&self) -> &[Measured];
+    /// Returns the measured rows.
+    fn measured(&self) -> &MeasuredRows;
     /// Returns whether the numbers of a row are real and imaginary part.
     fn is_complex(&self) -> bool {
         false
     }
-    /// Returns whether the rows are predicted only, not fitted.
-    fn is_predicted(&self) -> bool;
     /// Returns the number of measured rows of the first two cycles, if the rows are one motion over
     /// time. A search that begins with few cycles cannot end with a cycle too many or too few.
     fn first_cycles(&self) -> Option<usize> {
@@ -225,6 +232,11 @@ impl TargetInput<'_> {
         Measured { row: self.rows[i] + 1, group: self.groups[i], x, value, deviation }
     }
 
+    /// Returns the measured rows of the target from their numbers.
+    pub fn measured_rows(&self, values: Vec<Measured>) -> MeasuredRows {
+        MeasuredRows { data: self.data.name.clone(), is_predicted: self.predict, values }
+    }
+
     pub fn group(&self, i: usize) -> f64 {
         self.groups[i]
     }
@@ -290,7 +302,7 @@ pub(super) fn build(study: &Study, case: &Case) -> Result<Vec<Box<dyn Target>>, 
         let error = |ColumnError { message, help }| TargetError { number: i + 1, message, help };
         targets.push(build_one(study, case, i, values).map_err(error)?);
     }
-    if targets.iter().all(|target| target.is_predicted()) {
+    if targets.iter().all(|target| target.measured().is_predicted) {
         let message = "no rows are fitted: every target has predict = true".to_owned();
         return Err(TargetError { number: 1, message, help: "remove `predict` from one target".to_owned() });
     }

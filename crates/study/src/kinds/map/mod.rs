@@ -51,7 +51,7 @@ pub(super) const KIND: Kind = Kind {
     unit_size: |_| UnitSize::Case,
     size,
     warnings: sampling_warnings,
-    probe: Probe::Points { compute: probe, excluded: |_| Some("the refinement of peaks") },
+    probe: Probe::Points { compute: orbit_sweep::probe, excluded: |_| Some("the refinement of peaks") },
     compute,
     draw: figure::draw,
 };
@@ -93,12 +93,5 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         part.notes.push(Note::Sentence(text.to_owned()));
     }
     part.tables = vec![rows];
-    Ok(part)
-}
-
-/// Computes the orbits of some frequencies, as the search for a peak does.
-fn probe(work: &UnitTask<'_>) -> Computed {
-    let mut part = UnitResult::default();
-    orbit_sweep::converged_orbits(work, &mut part)?;
     Ok(part)
 }

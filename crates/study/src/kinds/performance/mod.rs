@@ -43,7 +43,7 @@ pub(super) const KIND: Kind = Kind {
     size,
     warnings: sampling_warnings,
     probe: Probe::Points {
-        compute: probe,
+        compute: orbit_sweep::probe,
         excluded: |_| Some("the search for the optimum, which takes about 20 further values"),
     },
     compute,
@@ -103,13 +103,6 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         }
     }
     part.tables = vec![rows, optima];
-    Ok(part)
-}
-
-/// Computes the orbits of some frequencies, as the search for a peak does.
-fn probe(work: &UnitTask<'_>) -> Computed {
-    let mut part = UnitResult::default();
-    orbit_sweep::converged_orbits(work, &mut part)?;
     Ok(part)
 }
 

@@ -3,7 +3,7 @@
 use crate::case::study::{Case, Study};
 use crate::results::notes::Note;
 use crate::run::point_row::describe_location;
-use crate::run::work::{NOT_REACHED, UnitResult, UnitSize, UnitTask};
+use crate::run::work::{Computed, NOT_REACHED, UnitResult, UnitSize, UnitTask};
 use stickslip::curve::sweep::{Observer, Watch, solve_sequence, solver};
 use stickslip::method::{MethodError, OrbitError};
 use stickslip::orbit::Orbit;
@@ -40,6 +40,14 @@ fn all(work: &UnitTask<'_>) -> Result<Vec<SweepOutcome>, (usize, MethodError)> {
     })
     .map_err(|error| (work.case().case.index, error))?;
     Ok(points)
+}
+
+/// Computes the orbits of some frequencies, as the search for a peak does: the probe of kinds that
+/// refine peaks.
+pub(in crate::kinds) fn probe(work: &UnitTask<'_>) -> Computed {
+    let mut part = UnitResult::default();
+    converged_orbits(work, &mut part)?;
+    Ok(part)
 }
 
 /// An orbit, and its stability if known.

@@ -127,7 +127,7 @@ impl AccelerationStep {
         let n = assembly.n;
         excitation.load(0.0, &mut self.loads[1]);
         for (q, joint) in assembly.joints.iter().enumerate() {
-            self.to[q] = relative(assembly, q, state, excitation, 0.0);
+            self.to[q] = assembly.motion_of(&assembly.joints[q], state, excitation, 0.0);
             let internal = joint.internal();
             let at = LawInstant { motion: self.to[q], z: &state[2 * n + internal.start..2 * n + internal.end] };
             let law = &mut self.laws[q];
@@ -251,21 +251,6 @@ impl AccelerationStep {
         }
         true
     }
-}
-
-/// Returns the motion of a joint in a state.
-fn relative(
-    assembly: &Assembly,
-    q: usize,
-    state: &[f64],
-    excitation: &HarmonicExcitation,
-    time: f64,
-) -> RelativeMotion<f64> {
-    let mut motion = RelativeMotion::along(0.0, 0.0);
-    for (d, axis) in assembly.joints[q].axes().enumerate() {
-        (motion.displacement[d], motion.velocity[d]) = assembly.relative(axis, state, excitation, time);
-    }
-    motion
 }
 
 #[cfg(test)]

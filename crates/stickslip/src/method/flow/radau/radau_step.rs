@@ -8,7 +8,11 @@
 //! estimate is eliminated in the same way.
 
 use crate::law::{RatePoint, RelativeMotion};
+use crate::method::IntegrationError;
 use crate::method::flow::assembly::{Assembly, IndexedLaw};
+use crate::method::flow::excitation::HarmonicExcitation;
+use crate::method::flow::step_record::StepRecord;
+use crate::orbit::Contact;
 use nalgebra::{DMatrix, DVector};
 use stickslip_numerics::interrupt;
 use stickslip_numerics::radau::{BUTCHER_MATRIX, ERROR_WEIGHTS, NODES, REAL_EIGENVALUE, STAGES, matrix_squared};
@@ -142,6 +146,28 @@ pub(crate) struct StageLoads {
     pub stage: Vec<(f64, f64)>,
 }
 
+impl StageLoads {
+    /// Sets the loads on a step of length `h` (s) that begins at `time` (s).
+    pub fn set(&mut self, assembly: &Assembly, excitation: &HarmonicExcitation, time: f64, h: f64) {
+        let n = assembly.n;
+        if self.force.len() != STAGES * n {
+            self.force.resize_vertically_mut(STAGES * n, 0.0);
+        }
+        self.stage.clear();
+        for (i, c) in NODES.iter().enumerate() {
+            let at = time + c * h;
+            excitation.load(at, &mut self.force.as_mut_slice()[i * n..(i + 1) * n]);
+            self.stage.extend((0..assembly.axes.len()).map(|axis| excitation.relative_at(axis, at)));
+        }
+    }
+}
+
+/// Returns the weights of the stages in the collocation polynomial of a step at `s`, where `s`
+/// is relative to the step size.
+pub(in crate::method) fn extrapolation_weights(s: f64) -> [f64; STAGES] {
+    std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - NODES[r]) / (NODES[q] - NODES[r])).product())
+}
+
 /// Scratch memory and result of a step.
 #[derive(Debug, Clone)]
 pub(crate) struct RadauStep {
@@ -207,6 +233,20 @@ impl RadauStep {
             answer: Vec::new(),
             carried: Vec::new(),
             filter: Filter::new(assembly),
+        }
+    }
+
+    /// Sets the initial guess of the unknowns to the collocation polynomial of the previous step,
+    /// with the weights of its stages for each stage of this step.
+    pub fn extrapolate(&mut self, assembly: &Assembly, previous: &[f64], weights: &[[f64; STAGES]; STAGES]) {
+        let (j, internal) = (assembly.axes.len(), assembly.internal);
+        for (i, weights) in weights.iter().enumerate() {
+            for (offset, count) in [(0, j), (STAGES * j, internal)] {
+                for k in 0..count {
+                    let at = |stage: usize| offset + stage * count + k;
+                    self.unknown[at(i)] = (0..STAGES).map(|q| weights[q] * previous[at(q)]).sum();
+                }
+            }
         }
     }
 
@@ -280,11 +320,15 @@ impl RadauStep {
         false
     }
 
-    /// Returns the joint whose law returned NaN in the last attempt.
-    pub fn joint_with_nan<'a>(&self, assembly: &'a Assembly) -> Option<&'a IndexedLaw> {
+    /// Returns the reason why no step is small enough: a law that returned NaN in the last attempt,
+    /// or equations that are too stiff.
+    pub fn stalled(&self, assembly: &Assembly, time: f64, step: f64) -> IntegrationError {
         let broken = |point: &RatePoint| point.force.iter().chain(&point.rate).any(|value| value.is_nan());
-        let joints = assembly.joints.iter().cycle();
-        joints.zip(&self.points).find_map(|(joint, point)| broken(point).then_some(joint))
+        let mut joints = assembly.joints.iter().cycle().zip(&self.points);
+        match joints.find(|(_, point)| broken(point)) {
+            Some((joint, _)) => joint.not_finite_error(time),
+            None => IntegrationError::Stalled { time, step },
+        }
     }
 
     /// Evaluates the laws at the present unknowns.
@@ -443,6 +487,31 @@ impl RadauStep {
         out.gemv(1.0, &eliminated.stage_from_state, &self.linear, 0.0);
         out.gemv(1.0, &eliminated.stage_from_load, &loads.force, 1.0);
         out.gemv(1.0, &eliminated.stage_from_force, &self.force, 1.0);
+    }
+
+    /// Records the stages of the last solved step, which began at `time`. `contact` returns the
+    /// state of a joint from its index, velocity and force.
+    pub fn record<'a>(
+        &mut self,
+        (assembly, eliminated, loads): (&'a Assembly, &RadauElimination, &StageLoads),
+        time: f64,
+        steps: &mut StepRecord,
+        contact: impl Fn(usize, &'a IndexedLaw, &[f64], &[f64]) -> Contact,
+    ) {
+        let (n, j) = (assembly.n, assembly.axes.len());
+        self.set_stages(eliminated, loads);
+        let (x, v) = self.stages.as_slice().split_at(STAGES * n);
+        steps.spans.push((time, eliminated.length));
+        for i in 0..STAGES {
+            let at_stage = i * j..(i + 1) * j;
+            let moving = self.unknown[at_stage.clone()].iter().zip(&self.held);
+            let velocity: Vec<f64> = moving.map(|(velocity, held)| if *held { 0.0 } else { *velocity }).collect();
+            let force = &self.force.as_slice()[at_stage];
+            let contacts = assembly.joints.iter().enumerate();
+            let contacts = contacts.map(|(q, joint)| contact(q, joint, &velocity[joint.axes()], &force[joint.axes()]));
+            let of = i * n..(i + 1) * n;
+            steps.push_node([&x[of.clone()], &v[of]], [&velocity, force], contacts);
+        }
     }
 
     fn combine(&self, [state, load, force]: &[DMatrix<f64>; 3], loads: &StageLoads, out: &mut [f64]) {

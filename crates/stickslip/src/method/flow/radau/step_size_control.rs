@@ -4,8 +4,8 @@
 //! Therefore all steps of one size share one elimination of the structure, and every run over
 //! the same interval ends exactly at its end.
 
-use super::radau_step::{RadauElimination, RadauStep, StageLoads, evaluation_points};
-use crate::law::{RatePoint, RelativeMotion};
+use super::radau_step::{RadauElimination, RadauStep, StageLoads, evaluation_points, extrapolation_weights};
+use crate::law::RatePoint;
 use crate::method::IntegrationError;
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::Assembly;
@@ -158,27 +158,12 @@ impl RadauFlow {
         self.assembly.scales(state, &self.excitation)
     }
 
-    fn set_loads(&mut self, time: f64, h: f64) {
-        let (n, j) = (self.assembly.n, self.assembly.axes.len());
-        if self.loads.force.len() != STAGES * n {
-            self.loads.force.resize_vertically_mut(STAGES * n, 0.0);
-        }
-        self.loads.stage.clear();
-        for (i, c) in NODES.iter().enumerate() {
-            let at = time + c * h;
-            self.excitation.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
-            for axis in 0..j {
-                self.loads.stage.push(self.excitation.relative_at(axis, at));
-            }
-        }
-    }
-
     /// Sets the initial guess of the step's unknowns: the extrapolated collocation polynomial
     /// of the last step, or the constant state.
     fn predict(&mut self, state: &[f64], h: f64, last: Option<(usize, f64)>, time: f64) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
-        let unknown = &mut self.step.unknown;
         let Some((level, length)) = last else {
+            let unknown = &mut self.step.unknown;
             for i in 0..STAGES {
                 for axis in 0..j {
                     unknown[i * j + axis] = self.assembly.relative(axis, state, &self.excitation, time).1;
@@ -190,25 +175,14 @@ impl RadauFlow {
         };
         let onward = self.onward[self.settings.levels + self.level - level]
             .get_or_insert_with(|| NODES.map(|c| extrapolation_weights(1.0 + c * h / length)));
-        for (i, weights) in onward.iter().enumerate() {
-            for (offset, count) in [(0, j), (STAGES * j, internal)] {
-                for k in 0..count {
-                    let at = |stage: usize| offset + stage * count + k;
-                    unknown[at(i)] = (0..STAGES).map(|q| weights[q] * self.previous[at(q)]).sum();
-                }
-            }
-        }
+        self.step.extrapolate(&self.assembly, &self.previous, onward);
     }
 
     /// Evaluates the laws at a state, in `laws`.
     fn set_laws(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (joint, point) in self.assembly.joints.iter().zip(&mut self.laws) {
-            let mut motion = RelativeMotion::along(0.0, 0.0);
-            for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) =
-                    self.assembly.relative(axis, state, &self.excitation, time);
-            }
+            let motion = self.assembly.motion_of(joint, state, &self.excitation, time);
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
                 rate.evaluate_with_derivatives(joint.directions, &motion, &state[first..first + joint.states], point);
@@ -271,17 +245,7 @@ impl RadauFlow {
 
     /// Returns the size of an error estimate relative to the tolerance.
     fn size(&self, error: &[f64], state: &[f64], scale: (f64, f64)) -> f64 {
-        let n = self.assembly.n;
-        let mut largest = 0.0f64;
-        for i in 0..n {
-            largest = largest.max(error[i].abs() / scale.0).max(error[n + i].abs() / scale.1);
-        }
-        for joint in &self.assembly.joints {
-            for s in joint.internal() {
-                largest = largest.max(error[2 * n + s].abs() / (joint.state_scale + state[2 * n + s].abs()));
-            }
-        }
-        if error.iter().all(|e| e.is_finite()) { largest / self.tolerance } else { f64::INFINITY }
+        self.assembly.error_size(error, state, scale) / self.tolerance
     }
 
     /// Returns the error for joints with imposed motion only. Only their work is integrated
@@ -315,20 +279,14 @@ impl RadauFlow {
         self.assembly.accelerate(state, &mut self.load, &self.force, acceleration);
     }
 
-    fn keep_step(&mut self, time: f64, h: f64) {
-        let (n, j) = (self.assembly.n, self.assembly.axes.len());
+    fn keep_step(&mut self, time: f64) {
         let Some(eliminated) = &self.eliminated[self.level] else { return };
-        self.step.set_stages(eliminated, &self.loads);
-        let (x, v) = self.step.stages.as_slice().split_at(STAGES * n);
-        self.steps.spans.push((time, h));
-        for i in 0..STAGES {
-            let (velocity, force) =
-                (&self.step.unknown[i * j..(i + 1) * j], &self.step.force.as_slice()[i * j..(i + 1) * j]);
-            let joints = self.assembly.joints.iter();
-            let contact = joints.map(|joint| joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]));
-            let of = i * n..(i + 1) * n;
-            self.steps.push_node([&x[of.clone()], &v[of]], [velocity, force], contact);
-        }
+        self.step.record(
+            (&self.assembly, eliminated, &self.loads),
+            time,
+            &mut self.steps,
+            |_, joint, velocity, force| joint.law.contact_state(velocity, force),
+        );
     }
 
     /// Returns the size of a step of the present level, s.
@@ -347,10 +305,7 @@ impl RadauFlow {
         if fastest > self.settings.unbounded_ratio * speed {
             return IntegrationError::Unbounded { time, place: self.assembly.farthest(state) };
         }
-        match self.step.joint_with_nan(&self.assembly) {
-            Some(joint) => joint.not_finite_error(time),
-            None => IntegrationError::Stalled { time, step },
-        }
+        self.step.stalled(&self.assembly, time, step)
     }
 
     /// Returns the size of the next attempt (s), or `None` at the step limit. Sets the level if
@@ -392,12 +347,6 @@ impl RadauFlow {
         self.level += halvings;
         self.level <= self.settings.levels
     }
-}
-
-/// Returns the weights of the stages in the collocation polynomial of a step at `s`, where `s`
-/// is relative to the step size.
-pub(in crate::method) fn extrapolation_weights(s: f64) -> [f64; STAGES] {
-    std::array::from_fn(|q| (0..STAGES).filter(|r| *r != q).map(|r| (s - NODES[r]) / (NODES[q] - NODES[r])).product())
 }
 
 /// Collects the forces along the axes.
@@ -499,7 +448,7 @@ impl Flow for RadauFlow {
             let time = position as f64 * tick;
             let h = self.attempt(lengths, tick).ok_or_else(|| self.stalled(state, time, self.length(tick), scale.1))?;
             let ticks = 1u64 << (self.settings.levels - self.level);
-            self.set_loads(time, h);
+            self.loads.set(&self.assembly, &self.excitation, time, h);
             self.predict(state, h, last, time);
             let Some(eliminated) = &self.eliminated[self.level] else {
                 return Err(IntegrationError::Stalled { time, step: h });
@@ -537,7 +486,7 @@ impl Flow for RadauFlow {
             }
             state.copy_from_slice(&self.next);
             if self.keep {
-                self.keep_step(time, h);
+                self.keep_step(time);
                 self.keep_instant(state, time + h);
             }
             last = Some((self.level, h));

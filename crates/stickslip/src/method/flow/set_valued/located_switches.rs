@@ -16,8 +16,10 @@ use crate::law::{RatePoint, RelativeMotion, SharedLaw};
 use crate::method::flow::Flow;
 use crate::method::flow::assembly::Assembly;
 use crate::method::flow::excitation::HarmonicExcitation;
-use crate::method::flow::radau::radau_step::{RadauElimination, RadauStep, StageLoads, evaluation_points};
-use crate::method::flow::radau::step_size_control::{extrapolation_weights, time_derivative};
+use crate::method::flow::radau::radau_step::{
+    RadauElimination, RadauStep, StageLoads, evaluation_points, extrapolation_weights,
+};
+use crate::method::flow::radau::step_size_control::time_derivative;
 use crate::method::flow::step_record::StepRecord;
 use crate::method::flow::trajectory::Trajectory;
 use crate::method::{IntegrationError, MethodError};
@@ -256,15 +258,11 @@ impl SetValuedFlow {
     fn evaluate_laws(&mut self, state: &[f64], time: f64) {
         let n = self.assembly.n;
         for (q, (joint, point)) in self.assembly.joints.iter().zip(&mut self.laws).enumerate() {
-            let mut motion = RelativeMotion::along(0.0, 0.0);
-            for (d, axis) in joint.axes().enumerate() {
-                (motion.displacement[d], motion.velocity[d]) =
-                    self.assembly.relative(axis, state, &self.excitation, time);
-            }
             let holds = |friction: &FrictionJoint| friction.joint == q && friction.mode == FrictionMode::Stick;
-            if self.frictions.iter().any(holds) {
-                motion = RelativeMotion::along(0.0, 0.0);
-            }
+            let motion = match self.frictions.iter().any(holds) {
+                true => RelativeMotion::along(0.0, 0.0),
+                false => self.assembly.motion_of(joint, state, &self.excitation, time),
+            };
             let first = 2 * n + joint.first_state;
             if let Some(rate) = joint.law.rate() {
                 rate.evaluate_with_derivatives(joint.directions, &motion, &state[first..first + joint.states], point);
@@ -331,36 +329,13 @@ impl SetValuedFlow {
         remove_velocity(&self.assembly, &held, &vec![0.0; held.len()], (rows, columns));
     }
 
-    fn set_loads(&mut self, time: f64, h: f64) {
-        let (n, j) = (self.assembly.n, self.assembly.axes.len());
-        if self.loads.force.len() != STAGES * n {
-            self.loads.force = DVector::zeros(STAGES * n);
-        }
-        self.loads.stage.clear();
-        for (i, c) in NODES.iter().enumerate() {
-            let at = time + c * h;
-            self.excitation.load(at, &mut self.loads.force.as_mut_slice()[i * n..(i + 1) * n]);
-            for axis in 0..j {
-                self.loads.stage.push(self.excitation.relative_at(axis, at));
-            }
-        }
-    }
-
     /// Sets the initial guess of the step's unknowns: the extrapolated collocation polynomial
     /// of the last step, or the initial state.
     fn predict(&mut self, state: &[f64], time: f64, h: f64, last: Option<f64>) {
         let (n, j, internal) = (self.assembly.n, self.assembly.axes.len(), self.assembly.internal);
         if let Some(length) = last {
-            for (i, c) in NODES.iter().enumerate() {
-                let weights = extrapolation_weights(1.0 + c * h / length);
-                for (offset, count) in [(0, j), (STAGES * j, internal)] {
-                    for k in 0..count {
-                        let at = |stage: usize| offset + stage * count + k;
-                        self.step.unknown[at(i)] = (0..STAGES).map(|q| weights[q] * self.previous[at(q)]).sum();
-                    }
-                }
-            }
-            return;
+            let weights = NODES.map(|c| extrapolation_weights(1.0 + c * h / length));
+            return self.step.extrapolate(&self.assembly, &self.previous, &weights);
         }
         let start: Vec<f64> = (0..j).map(|axis| self.velocity(axis, state, time)).collect();
         for i in 0..STAGES {
@@ -382,7 +357,7 @@ impl SetValuedFlow {
         (scale, derivatives): (f64, bool),
     ) -> bool {
         self.tried += 1;
-        self.set_loads(begin.time, eliminated.length);
+        self.loads.set(&self.assembly, &self.excitation, begin.time, eliminated.length);
         self.predict(state, begin.time, eliminated.length, last);
         let solved = self.step.solve(&self.assembly, eliminated, &self.loads, state, (scale, derivatives));
         if solved {
@@ -410,14 +385,7 @@ impl SetValuedFlow {
 
     /// Returns the size of an error estimate relative to the tolerance.
     fn size(&self, error: &[f64], state: &[f64], scale: (f64, f64)) -> f64 {
-        let n = self.assembly.n;
-        let moving = (0..n).map(|i| (error[i].abs() / scale.0).max(error[n + i].abs() / scale.1));
-        let internal = self.assembly.joints.iter().flat_map(|joint| {
-            let size = move |s: usize| joint.state_scale + state[2 * n + s].abs();
-            joint.internal().map(move |s| error[2 * n + s].abs() / size(s))
-        });
-        let largest = moving.chain(internal).fold(0.0, f64::max);
-        if error.iter().all(|e| e.is_finite()) { largest / self.tolerance } else { f64::INFINITY }
+        self.assembly.error_size(error, state, scale) / self.tolerance
     }
 
     /// Returns the margin of a joint's mode at `s` in [0, 1] of the last solved step, relative
@@ -489,7 +457,8 @@ impl SetValuedFlow {
             FrictionMode::Stick => {
                 let force = self.laws[friction.joint].force[0];
                 let j = self.assembly.axes.len();
-                // the rate of the polynomial through the stages, at its end
+                // The rate of the polynomial through the stages, near its end. It only steers the
+                // search for the switch.
                 let ends = [0.95, 1.0].map(|s| {
                     let weights = extrapolation_weights(s);
                     (0..STAGES).map(|q| weights[q] * self.step.unknown[q * j + friction.axis]).sum::<f64>()
@@ -584,25 +553,12 @@ impl SetValuedFlow {
     }
 
     fn keep_step(&mut self, eliminated: &RadauElimination, time: f64) {
-        let (n, j) = (self.assembly.n, self.assembly.axes.len());
-        self.step.set_stages(eliminated, &self.loads);
-        let (x, v) = self.step.stages.as_slice().split_at(STAGES * n);
-        self.steps.spans.push((time, eliminated.length));
-        for i in 0..STAGES {
-            let mut velocity = self.step.unknown[i * j..(i + 1) * j].to_vec();
-            self.held().for_each(|friction| velocity[friction.axis] = 0.0);
-            let force = &self.step.force.as_slice()[i * j..(i + 1) * j];
-            let contact = self.assembly.joints.iter().enumerate().map(|(q, joint)| {
-                let own = self.frictions.iter().find(|friction| friction.joint == q);
-                own.map_or_else(
-                    || joint.law.contact_state(&velocity[joint.axes()], &force[joint.axes()]),
-                    |friction| friction.mode.contact(),
-                )
-            });
-            let contact: Vec<_> = contact.collect();
-            let of = i * n..(i + 1) * n;
-            self.steps.push_node([&x[of.clone()], &v[of]], [&velocity, force], contact);
-        }
+        let frictions = &self.frictions;
+        let of_step = (&self.assembly, eliminated, &self.loads);
+        self.step.record(of_step, time, &mut self.steps, |q, joint, velocity, force| {
+            let own = frictions.iter().find(|friction| friction.joint == q);
+            own.map_or_else(|| joint.law.contact_state(velocity, force), |friction| friction.mode.contact())
+        });
     }
 
     /// Returns the size of the next step, and the tick at its end.
@@ -619,10 +575,7 @@ impl SetValuedFlow {
     }
 
     fn stalled(&self, time: f64, step: f64) -> IntegrationError {
-        match self.step.joint_with_nan(&self.assembly) {
-            Some(joint) => joint.not_finite_error(time),
-            None => IntegrationError::Stalled { time, step },
-        }
+        self.step.stalled(&self.assembly, time, step)
     }
 
     /// Returns the eliminated structure for a step. Steps to or from a switch have a separate
@@ -709,9 +662,7 @@ impl SetValuedFlow {
         columns: usize,
     ) -> Result<(), IntegrationError> {
         if columns > 0 {
-            let mut derivative = std::mem::take(&mut self.derivative);
-            self.step.carry(&self.assembly, eliminated, &mut derivative, columns);
-            self.derivative = derivative;
+            self.step.carry(&self.assembly, eliminated, &mut self.derivative, columns);
         }
         if self.keep {
             if !self.set_slope(state, before) {

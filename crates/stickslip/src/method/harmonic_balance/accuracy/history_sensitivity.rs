@@ -28,9 +28,11 @@ impl HarmonicBalanceSolver {
         let mut spread: Option<f64> = None;
         // Factors on the friction forces of static equilibrium.
         for factor in [0.0, -1.0] {
-            self.ports.scale_static_states(&states, factor);
+            let mut scaled = states.clone();
+            scaled.iter_mut().flat_map(|state| &mut state.states).for_each(|force| *force *= factor);
+            self.ports.set_history(&scaled);
             let other = self.solve_with_history(top, omega, &motion);
-            self.ports.scale_static_states(&states, 1.0);
+            self.ports.set_history(&states);
             if let Some(other) = other {
                 let apart = self.vibration_change(top, &own, &other);
                 spread = Some(spread.map_or(apart, |spread| spread.max(apart)));

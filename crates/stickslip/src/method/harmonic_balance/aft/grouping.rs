@@ -19,7 +19,7 @@ struct PortScales {
     series_compliance: f64,
     /// Typical force of the law, N.
     force: f64,
-    /// Smallest penalty of the resolvent, N/m.
+    /// Smallest penalty of the resolvent, N s/m.
     least_penalty: f64,
 }
 

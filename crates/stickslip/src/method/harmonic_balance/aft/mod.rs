@@ -365,15 +365,6 @@ impl Ports {
         self.list.iter().map(|port| port.static_state.clone()).collect()
     }
 
-    /// Sets the initial states of all ports to `factor` times those in
-    /// `states`. Displacements stay.
-    pub fn scale_static_states(&mut self, states: &[StaticState], factor: f64) {
-        for (port, state) in self.list.iter_mut().zip(states) {
-            let own = &mut port.static_state.states;
-            own.iter_mut().zip(&state.states).for_each(|(z, known)| *z = factor * known);
-        }
-    }
-
     /// Returns the travelling wave, if these are the ports of the first sector alone.
     pub fn wave(&self) -> Option<CyclicSymmetry> {
         self.wave

@@ -39,7 +39,7 @@ pub(super) mod regularization;
 mod scaled_unknowns;
 mod scaling;
 
-use super::aft::{FrequencyTime, InitialState, Port, Ports, tangent_range, tangent_ranges};
+use super::aft::{FrequencyTime, InitialState, Port, Ports, StaticState, tangent_range, tangent_ranges};
 use super::budget::WorkCounter;
 use super::dynamics::banded::BandedForm;
 use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
@@ -577,6 +577,18 @@ impl Discretization {
         self.aft.static_share = 1.0;
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
         self.aft.sample(port, omega, self.linear.penalty[p], &motion.c[range.clone()], &motion.force[range]);
+    }
+
+    /// Returns displacement and internal states of a port at the beginning of the period. The states
+    /// are empty if they are not periodic.
+    pub fn initial_state_of(&mut self, ports: &Ports, p: usize, omega: f64, motion: &HarmonicSolution) -> StaticState {
+        self.sample(ports, p, omega, motion);
+        let nh = self.harmonics().len();
+        let mut state = StaticState { states: self.aft.state.clone(), ..StaticState::default() };
+        for (to, q) in state.displacement.iter_mut().zip(ports[p].range()) {
+            *to = motion.c[q * nh..(q + 1) * nh].iter().map(|c| c.re).sum();
+        }
+        state
     }
 
     /// Returns the forces along all axes at the harmonics `wanted`, per harmonic, from the

@@ -132,17 +132,11 @@ impl HarmonicBalanceSolver {
     /// Lets the history begin in the states of a motion at the beginning of its period.
     fn continue_history(&mut self, top: usize, omega: f64, motion: &HarmonicSolution) {
         let Some(discretization) = self.discretizations.get_mut(&top) else { return };
-        let nh = discretization.harmonics().len();
         let mut history = self.ports.static_states();
-        for (p, port) in self.ports.iter().enumerate().filter(|(_, port)| port.has_memory_steps()) {
-            discretization.sample(&self.ports, p, omega, motion);
-            // the states are unknown if none of them are periodic
-            if discretization.aft.state.len() != history[p].states.len() {
-                continue;
-            }
-            history[p].states.clone_from(&discretization.aft.state);
-            for (to, q) in history[p].displacement.iter_mut().zip(port.range()) {
-                *to = motion.c[q * nh..(q + 1) * nh].iter().map(|c| c.re).sum();
+        for (p, _) in self.ports.iter().enumerate().filter(|(_, port)| port.has_memory_steps()) {
+            let state = discretization.initial_state_of(&self.ports, p, omega, motion);
+            if state.states.len() == history[p].states.len() {
+                history[p] = state;
             }
         }
         self.set_history(&history);
