@@ -417,9 +417,9 @@ impl<'a> ModeEquations<'a> {
             tangents.push((tangent, by_frequency.cloned()));
         }
         let Some(jacobian) = jacobian else { return };
-        // all axes for one row after the other: in reduced structures every axis moves all places,
-        // and the Jacobian does not fit into the cache
+        // all axes at once: in reduced structures every axis moves all places
         let axes: Vec<&DVector<f64>> = self.motion_ports.iter().flat_map(|placed| &placed.directions).collect();
+        let places_by_axes: Vec<f64> = (0..n).flat_map(|i| axes.iter().map(move |w| w[i])).collect();
         let mut slopes = vec![0.0; axes.len() * (size - 1)];
         for (k, part) in (0..nh).flat_map(|k| [(k, 0), (k, 1)]) {
             let mut of_axes = slopes.chunks_exact_mut(size - 1);
@@ -431,12 +431,8 @@ impl<'a> ModeEquations<'a> {
                     slopes[size - 2] = [by_frequency.re, by_frequency.im][part];
                 }
             }
-            for i in 0..n {
-                let row = &mut jacobian[(2 * (k * n + i) + part) * size..][..size - 1];
-                for (w, slopes) in axes.iter().zip(slopes.chunks_exact(size - 1)).filter(|(w, _)| w[i] != 0.0) {
-                    row.iter_mut().zip(slopes).for_each(|(entry, slope)| *entry += w[i] * slope);
-                }
-            }
+            let rows = &mut jacobian[(2 * k * n + part) * size..];
+            dense::add_product(&places_by_axes, &slopes, axes.len(), rows, 2 * size);
         }
     }
 
