@@ -68,12 +68,14 @@ pub enum FirstZero {
 }
 
 /// The state of a monitored signal at the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialSign {
     /// The signal is positive.
     Positive,
-    /// The signal is zero and expected to rise. Its first nonzero derivative decides.
-    Zero,
+    /// The signal is zero within this tolerance and expected to rise. Its first nonzero derivative
+    /// decides. A signal that rises too slowly to be told from zero is raised by twice the
+    /// tolerance, or by more if it begins further below zero.
+    Zero(f64),
 }
 
 impl ExponentialBasis {
@@ -248,6 +250,7 @@ impl ExponentialBasis {
             second_weights,
             third_weights,
             zero_free_until,
+            raised,
             rising,
         } = scratch;
         self.exponent_magnitudes(exponent_magnitudes);
@@ -261,12 +264,18 @@ impl ExponentialBasis {
         }
         self.magnitudes(end, magnitudes);
         for k in 0..count {
-            zero_free_until[k] = match begins[k] {
-                InitialSign::Positive => 0.0,
-                InitialSign::Zero => match self.rises_until(&first[k * nb..(k + 1) * nb], magnitudes, rising) {
-                    Some(until) => until,
-                    None => return FirstZero::Found { index: k, time: 0.0 },
-                },
+            (zero_free_until[k], raised[k]) = match begins[k] {
+                InitialSign::Positive => (0.0, 0.0),
+                InitialSign::Zero(tolerance) => {
+                    let range = k * nb..(k + 1) * nb;
+                    let Some((until, value)) = self.rises_until(&first[range.clone()], magnitudes, rising) else {
+                        return FirstZero::Found { index: k, time: 0.0 };
+                    };
+                    // ten times the rounding errors of a signal
+                    let resolved = 1e-12 * signals[range.clone()].iter().map(magnitude).sum::<f64>();
+                    let raise = || 2.0 * tolerance.max(-self.initial_value(&signals[range]));
+                    (until, if value > resolved { 0.0 } else { raise() })
+                }
             };
         }
         let mut time = 0.0;
@@ -288,7 +297,7 @@ impl ExponentialBasis {
                     continue;
                 }
                 let range = k * nb..(k + 1) * nb;
-                let g = real_dot(&signals[range.clone()], values);
+                let g = real_dot(&signals[range.clone()], values) + raised[k];
                 if g <= 0.0 {
                     return FirstZero::Found { index: k, time };
                 }
@@ -331,14 +340,21 @@ impl ExponentialBasis {
         FirstZero::TooManySteps
     }
 
-    /// Returns a time until which a signal that starts at zero stays positive,
-    /// or `None` if it falls. `slope` is its derivative.
-    fn rises_until(&self, slope: &[Complex64], magnitudes: &[f64], memory: &mut [Vec<Complex64>; 2]) -> Option<f64> {
+    /// Returns a time until which a signal that starts at zero stays positive, and its least value
+    /// then; or `None` if it falls. `slope` is its derivative.
+    fn rises_until(
+        &self,
+        slope: &[Complex64],
+        magnitudes: &[f64],
+        memory: &mut [Vec<Complex64>; 2],
+    ) -> Option<(f64, f64)> {
         let [current, next] = memory;
         current.clear();
         current.extend_from_slice(slope);
         next.resize(slope.len(), Complex64::new(0.0, 0.0));
+        let mut factorial = 1.0;
         for order in 1..=4 {
+            factorial *= f64::from(order);
             if order > 1 {
                 self.differentiate(current, next);
                 std::mem::swap(current, next);
@@ -353,11 +369,15 @@ impl ExponentialBasis {
                 }
                 self.differentiate(current, next);
                 let bound: f64 = next.iter().zip(magnitudes).map(|(c, m)| magnitude(c) * m).sum();
-                // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!
-                return Some(if bound == 0.0 { f64::INFINITY } else { 0.5 * f64::from(order + 1) * value / bound });
+                if bound == 0.0 {
+                    return Some((f64::INFINITY, f64::INFINITY));
+                }
+                // g ≥ value τ^k/k! - bound τ^{k+1}/(k+1)!, half of the first term at this τ
+                let until = 0.5 * f64::from(order + 1) * value / bound;
+                return Some((until, 0.5 * value * until.powi(order) / factorial));
             }
         }
-        Some(f64::INFINITY) // flat: a contact that stays exactly at its limit
+        Some((0.0, 0.0)) // flat, such as the force of a contact that stays exactly at its limit
     }
 
     /// Returns true if a signal has no resonant and no drifting terms.
@@ -551,6 +571,7 @@ pub struct ZeroScratch {
     second_weights: Vec<f64>,
     third_weights: Vec<f64>,
     zero_free_until: Vec<f64>,
+    raised: Vec<f64>,
     rising: [Vec<Complex64>; 2],
 }
 
@@ -565,6 +586,7 @@ impl ZeroScratch {
         self.second_weights.resize(nb * count, 0.0);
         self.third_weights.resize(nb * count, 0.0);
         self.zero_free_until.resize(count, 0.0);
+        self.raised.resize(count, 0.0);
     }
 }
 
@@ -601,17 +623,31 @@ mod tests {
         let basis = ExponentialBasis { exponents: vec![c(0.0, 1.0)], ..ExponentialBasis::default() };
         let g = [c(-1.0, 0.0), c(1.0, 0.0)];
         let mut scratch = ZeroScratch::default();
-        assert_eq!(basis.first_zero(&g, &[InitialSign::Zero], 6.0, &mut scratch), FirstZero::None);
+        assert_eq!(basis.first_zero(&g, &[InitialSign::Zero(1e-10)], 6.0, &mut scratch), FirstZero::None);
         let sine = [c(0.0, -1.0), c(0.0, 0.0)];
-        let FirstZero::Found { time, .. } = basis.first_zero(&sine, &[InitialSign::Zero], 6.0, &mut scratch) else {
+        let FirstZero::Found { time, .. } = basis.first_zero(&sine, &[InitialSign::Zero(1e-10)], 6.0, &mut scratch)
+        else {
             panic!("the zero at pi was missed");
         };
         assert!((time - std::f64::consts::PI).abs() < 1e-14);
         let falling = [c(1.0, 0.0), c(-1.0, 0.0)];
         assert_eq!(
-            basis.first_zero(&falling, &[InitialSign::Zero], 6.0, &mut scratch),
+            basis.first_zero(&falling, &[InitialSign::Zero(1e-10)], 6.0, &mut scratch),
             FirstZero::Found { index: 0, time: 0.0 }
         );
+    }
+
+    /// `cos τ - cos 2τ/4 - 3/4` and a constant that rounding has lowered by 1e-13: the signal rises
+    /// with the fourth power of time, and its rounding is no zero.
+    #[test]
+    fn a_slow_rise_is_no_zero() {
+        let basis = ExponentialBasis { exponents: vec![c(0.0, 1.0), c(0.0, 2.0)], ..ExponentialBasis::default() };
+        let falls = |sign: f64| [c(sign, 0.0), c(-0.25 * sign, 0.0), c(-0.75 * sign - 1e-13, 0.0)];
+        let mut scratch = ZeroScratch::default();
+        let slow = [InitialSign::Zero(1e-10)];
+        assert_eq!(basis.first_zero(&falls(-1.0), &slow, 6.0, &mut scratch), FirstZero::None);
+        let found = basis.first_zero(&falls(1.0), &slow, 6.0, &mut scratch);
+        assert_eq!(found, FirstZero::Found { index: 0, time: 0.0 });
     }
 
     /// The closed-form integrals agree with quadrature, and the derivatives of

@@ -213,7 +213,7 @@ pub enum OrbitError {
     },
     /// The motion does not settle.
     #[error(
-        "{method} at {}: the motion has not settled after {returns} periods, each of `period` cycles; it still changes by a \
+        "{method} at {}: the motion has not settled after {returns} periods; it still changes by a \
          fraction of {change:.1e} per period{}",
         hertz(*omega), settling_advice(*.repeats, *.needed, .advice)
     )]

@@ -213,3 +213,36 @@ fn a_decay_of_several_modes_is_named() {
     let one = notes("a = \"1 mm\", b = \"1 mm\"");
     assert!(!one.contains("grow"), "{one}");
 }
+
+/// Three masses in a row, the last one pulled until the joint of the first one slips. After the
+/// release the force of this joint leaves its limit with the sixth power of time, or with the
+/// fourth if the springs have dampers. Expected: the linear motion of the stuck structure (SciPy,
+/// matrix exponential).
+#[test]
+fn a_joint_far_from_the_pulled_place_leaves_its_limit_slowly() {
+    let expected = [
+        ("0", [[0.00416166, 0.01055919, 0.01360404], [-0.00182324, -0.00591666, -0.00668141]]),
+        ("10 N s/m", [[0.00416038, 0.01054966, 0.01361909], [-0.00181118, -0.00585917, -0.00665755]]),
+    ];
+    for (damping, expected) in expected {
+        let mut text = "schema = 1\n".to_owned();
+        for (mass, size) in [("a", 100), ("b", 80), ("c", 60)] {
+            text += &format!("[[mass]]\nname = \"{mass}\"\nmass = \"{size} kg\"\n");
+        }
+        for ([one, other], stiffness, share) in [(["a", "ground"], 60, 2), (["a", "b"], 50, 1), (["b", "c"], 40, 1)] {
+            text += &format!(
+                "[[spring]]\nbetween = [\"{one}\", \"{other}\"]\nstiffness = \"{stiffness} N/mm\"\ndamping = \"{share} * {damping}\"\n"
+            );
+        }
+        text += "[[joint]]\nname = \"brace\"\nbetween = [\"a\", \"ground\"]\nlaw = { kind = \"jenkins\", stiffness = \"30 N/mm\", \
+                 limit = \"100 N\" }\n[study]\nkind = \"transient\"\nstart = { c = \"20 mm\" }\nduration = \"0.15 s\"\n\
+                 time_step = \"50 ms\"\n";
+        let data = dataset(&text);
+        for (place, at) in ["a", "b", "c"].iter().zip(0..) {
+            let motion = displacement(&data, place);
+            for (row, expected) in [(1, expected[0][at]), (3, expected[1][at])] {
+                assert!((motion[row] - expected).abs() < 1e-8, "{damping}, {place}: {} {expected}", motion[row]);
+            }
+        }
+    }
+}

@@ -561,7 +561,7 @@ fn begin(constant: &mut Complex64, value: f64, zero: f64, eased: bool) -> Initia
         constant.re += 2.0 * zero;
         InitialSign::Positive
     } else {
-        InitialSign::Zero
+        InitialSign::Zero(zero)
     }
 }
 
