@@ -274,6 +274,50 @@ fn further_tables_of_a_motion() {
     assert!(error.contains("no table `spektrum`"), "{error}");
 }
 
+/// The ground accelerates by 2 m/s² under a stiff structure, which moves with it: oscillators on the
+/// structure see this acceleration, and overshoot by `e^(-πζ/√(1 - ζ²))`, 85 %.
+#[test]
+fn shock_spectra_include_the_motion_of_the_ground() {
+    let study = format!(
+        "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"1e8 N/m\"\n\
+         damping = \"1e4 N s/m\"\n[[motion]]\non = \"ground\"\ndata = \"record\"\n{TRANSIENT}also = [\"shock_spectrum\"]\n"
+    );
+    let study = study.replace("2 s\"", "4 s\"");
+    let dataset = try_run("time_s,acceleration_m_per_s2\n0,2\n5,2\n", &study).unwrap_or_else(|error| panic!("{error}"));
+    let table = dataset.tables.iter().find(|one| one.name == "shock_spectrum").unwrap();
+    let numbers = |column: &str| table.numbers(column).unwrap_or_else(|| panic!("no column {column}")).to_vec();
+    for (hertz, largest) in numbers("frequency_Hz").iter().zip(numbers("m_largest_acceleration_m_per_s2")) {
+        if (0.5..5.0).contains(hertz) {
+            assert!((largest / 3.7089 - 1.0).abs() < 2e-3, "{hertz} Hz: {largest}");
+        }
+    }
+}
+
+/// A mass on a spring with dry friction turns at 0.1, -0.08, 0.06, -0.04 and 0.02 m, and friction
+/// takes 0.4 N times the way of 0.48 m, also with ten samples a period. Three samples a period are
+/// too few to follow the motion.
+#[test]
+fn tables_of_few_samples() {
+    let study = |step: &str| {
+        format!(
+            "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \
+             \"40 N/m\"\n[[joint]]\nname = \"j\"\nbetween = [\"m\", \"ground\"]\nlaw = {{ kind = \"coulomb\", limit = \
+             \"0.4 N\" }}\n[study]\nkind = \"transient\"\nstart = {{ m = \"0.1 m\" }}\nduration = \"{} s\"\ntime_step = \
+             \"{step}\"\nalso = [\"joint_work\"]\n",
+            2.0 * std::f64::consts::TAU / f64::sqrt(40.0)
+        )
+    };
+    let dataset =
+        run(&read_study("study.toml", &study("100 ms"), &[]).unwrap(), &Context::without_progress(1)).unwrap();
+    let table = dataset.tables.iter().find(|one| one.name == "joint_work").unwrap();
+    let work = table.numbers("j_work_J").unwrap();
+    assert!((work[work.len() - 1] / (0.4 * 0.48) - 1.0).abs() < 5e-3, "{work:?}");
+    let noted = |dataset: &Dataset| dataset.notes.iter().any(|note| note.contains("too far apart to follow"));
+    assert!(!noted(&dataset), "{:?}", dataset.notes);
+    let coarse = run(&read_study("study.toml", &study("300 ms"), &[]).unwrap(), &Context::without_progress(1)).unwrap();
+    assert!(noted(&coarse), "{:?}", coarse.notes);
+}
+
 #[test]
 fn signals_are_checked() {
     let study = |signal: &str| {

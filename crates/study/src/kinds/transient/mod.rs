@@ -1,6 +1,7 @@
 //! Transients: the motion in time from rest or from given displacements; free decay,
 //! switched-on excitation, or run-up.
 
+mod extremes;
 mod figure;
 mod further_tables;
 pub(super) mod record;
@@ -22,6 +23,7 @@ use crate::run::point_row::describe_location;
 use crate::run::work::{CONVERGED, Computed, NOT_CONVERGED, NOT_REACHED, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::format_significant;
 use crate::syntax::key::{Bounds, FREQUENCY_RANGE, Key, ValueType, default, optional, required};
+use extremes::Extremes;
 use further_tables::History;
 use record::Records;
 use std::f64::consts::TAU;
@@ -261,8 +263,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         part.tables = (0..4 + further_tables::ALL.len()).map(|_| TableBuilder::default()).collect();
         return Ok(part);
     }
-    if records.as_ref().is_some_and(|records| records.ground_moves) {
-        let text = "the ground moves; displacements and velocities are relative to it.";
+    if records.as_ref().is_some_and(Records::ground_moves) {
+        let text = "the ground moves; displacements and velocities are relative to it, shock response spectra are not.";
         part.notes.push(Note::for_case(&case.label(), text));
     }
     let (mut rows, mut extremes) = (TableBuilder::default(), TableBuilder::default());
@@ -294,12 +296,9 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             tolerance: case.method.time_history_tolerance(),
         };
         let (mut sampled, mut stopped) = (false, false);
-        // largest displacement of every place, and its time
-        let mut largest = vec![(0.0f64, 0.0); prepared.system.places().len()];
+        let mut extremes_of_places = vec![Extremes::default(); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
-        // sum of the squared displacements of every place, and number of samples
         let mut history = History::default();
-        let (mut squares, mut count) = (vec![0.0f64; prepared.system.places().len()], 0usize);
         let is_free = excitation == Excitation::Free && records.is_none();
         let mut visitor = |instant: TimeSample<'_>| {
             let TimeSample { time, omega, state: sample, between: since } = instant;
@@ -313,9 +312,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             rows.end_row();
             sampled = true;
             if !wanted.is_empty() {
-                history.add(prepared, time, sample);
+                history.add(prepared, records.as_ref(), (time, sample), since);
             }
-            count += 1;
             // the turning points are located exactly only for the place that moves most
             let most = largest_range(&decays).filter(|_| is_free);
             for (i, (decay, along)) in decays.iter_mut().zip(prepared.system.place_axes()).enumerate() {
@@ -324,10 +322,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                 let [x, v] = motion_along(sample);
                 let motion = |time: f64| motion_along(&since(time));
                 decay.add([time, x, v], (Some(i) == most).then_some(&motion as &PlaceMotionFn<'_>));
-                squares[i] += x * x;
-                if x.abs() > largest[i].0 {
-                    largest[i] = (x.abs(), time);
-                }
+                extremes_of_places[i].add([time, x, v]);
             }
             work.share.reach((number as f64 + time / duration) / motions);
             stopped = work.context.stopped();
@@ -349,17 +344,18 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         history.write(prepared, wanted, &begin_row, &mut further);
         // a motion without a sample has no largest displacement
         let displacements = prepared.system.place_axes().iter().map(|along| !along.is_rotation());
-        let places = prepared.system.places().iter().zip(largest).zip(&squares).zip(displacements);
-        let places = places.filter(|(_, counts)| *counts && sampled).map(|(of, _)| of);
-        for ((place, (displacement, time)), squares) in places {
+        let places = prepared.system.places().iter().zip(&extremes_of_places).zip(displacements);
+        let places: Vec<_> = places.filter(|(_, counts)| *counts && sampled).map(|(of, _)| of).collect();
+        part.notes.extend(coarse_samples(&places).map(|text| Note::for_case(&case.label(), text)));
+        for (place, found) in places {
             extremes.varied(case);
             if work.several_frequencies() {
                 extremes.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
             }
             extremes.text("mass", place);
-            extremes.number("largest_displacement_m", displacement);
-            extremes.number(TIME, time);
-            extremes.number("rms_displacement_m", (squares / count as f64).sqrt());
+            extremes.number("largest_displacement_m", found.largest);
+            extremes.number(TIME, found.time);
+            extremes.number("rms_displacement_m", found.rms());
             extremes.reduction_error(prepared.system.reduction_evidence());
             extremes.end_row();
         }
@@ -382,6 +378,19 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     part.tables = vec![rows, extremes, decay, summary];
     part.tables.extend(further);
     Ok(part)
+}
+
+/// Returns the warning for samples that do not follow the motion.
+fn coarse_samples(places: &[(&String, &Extremes)]) -> Option<String> {
+    // Distance of a sample from the cubic through its neighbours, relative to the largest
+    // displacement: that of a sine at six samples a period.
+    let coarse = 0.05;
+    let largest = places.iter().map(|(_, found)| found.largest).fold(0.0, f64::max);
+    let (place, _) = places.iter().find(|(_, found)| found.unresolved > coarse * largest)?;
+    Some(format!(
+        "{WARNING}the samples are too far apart to follow the motion of `{place}`: largest displacements, spectra and \
+         figures depend on `time_step`; make it smaller"
+    ))
 }
 
 /// Returns the place with the largest range of samples.

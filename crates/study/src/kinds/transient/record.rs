@@ -60,8 +60,9 @@ pub(super) struct Records {
     channels: Vec<Channel>,
     /// Times of all rows, rising.
     knots: Vec<f64>,
-    /// True if the ground moves, so that displacements are relative to it.
-    pub ground_moves: bool,
+    /// Channels with the acceleration of the ground, and the displacements of all degrees of freedom
+    /// if the ground moves by 1 m.
+    ground: Vec<(usize, Vec<f64>)>,
 }
 
 /// A problem of a record: the list, the number of its entry, and the key.
@@ -85,7 +86,7 @@ impl Records {
     pub fn new(study: &Study, case: &Case) -> Result<Option<Records>, RecordError> {
         let lists = [("force", &study.structure.lists.force), ("motion", &study.structure.lists.motion)];
         let mut model = case.model.clone();
-        let (mut channels, mut ground_moves): (Vec<Channel>, bool) = (Vec::new(), false);
+        let (mut channels, mut on_the_ground): (Vec<Channel>, _) = (Vec::new(), Vec::new());
         for (list, tables) in lists {
             for (index, table) in tables.iter().enumerate() {
                 if !table.has_time_history() {
@@ -107,7 +108,6 @@ impl Records {
                 let on = text(table, "on").unwrap_or_default().to_owned();
                 let harmonic = channels.len() as u32 + 1;
                 let on_ground = list == "motion" && on == GROUND;
-                ground_moves |= on_ground;
                 let (displacement, role) = match (list, on_ground, model.is_rotation(&on)) {
                     ("force", _, false) => (Dimension::FORCE, "force"),
                     ("force", _, true) => (Dimension::ENERGY, "force"),
@@ -138,7 +138,8 @@ impl Records {
                 };
                 let SignalRows { times, values } = rows;
                 if on_ground {
-                    push_inertia(&mut model, text(table, "along"), harmonic).map_err(|cause| fail("on", cause))?;
+                    let moved = push_inertia(&mut model, text(table, "along"), harmonic);
+                    on_the_ground.push((channels.len(), moved.map_err(|cause| fail("on", cause))?));
                 } else if list == "force" {
                     model.forces.push(Force { on, amplitude: 1.0, phase: 0.0, harmonic });
                 } else {
@@ -161,7 +162,29 @@ impl Records {
         knots.retain(|time| *time >= 0.0);
         knots.sort_by(f64::total_cmp);
         knots.dedup();
-        Ok(Some(Records { unit, channels, knots, ground_moves }))
+        let carried = |moved: Vec<String>| {
+            let mut displacement = vec![0.0; unit.dofs()];
+            let places = unit.places().iter().zip(unit.place_axes()).filter(|(place, _)| moved.contains(place));
+            places.flat_map(|(_, axis)| axis.rows()).for_each(|(row, weight)| displacement[*row] = *weight);
+            displacement
+        };
+        let ground = on_the_ground.into_iter().map(|(channel, moved)| (channel, carried(moved))).collect();
+        Ok(Some(Records { unit, channels, knots, ground }))
+    }
+
+    /// Tells whether the ground moves, so that displacements are relative to it.
+    pub fn ground_moves(&self) -> bool {
+        !self.ground.is_empty()
+    }
+
+    /// Returns the accelerations of the degrees of freedom that move with the ground, m/s².
+    pub fn ground_acceleration(&self, time: f64) -> Vec<f64> {
+        let mut acceleration = vec![0.0; self.unit.dofs()];
+        for (channel, carried) in &self.ground {
+            let (value, _) = self.channels[*channel].at(time, time);
+            acceleration.iter_mut().zip(carried).for_each(|(sum, moved)| *sum += value * moved);
+        }
+        acceleration
     }
 
     /// Returns the time of the last row, s.
@@ -228,8 +251,9 @@ pub(in crate::kinds) fn check(study: &Study, case: &Case) -> Result<(), RecordEr
     Records::new(study, case).map(drop)
 }
 
-/// Adds the inertia forces `-m a` of a unit acceleration of the ground.
-fn push_inertia(model: &mut Model, along: Option<&str>, harmonic: u32) -> Result<(), ColumnError> {
+/// Adds the inertia forces `-m a` of a unit acceleration of the ground. Returns the places on which
+/// they act.
+fn push_inertia(model: &mut Model, along: Option<&str>, harmonic: u32) -> Result<Vec<String>, ColumnError> {
     let error = |message: &str, help: &str| ColumnError { message: message.to_owned(), help: help.to_owned() };
     if model.substructure.is_some() || model.ring.is_some() {
         let help = "state a model of masses and bodies, or a motion of the places that the ground moves";
@@ -257,6 +281,7 @@ fn push_inertia(model: &mut Model, along: Option<&str>, harmonic: u32) -> Result
     if forces.is_empty() {
         return Err(error("no mass can move in this direction", "choose another direction in `along`"));
     }
+    let moved = forces.iter().map(|force| force.on.clone()).collect();
     model.forces.extend(forces);
-    Ok(())
+    Ok(moved)
 }
