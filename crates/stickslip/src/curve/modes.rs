@@ -207,6 +207,7 @@ impl ModeBranches {
             return ModeBranches { falling: None, rising };
         }
         let mut falling = ModeCurve::follow(equations, request.mode, request.range.0, request.range.1);
+        falling.drop_other_mode(equations);
         let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
         let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, low, end) } else { None };
@@ -400,6 +401,41 @@ mod tests {
             apart += usize::from(cause == Some(ModeEndCause::Apart));
         }
         assert!(apart > 0, "no mode changes its number");
+    }
+
+    /// Three times the frequency of the first mode meets the third mode while the joints slip. Below,
+    /// the curve from large amplitudes is a vibration of the third mode. At small amplitudes all
+    /// joints stick (NumPy, eigenvalues): 16.304452955 Hz, damping ratio 0.00270917.
+    #[test]
+    fn a_mode_ends_where_it_becomes_another_one() {
+        let places = ["m1", "m2", "m3", "m4"];
+        let between = |one: &str, other: &str| [one.to_owned(), other.to_owned()];
+        let spring =
+            |one: &str, other: &str, stiffness, damping| Spring { between: between(one, other), stiffness, damping };
+        let joint = |one: &str, other: &str, stiffness, limit| Joint {
+            name: format!("{one}-{other}"),
+            between: between(one, other),
+            law: std::sync::Arc::new(Jenkins { stiffness, limit }),
+        };
+        let model = Model {
+            masses: places.iter().zip([2.0, 1.5, 1.0, 0.5]).map(|(place, mass)| Mass::new(*place, mass)).collect(),
+            springs: vec![
+                spring("m1", GROUND, 4e4, 3.0),
+                spring("m1", "m2", 3e4, 2.0),
+                spring("m2", "m3", 2.5e4, 2.0),
+                spring("m3", "m4", 2e4, 1.0),
+            ],
+            joints: vec![joint("m2", GROUND, 1.5e4, 8.0), joint("m3", "m1", 5e5, 5.0)],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let unit = unit_amplitude(&system, 0).unwrap().unwrap();
+        let range = (2e-5 * unit, 2e-2 * unit);
+        let mode =
+            nonlinear_mode(&system, ModeRequest { mode: 0, range, points: 2, harmonics: 15, samples: 512 }).unwrap();
+        let small = &mode.points[0];
+        assert!((small.omega / (2.0 * PI) / 16.304_452_955 - 1.0).abs() < 1e-6, "{}", small.omega / (2.0 * PI));
+        assert!((small.damping / 0.002_709_17 - 1.0).abs() < 1e-4, "{}", small.damping);
     }
 
     /// For two equal modes of a ring, the solver follows the travelling waves:

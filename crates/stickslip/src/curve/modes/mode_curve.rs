@@ -50,6 +50,12 @@ pub enum ModeEndCause {
         "the continuation reached its work limit, because the internal states of a law change very fast there; choose other amplitudes"
     )]
     WorkLimit,
+    /// Another harmonic exceeds the first.
+    #[error(
+        "another harmonic exceeds the first there: the curve continues as a vibration of another mode at a multiple of the \
+         frequency"
+    )]
+    OtherMode,
     /// The curve from small amplitudes is another motion where it should meet the one from large
     /// amplitudes.
     #[error(
@@ -310,7 +316,25 @@ impl ModeCurve {
         arcs.push(start);
         let mut curve = ModeCurve { linear: None, travels, arcs, sticks: false, ended: None, settings };
         curve.ended = reason.map(|reason| ModeEnd { at: curve.largest_amplitude(), reason });
+        curve.drop_other_mode(equations);
         Some(curve)
+    }
+
+    /// Drops the last points if another harmonic exceeds the first in all of them: the curve has
+    /// become a vibration of another mode. Its frequency is near a multiple of that of this mode.
+    pub(super) fn drop_other_mode(&mut self, equations: &ModeEquations<'_>) {
+        let rises = self.linear.is_none();
+        let own = |arc: &ModeArc| equations.is_mainly_first_harmonic(&arc.state);
+        let (first, last) = (self.arcs.iter().position(own), self.arcs.iter().rposition(own));
+        let (Some(first), Some(last)) = (first, last) else { return };
+        let dropped = if rises { first } else { self.arcs.len() - 1 - last };
+        if dropped == 0 {
+            return;
+        }
+        self.arcs = if rises { self.arcs.split_off(first) } else { self.arcs.drain(..=last).collect() };
+        self.sticks = false;
+        let at = if rises { self.largest_amplitude() } else { self.smallest_amplitude() };
+        self.ended = Some(ModeEnd { at, reason: ModeEndCause::OtherMode });
     }
 
     /// Returns the largest amplitude on the curve.

@@ -12,7 +12,7 @@ use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
 use crate::results::columns::{amplitude_in, first_harmonic_in, phase_of};
 use crate::results::dataset::FIELDS;
-use crate::results::notes::Note;
+use crate::results::notes::{Note, WARNING};
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};
 use crate::syntax::format::{format_with_prefix, plural_suffix};
@@ -278,6 +278,15 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
             travelling wave is computed: equal places of all sectors have equal amplitudes with a phase shift. The \
             other mode is the wave in the opposite direction. Standing waves slip differently.";
         remarks.push(text.to_owned());
+    }
+    if let Some(point) =
+        mode.points.iter().filter(|point| point.damping > 1.0).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
+    {
+        remarks.push(format!(
+            "{WARNING}from {} downwards the damping ratio exceeds 1, and no decay or resonance shows such a mode; if a \
+             rigid joint slides there, give it a stiffness (law `jenkins`), or choose larger amplitudes",
+            amplitude(unit, point.amplitude)
+        ));
     }
     let joints = mode.points.iter().chain(&mode.largest).map(|point| (point.damping - point.viscous).abs());
     // Damping ratio of the joints, absolute, below which no joint slips. Solutions are accurate

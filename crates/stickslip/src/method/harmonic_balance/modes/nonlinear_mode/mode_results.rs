@@ -46,6 +46,17 @@ impl ModeEquations<'_> {
         self.mass_inner_product(one, other).norm_sqr() / (squares[0] * squares[1])
     }
 
+    /// Returns whether the first harmonic is the largest part of the vibration.
+    pub fn is_mainly_first_harmonic(&self, state: &ModeState) -> bool {
+        let n = self.system.dofs();
+        let moving = state.x.chunks_exact(n).zip(&self.aft.harmonics).filter(|(_, h)| **h > 0);
+        let (mut first, mut others) = (0.0, 0.0);
+        for (x, h) in moving {
+            *(if *h == 1 { &mut first } else { &mut others }) += self.mass_inner_product(x, x).re;
+        }
+        first >= others
+    }
+
     /// Returns the mass inner product of two changes of motion, summed over all harmonics.
     pub(super) fn kinetic_inner_product(&self, one: &[f64], other: &[f64]) -> f64 {
         let n = self.system.dofs();
