@@ -4,10 +4,12 @@
 //! A force becomes a moment, and a length becomes an angle. A dimension `kg^a m^b s^c rad^d` is a
 //! product of `a` forces and `b - a` lengths, so it becomes `kg^a m^2a s^c rad^(d + b - a)`.
 
-use super::compiled::{CompiledTable, CompiledValue, LawCoordinate};
+use super::bare_numbers::bare_number;
+use super::compiled::{CompiledQuantity, CompiledTable, CompiledValue, LawCoordinate};
 use super::source_model::{ModelLists, SourceModel};
 use crate::syntax::error::Problem;
 use crate::syntax::expression::ExpressionValue;
+use crate::syntax::suggest::excerpt;
 use stickslip::dimension::Dimension;
 
 /// Returns the dimension that a quantity of displacements and forces has for rotations and
@@ -59,6 +61,25 @@ fn turn(table: &mut CompiledTable) {
     }
 }
 
+/// Returns the problem of a speed without a unit, which would count in Hz as a frequency does.
+fn bare_speed(table: &CompiledTable) -> Option<Problem> {
+    table.entries.iter().find_map(|entry| {
+        let quantities: Vec<&CompiledQuantity> = match &entry.value {
+            CompiledValue::Quantity { quantity, dimension: Dimension::VELOCITY, .. } => vec![quantity],
+            CompiledValue::ByName(list, Dimension::VELOCITY) => list.iter().map(|(.., quantity)| quantity).collect(),
+            CompiledValue::Law(_, table, _) | CompiledValue::Table(table) => return bare_speed(table),
+            CompiledValue::Tables(tables) => return tables.iter().find_map(bare_speed),
+            _ => return None,
+        };
+        quantities.into_iter().find(|quantity| bare_number(quantity).is_some()).map(|quantity| {
+            let number = excerpt(quantity.text.trim());
+            quantity
+                .problem(entry.key, format!("the speed of rotation {number} has no unit"))
+                .help(format!("write \"{number} rad/s\" or \"{number} rpm\""))
+        })
+    })
+}
+
 /// Returns the dimension of the `mass` of an entry, if its expression determines it.
 fn mass_dimension(mass: &CompiledTable, parameters: &[ExpressionValue]) -> Option<Dimension> {
     match &mass.entry("mass")?.value {
@@ -72,7 +93,8 @@ fn mass_dimension(mass: &CompiledTable, parameters: &[ExpressionValue]) -> Optio
 /// `[parameters]`.
 ///
 /// # Errors
-/// The model mixes masses with moments of inertia, or it has parts without rotations.
+/// The model mixes masses with moments of inertia, has parts without rotations, or a speed without
+/// a unit.
 pub(crate) fn use_moments_of_inertia(
     structure: &mut SourceModel,
     study: &mut CompiledTable,
@@ -114,6 +136,10 @@ pub(crate) fn use_moments_of_inertia(
         return problem(&matrices.table, "mass", message);
     }
     let ModelLists { mass, spring, joint, force, motion, is_torsional, .. } = &mut structure.lists;
+    let entries = || mass.iter().chain(&*spring).chain(&*joint).chain(&*force).chain(&*motion);
+    if let Some(problem) = entries().find_map(bare_speed).or_else(|| bare_speed(study)) {
+        return Err(problem);
+    }
     mass.iter_mut().chain(spring).chain(joint).chain(force).chain(motion).for_each(turn);
     turn(study);
     *is_torsional = true;

@@ -63,7 +63,7 @@ impl ModelSummary {
             None => {}
         }
         if joint.limit == 0.0 {
-            return "free: its slip limit is zero in static equilibrium".to_owned();
+            return "free: no slip limit and no force in static equilibrium".to_owned();
         }
         if joint.limit.is_infinite() {
             return "acts as a spring, never slips".to_owned();
