@@ -25,7 +25,7 @@ pub(super) const ALL: [&str; 3] = [JOINT_WORK, SPECTRUM, SHOCK_SPECTRUM];
 
 /// Instants per sample for the work and the shock response spectrum. At 20 samples a period, the
 /// work of a harmonic force and motion is then exact to 1e-4.
-const INSTANTS: usize = 8;
+pub(super) const INSTANTS: usize = 8;
 /// Half-overlapping segments of a spectrum.
 const SEGMENTS: usize = 8;
 /// Damping ratio of the oscillators of a shock response spectrum.
@@ -33,9 +33,11 @@ const SHOCK_DAMPING: f64 = 0.05;
 /// Their frequencies per octave.
 const PER_OCTAVE: f64 = 12.0;
 
-/// The samples of a motion.
+/// The samples of a motion, as far as its tables need them.
 #[derive(Debug, Default)]
 pub(super) struct History {
+    /// The names of the tables.
+    wanted: Vec<String>,
     times: Vec<f64>,
     /// Displacements of the samples, place by place.
     displacement: Vec<Vec<f64>>,
@@ -49,6 +51,14 @@ pub(super) struct History {
 }
 
 impl History {
+    pub fn new(wanted: &[String]) -> Self {
+        History { wanted: wanted.to_vec(), ..History::default() }
+    }
+
+    fn wants(&self, table: &str) -> bool {
+        self.wanted.iter().any(|wanted| wanted == table)
+    }
+
     /// Adds a sample. `since` returns the motion since the previous one.
     pub fn add(
         &mut self,
@@ -57,20 +67,20 @@ impl History {
         (time, sample): (f64, &Sample),
         since: &dyn Fn(f64) -> Sample,
     ) {
-        let axes = prepared.system.place_axes();
-        self.displacement.resize(axes.len(), Vec::new());
-        for (i, axis) in axes.iter().enumerate() {
-            self.displacement[i].push(axis.component(&sample.displacement));
+        if self.wants(SPECTRUM) {
+            push_components(&mut self.displacement, prepared, &sample.displacement);
         }
-        let mut work = self.work.last().cloned().unwrap_or_default();
-        if let Some(last) = self.times.last().copied() {
-            for k in 1..INSTANTS {
-                let instant = last + (time - last) * k as f64 / INSTANTS as f64;
-                self.advance(prepared, records, (instant, &since(instant)), &mut work);
+        if self.wants(JOINT_WORK) || self.wants(SHOCK_SPECTRUM) {
+            let mut work = self.work.last().cloned().unwrap_or_default();
+            if let Some(last) = self.times.last().copied() {
+                for k in 1..INSTANTS {
+                    let instant = last + (time - last) * k as f64 / INSTANTS as f64;
+                    self.advance(prepared, records, (instant, &since(instant)), &mut work);
+                }
             }
+            self.advance(prepared, records, (time, sample), &mut work);
+            self.work.push(work);
         }
-        self.advance(prepared, records, (time, sample), &mut work);
-        self.work.push(work);
         self.times.push(time);
     }
 
@@ -82,12 +92,13 @@ impl History {
         (time, sample): (f64, &Sample),
         work: &mut Vec<f64>,
     ) {
-        let axes = prepared.system.place_axes();
-        self.acceleration.resize(axes.len(), Vec::new());
-        let ground = records.map(|records| records.ground_acceleration(time));
-        for (acceleration, axis) in self.acceleration.iter_mut().zip(axes) {
-            let of_ground = ground.as_ref().map_or(0.0, |ground| axis.component(ground));
-            acceleration.push(axis.component(&sample.acceleration) + of_ground);
+        if self.wants(SHOCK_SPECTRUM) {
+            let mut acceleration = sample.acceleration.clone();
+            if let Some(records) = records {
+                let ground = records.ground_acceleration(time);
+                acceleration.iter_mut().zip(ground).for_each(|(own, ground)| *own += ground);
+            }
+            push_components(&mut self.acceleration, prepared, &acceleration);
         }
         let joints = prepared.system.joints().iter().zip(&sample.joints);
         let now: Vec<[f64; 2]> = joints
@@ -100,16 +111,10 @@ impl History {
         self.before = now;
     }
 
-    /// Writes the tables of [`ALL`] that `wanted` names. `begin` writes the first cells of a row.
-    pub fn write(
-        &self,
-        prepared: &PreparedCase,
-        wanted: &[String],
-        begin: &dyn Fn(&mut TableBuilder),
-        tables: &mut [TableBuilder],
-    ) {
+    /// Writes the wanted tables of [`ALL`]. `begin` writes the first cells of a row.
+    pub fn write(&self, prepared: &PreparedCase, begin: &dyn Fn(&mut TableBuilder), tables: &mut [TableBuilder]) {
         for (table, name) in tables.iter_mut().zip(ALL) {
-            if !wanted.iter().any(|wanted| wanted == name) || self.times.len() < 2 {
+            if !self.wants(name) || self.times.len() < 2 {
                 continue;
             }
             match name {
@@ -169,6 +174,13 @@ impl History {
             table.end_row();
         }
     }
+}
+
+/// Adds the components of a motion of all degrees of freedom along every place.
+fn push_components(of_places: &mut Vec<Vec<f64>>, prepared: &PreparedCase, motion: &[f64]) {
+    let axes = prepared.system.place_axes();
+    of_places.resize(axes.len(), Vec::new());
+    of_places.iter_mut().zip(axes).for_each(|(values, axis)| values.push(axis.component(motion)));
 }
 
 /// Returns the largest absolute acceleration of an oscillator on a base with this acceleration.

@@ -160,8 +160,10 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
         numbers: table.numbers,
         words: 0.0,
     };
-    // places and accelerations of all samples, for the further tables
-    let kept = if wanted.is_empty() { 0.0 } else { 16.0 * samples * table.numbers };
+    // displacements and work of all samples, and accelerations of all instants
+    let instants =
+        if wanted.iter().any(|wanted| wanted == further_tables::SHOCK_SPECTRUM) { further_tables::INSTANTS } else { 0 };
+    let kept = if wanted.is_empty() { 0.0 } else { 8.0 * (2 + instants) as f64 * samples * table.numbers };
     PlannedSize {
         tables: vec![
             TableShape { numbers: table.numbers + inputs.frequency_columns(), ..table },
@@ -298,7 +300,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
         let (mut sampled, mut stopped) = (false, false);
         let mut extremes_of_places = vec![Extremes::default(); prepared.system.places().len()];
         let mut decays = vec![Decay::default(); prepared.system.places().len()];
-        let mut history = History::default();
+        let mut history = History::new(wanted);
         let is_free = excitation == Excitation::Free && records.is_none();
         let mut visitor = |instant: TimeSample<'_>| {
             let TimeSample { time, omega, state: sample, between: since } = instant;
@@ -341,7 +343,7 @@ fn compute(work: &UnitTask<'_>) -> Computed {
                 table.number("drive_frequency_Hz", hertz(drive.unwrap_or(0.0)));
             }
         };
-        history.write(prepared, wanted, &begin_row, &mut further);
+        history.write(prepared, &begin_row, &mut further);
         // a motion without a sample has no largest displacement
         let displacements = prepared.system.place_axes().iter().map(|along| !along.is_rotation());
         let places = prepared.system.places().iter().zip(&extremes_of_places).zip(displacements);
