@@ -281,8 +281,10 @@ impl ExponentialBasis {
         let mut time = 0.0;
         // Shortest step as a fraction of the interval: about the rounding of the time.
         let resolution = 4e-16 * end;
-        // Maximum number of steps of a search. A period of an orbit takes 10 to 100.
-        for _ in 0..100_000 {
+        // Maximum number of steps of a search, and the number from which on all steps may use
+        // higher derivatives. A period of an orbit takes 10 to 100.
+        for steps in 0..100_000 {
+            let is_slow = steps >= 1000;
             self.evaluate_and(time, values, |b, size| {
                 if self.exponents[b].re < 0.0 {
                     magnitudes[b] = size; // it decays from here on
@@ -304,6 +306,15 @@ impl ExponentialBasis {
                 let slope = real_dot(&first[range.clone()], values);
                 let bound = magnitude_bound(&second_weights[range.clone()], magnitudes);
                 let safe = first_root(g, slope, -bound);
+                if raised[k] > 0.0 || is_slow {
+                    let flat = self.flat_until(&first[range.clone()], (values, magnitudes), g, rising);
+                    if flat > safe {
+                        if flat < step {
+                            (step, nearest, converged) = (flat, k, false);
+                        }
+                        continue;
+                    }
+                }
                 if safe >= step {
                     continue;
                 }
@@ -378,6 +389,36 @@ impl ExponentialBasis {
             }
         }
         Some((0.0, 0.0)) // flat, such as the force of a contact that stays exactly at its limit
+    }
+
+    /// Returns a time over which a signal with the value `g > 0` stays positive, by its first four
+    /// derivatives and a bound on the fifth: each term may take a fifth of `g`. It is long if these
+    /// derivatives are small, where a bound on the second derivative would permit short steps only.
+    fn flat_until(
+        &self,
+        slope: &[Complex64],
+        (values, magnitudes): (&[Complex64], &[f64]),
+        g: f64,
+        memory: &mut [Vec<Complex64>; 2],
+    ) -> f64 {
+        let [current, next] = memory;
+        current.clear();
+        current.extend_from_slice(slope);
+        next.resize(slope.len(), Complex64::new(0.0, 0.0));
+        let (mut least, mut factorial) = (f64::INFINITY, 1.0);
+        for order in 1..=5 {
+            factorial *= f64::from(order);
+            let fall = match order {
+                5 => current.iter().zip(magnitudes).map(|(c, m)| magnitude(c) * m).sum::<f64>(),
+                _ => -real_dot(current, values),
+            };
+            if fall > 0.0 {
+                least = f64::min(least, (0.2 * g * factorial / fall).powf(1.0 / f64::from(order)));
+            }
+            self.differentiate(current, next);
+            std::mem::swap(current, next);
+        }
+        least
     }
 
     /// Returns true if a signal has no resonant and no drifting terms.

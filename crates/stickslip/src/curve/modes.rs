@@ -413,7 +413,7 @@ mod tests {
         let spring =
             |one: &str, other: &str, stiffness, damping| Spring { between: between(one, other), stiffness, damping };
         let joint = |one: &str, other: &str, stiffness, limit| Joint {
-            name: format!("{one}-{other}"),
+            name: format!("{one}_{other}"),
             between: between(one, other),
             law: std::sync::Arc::new(Jenkins { stiffness, limit }),
         };

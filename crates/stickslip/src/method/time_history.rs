@@ -241,7 +241,8 @@ impl TimeHistory {
         state.resize(flow.states(), 0.0);
         let mut begin = 0.0;
         let mut next = 0usize; // index of the next sample
-        let mut before: Option<TimeInterval> = None;
+        // the interval of the previous sample, and all later ones
+        let mut intervals: Vec<TimeInterval> = Vec::new();
         let samples = (self.duration / self.step * (1.0 + f64::EPSILON)).floor() as usize;
         while next <= samples {
             if begin > 0.0 {
@@ -263,23 +264,23 @@ impl TimeHistory {
                     .and_then(|last| self.recompute_before_breakdown(&interval, &start, (begin, next, last), cause)),
             };
             if let Some(stretch) = stretch {
-                while stretch.last.is_some_and(|last| next <= last) {
+                let last = stretch.last;
+                intervals.push(stretch);
+                let since = |time: f64| {
+                    let later = intervals.partition_point(|interval| interval.begin <= time);
+                    intervals[later.saturating_sub(1)].at(time)
+                };
+                while last.is_some_and(|last| next <= last) {
                     let time = next as f64 * self.step;
-                    let since = |time: f64| match &before {
-                        Some(before) if time < stretch.begin => before.at(time),
-                        _ => stretch.at(time),
-                    };
-                    if !visitor(TimeSample {
-                        time,
-                        omega: interval.reported,
-                        state: &stretch.at(time),
-                        between: &since,
-                    }) {
+                    let state = &since(time);
+                    if !visitor(TimeSample { time, omega: interval.reported, state, between: &since }) {
                         return Ok(());
                     }
                     next += 1;
                 }
-                before = Some(stretch);
+                if last.is_some() {
+                    intervals.drain(..intervals.len() - 1);
+                }
             }
             followed.map_err(|cause| TimeHistoryError::Breakdown {
                 last: next.checked_sub(1).map(|last| last as f64 * self.step),

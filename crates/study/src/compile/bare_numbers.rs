@@ -48,7 +48,7 @@ pub(crate) fn literal_unit(quantity: &CompiledQuantity) -> Option<(&str, f64, Di
 }
 
 /// Returns the value of a literal without a unit, unless it is zero.
-pub(crate) fn bare_number(quantity: &CompiledQuantity) -> Option<f64> {
+fn bare_number(quantity: &CompiledQuantity) -> Option<f64> {
     if !quantity.expression.is_literal() {
         return None;
     }

@@ -4,7 +4,6 @@
 //! A force becomes a moment, and a length becomes an angle. A dimension `kg^a m^b s^c rad^d` is a
 //! product of `a` forces and `b - a` lengths, so it becomes `kg^a m^2a s^c rad^(d + b - a)`.
 
-use super::bare_numbers::bare_number;
 use super::compiled::{CompiledQuantity, CompiledTable, CompiledValue, LawCoordinate};
 use super::source_model::{ModelLists, SourceModel};
 use crate::syntax::error::Problem;
@@ -62,20 +61,26 @@ fn turn(table: &mut CompiledTable) {
 }
 
 /// Returns the problem of a speed without a unit, which would count in Hz as a frequency does.
-fn bare_speed(table: &CompiledTable) -> Option<Problem> {
+fn bare_speed(table: &CompiledTable, parameters: &[ExpressionValue]) -> Option<Problem> {
+    let is_bare = |quantity: &CompiledQuantity| {
+        let value = quantity.expression.evaluate(parameters);
+        value.is_ok_and(|value| value.dimension.is_none() && value.si != 0.0)
+    };
     table.entries.iter().find_map(|entry| {
         let quantities: Vec<&CompiledQuantity> = match &entry.value {
             CompiledValue::Quantity { quantity, dimension: Dimension::VELOCITY, .. } => vec![quantity],
             CompiledValue::ByName(list, Dimension::VELOCITY) => list.iter().map(|(.., quantity)| quantity).collect(),
-            CompiledValue::Law(_, table, _) | CompiledValue::Table(table) => return bare_speed(table),
-            CompiledValue::Tables(tables) => return tables.iter().find_map(bare_speed),
+            CompiledValue::Law(_, table, _) | CompiledValue::Table(table) => return bare_speed(table, parameters),
+            CompiledValue::Tables(tables) => {
+                return tables.iter().find_map(|table| bare_speed(table, parameters));
+            }
             _ => return None,
         };
-        quantities.into_iter().find(|quantity| bare_number(quantity).is_some()).map(|quantity| {
+        quantities.into_iter().find(|quantity| is_bare(quantity)).map(|quantity| {
             let number = excerpt(quantity.text.trim());
             quantity
                 .problem(entry.key, format!("the speed of rotation {number} has no unit"))
-                .help(format!("write \"{number} rad/s\" or \"{number} rpm\""))
+                .help("state it in rad/s or rpm, such as \"100 rad/s\"")
         })
     })
 }
@@ -137,7 +142,7 @@ pub(crate) fn use_moments_of_inertia(
     }
     let ModelLists { mass, spring, joint, force, motion, is_torsional, .. } = &mut structure.lists;
     let entries = || mass.iter().chain(&*spring).chain(&*joint).chain(&*force).chain(&*motion);
-    if let Some(problem) = entries().find_map(bare_speed).or_else(|| bare_speed(study)) {
+    if let Some(problem) = entries().chain([&*study]).find_map(|table| bare_speed(table, parameters)) {
         return Err(problem);
     }
     mass.iter_mut().chain(spring).chain(joint).chain(force).chain(motion).for_each(turn);

@@ -279,8 +279,8 @@ fn further_tables_of_a_motion() {
 #[test]
 fn shock_spectra_include_the_motion_of_the_ground() {
     let study = format!(
-        "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"1e8 N/m\"\n\
-         damping = \"1e4 N s/m\"\n[[motion]]\non = \"ground\"\ndata = \"record\"\n{TRANSIENT}also = [\"shock_spectrum\"]\n"
+        "[[mass]]\nname = \"m\"\nmass = \"2 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \"1e6 N/m\"\n\
+         damping = \"1e3 N s/m\"\n[[motion]]\non = \"ground\"\ndata = \"record\"\n{TRANSIENT}also = [\"shock_spectrum\"]\n"
     );
     let study = study.replace("2 s\"", "4 s\"");
     let dataset = try_run("time_s,acceleration_m_per_s2\n0,2\n5,2\n", &study).unwrap_or_else(|error| panic!("{error}"));
@@ -288,14 +288,30 @@ fn shock_spectra_include_the_motion_of_the_ground() {
     let numbers = |column: &str| table.numbers(column).unwrap_or_else(|| panic!("no column {column}")).to_vec();
     for (hertz, largest) in numbers("frequency_Hz").iter().zip(numbers("m_largest_acceleration_m_per_s2")) {
         if (0.5..5.0).contains(hertz) {
-            assert!((largest / 3.7089 - 1.0).abs() < 2e-3, "{hertz} Hz: {largest}");
+            assert!((largest / 3.7089 - 1.0).abs() < 5e-3, "{hertz} Hz: {largest}");
         }
     }
 }
 
+/// A half-sine of 11 ms under a soft structure, whose small acceleration is a difference of large
+/// ones. Many rows of the signal lie between two samples. Expected: DOP853 of SciPy.
+#[test]
+fn shock_spectra_see_pulses_between_samples() {
+    let study = "schema = 1\n[[mass]]\nname = \"m\"\nmass = \"1 kg\"\n[[spring]]\nbetween = [\"m\", \"ground\"]\nstiffness = \
+                 \"1000 N/m\"\ndamping = \"2 N s/m\"\n[[motion]]\non = \"ground\"\nsignal = { kind = \"half-sine\", amplitude = \
+                 \"100 m/s^2\", duration = \"11 ms\" }\n[study]\nkind = \"transient\"\nduration = \"1 s\"\ntime_step = \"1 ms\"\n\
+                 also = [\"shock_spectrum\"]\n";
+    let dataset = run(&read_study("study.toml", study, &[]).unwrap(), &Context::without_progress(1)).unwrap();
+    let table = dataset.tables.iter().find(|one| one.name == "shock_spectrum").unwrap();
+    let frequency = table.numbers("frequency_Hz").unwrap();
+    let row = frequency.iter().position(|hertz| (hertz - 67.7379).abs() < 1e-4).expect("the frequency");
+    let largest = table.numbers("m_largest_acceleration_m_per_s2").unwrap()[row];
+    assert!((largest / 21.20603 - 1.0).abs() < 1e-3, "{largest}");
+}
+
 /// A mass on a spring with dry friction turns at 0.1, -0.08, 0.06, -0.04 and 0.02 m, and friction
-/// takes 0.4 N times the way of 0.48 m, also with ten samples a period. Three samples a period are
-/// too few to follow the motion.
+/// takes 0.4 N times the way, also with ten samples a period. Three samples a period are too few to
+/// follow the motion.
 #[test]
 fn tables_of_few_samples() {
     let study = |step: &str| {
@@ -310,8 +326,13 @@ fn tables_of_few_samples() {
     let dataset =
         run(&read_study("study.toml", &study("100 ms"), &[]).unwrap(), &Context::without_progress(1)).unwrap();
     let table = dataset.tables.iter().find(|one| one.name == "joint_work").unwrap();
-    let work = table.numbers("j_work_J").unwrap();
-    assert!((work[work.len() - 1] / (0.4 * 0.48) - 1.0).abs() < 5e-3, "{work:?}");
+    let (time, work) = (table.numbers("time_s").unwrap(), table.numbers("j_work_J").unwrap());
+    let (last, rate) = (time.len() - 1, f64::sqrt(40.0));
+    assert!((time[last] - 1.9).abs() < 1e-9, "{time:?}");
+    // in the fourth half of a period, about the place -0.01 m
+    let x = -0.01 - 0.03 * (rate * time[last] - 3.0 * std::f64::consts::PI).cos();
+    let way = 0.18 + 0.14 + 0.1 + (x + 0.04);
+    assert!((work[last] / (0.4 * way) - 1.0).abs() < 2e-3, "{work:?} {way}");
     let noted = |dataset: &Dataset| dataset.notes.iter().any(|note| note.contains("too far apart to follow"));
     assert!(!noted(&dataset), "{:?}", dataset.notes);
     let coarse = run(&read_study("study.toml", &study("300 ms"), &[]).unwrap(), &Context::without_progress(1)).unwrap();

@@ -347,8 +347,9 @@ cycles = 20
     for (row, mass) in ["a", "b"].iter().enumerate() {
         let column = motion.numbers(&format!("{mass}_displacement_m")).unwrap();
         let largest = column.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-        assert_eq!(summary.numbers("largest_displacement_m").unwrap()[row], largest);
-        assert!(largest > 0.0);
+        // a turning point between two of 64 samples a period
+        let ratio = summary.numbers("largest_displacement_m").unwrap()[row] / largest;
+        assert!((1.0..1.01).contains(&ratio), "{ratio}");
     }
     // with the width that its message advises, it runs to the end
     let (_, smoothed) = of(&format!("{text}\n[method]\nkind = \"shooting\"\nwidth = \"0.1 mm/s\"\n"));

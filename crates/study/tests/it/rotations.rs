@@ -115,11 +115,7 @@ fn mixed_units_are_refused() {
             "but a [[body]] has displacements",
         ),
         ("J = \"0.05 kg m^2\"", "J = \"0.05 kg\"", "moment of inertia in kg m^2"),
-        (
-            "{ kind = \"jenkins\"",
-            "{ kind = \"coulomb-tanh\", velocity = 0.1, limit = \"3 N m\" } # ",
-            "0.1 has no unit",
-        ),
+        ("kind = \"coulomb\"", "kind = \"coulomb-tanh\", velocity = 0.1", "rotation 0.1 has no unit"),
     ] {
         let said = refused(from, to);
         assert!(said.contains(words), "{to}: {said}");
