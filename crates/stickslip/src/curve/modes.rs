@@ -403,9 +403,9 @@ mod tests {
         assert!(apart > 0, "no mode changes its number");
     }
 
-    /// Three times the frequency of the first mode meets the third mode while the joints slip. Below,
-    /// the curve from large amplitudes is a vibration of the third mode. At small amplitudes all
-    /// joints stick (NumPy, eigenvalues): 16.304452955 Hz, damping ratio 0.00270917.
+    /// Three times the frequency of the first mode meets the third mode while the joints slip.
+    /// Below, the curve from large amplitudes is a vibration of the third mode. At small amplitudes
+    /// all joints stick (NumPy, eigenvalues): 16.304452955 Hz, damping ratio 0.00270917.
     #[test]
     fn a_mode_ends_where_it_becomes_another_one() {
         let places = ["m1", "m2", "m3", "m4"];

@@ -33,7 +33,7 @@ const SHOCK_DAMPING: f64 = 0.05;
 /// Their frequencies per octave.
 const PER_OCTAVE: f64 = 12.0;
 
-/// The samples of a motion, as far as its tables need them.
+/// The samples of a motion, with all that the wanted tables need.
 #[derive(Debug, Default)]
 pub(super) struct History {
     /// The names of the tables.

@@ -60,8 +60,8 @@ pub(super) struct Records {
     channels: Vec<Channel>,
     /// Times of all rows, rising.
     knots: Vec<f64>,
-    /// Channels with the acceleration of the ground, and the displacements of all degrees of freedom
-    /// if the ground moves by 1 m.
+    /// Channels with the acceleration of the ground, and the displacements of all degrees of
+    /// freedom if the ground moves by 1 m.
     ground: Vec<(usize, Vec<f64>)>,
 }
 

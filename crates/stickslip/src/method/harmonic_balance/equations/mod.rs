@@ -579,8 +579,8 @@ impl Discretization {
         self.aft.sample(port, omega, self.linear.penalty[p], &motion.c[range.clone()], &motion.force[range]);
     }
 
-    /// Returns displacement and internal states of a port at the beginning of the period. The states
-    /// are empty if they are not periodic.
+    /// Returns displacement and internal states of a port at the beginning of the period. The
+    /// states are empty if they are not periodic.
     pub fn initial_state_of(&mut self, ports: &Ports, p: usize, omega: f64, motion: &HarmonicSolution) -> StaticState {
         self.sample(ports, p, omega, motion);
         let nh = self.harmonics().len();
