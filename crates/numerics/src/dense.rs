@@ -35,29 +35,6 @@ pub fn solve(matrix: &mut [f64], n: usize, right: &mut [f64]) -> bool {
     solve_with_determinant_sign(matrix, n, right).is_some()
 }
 
-/// Adds `A B` to `out`; all are row-major. `inner` is the number of columns of A and of rows of B.
-/// Rows of `out` begin `stride` entries apart.
-///
-/// # Panics
-/// If `out` has no place for the product.
-///
-/// # Example
-/// ```
-/// let mut out = [1.0; 6];
-/// stickslip_numerics::dense::add_product(&[1.0, 2.0, 3.0, 4.0], &[1.0, 10.0], 2, &mut out, 3);
-/// assert_eq!(out, [22.0, 1.0, 1.0, 44.0, 1.0, 1.0]);
-/// ```
-pub fn add_product(a: &[f64], b: &[f64], inner: usize, out: &mut [f64], stride: usize) {
-    if a.is_empty() || b.is_empty() {
-        return;
-    }
-    let (rows, columns) = (a.len() / inner, b.len() / inner);
-    // the transposed product by columns, because faer 0.24 exchanges the strides of rows
-    let out = MatMut::from_column_major_slice_with_stride_mut(out, columns, rows, stride);
-    let (a, b) = (MatRef::from_column_major_slice(a, inner, rows), MatRef::from_column_major_slice(b, columns, inner));
-    matmul(out, Accum::Add, b, a, 1.0, Par::Seq);
-}
-
 /// Solves `A x = b` like [`solve`]. Returns the sign ±1 of the determinant of
 /// A, or `None` if [`solve`] returns false.
 pub fn solve_with_determinant_sign(matrix: &mut [f64], n: usize, right: &mut [f64]) -> Option<f64> {

@@ -1,5 +1,6 @@
 //! Axes: range, position of a value, ticks and title.
 
+use libm::exp10;
 use stickslip_study::dataset::{Axis, Scale};
 
 /// Range of an axis: finite and not empty. Both ends are positive on a logarithmic axis.
@@ -119,7 +120,7 @@ impl AxisRange {
 /// Returns the logarithm to base 10 of a positive number, with the same bits on every machine. The
 /// logarithms of system libraries differ in the last bit.
 pub(crate) fn log10(value: f64) -> f64 {
-    if value <= 0.0 {
+    if value.is_nan() || value <= 0.0 {
         return f64::NEG_INFINITY;
     }
     let log = libm::log10(value);
@@ -127,11 +128,6 @@ pub(crate) fn log10(value: f64) -> f64 {
     let whole = log.round();
     let is_power = (log - whole).abs() < 1e-14 * whole.abs() && power_of_ten(whole as i32) == value;
     if is_power { whole } else { log }
-}
-
-/// Returns ten to a power, with the same bits on every machine: the inverse of [`log10`].
-fn exp10(power: f64) -> f64 {
-    libm::exp10(power)
 }
 
 /// Returns a correctly rounded power of ten, which may underflow to zero or overflow to

@@ -279,9 +279,7 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
             other mode is the wave in the opposite direction. Standing waves slip differently.";
         remarks.push(text.to_owned());
     }
-    if let Some(point) =
-        mode.points.iter().filter(|point| point.damping > 1.0).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
-    {
+    if let Some(point) = mode.points.iter().rfind(|point| point.damping > 1.0) {
         remarks.push(format!(
             "{WARNING}from {} downwards the damping ratio exceeds 1, and no decay or resonance shows such a mode; if a \
              rigid joint slides there, give it a stiffness (law `jenkins`), or choose larger amplitudes",

@@ -90,7 +90,7 @@ mod tests {
             let found = extremes(per_period);
             let error = (std::f64::consts::TAU / per_period).powi(4) / 384.0;
             assert!((found.largest - 1.1).abs() <= error, "{found:?}");
-            assert!((found.time / std::f64::consts::TAU).fract() - 0.25 < 0.01, "{found:?}");
+            assert!(((found.time / std::f64::consts::TAU).fract() - 0.25).abs() < 0.01, "{found:?}");
             assert!((found.unresolved / (16.0 * error) - 1.0).abs() < 0.2, "{found:?} {error}");
             assert!((found.rms() - f64::sqrt(0.51)).abs() < 1e-3);
         }

@@ -68,7 +68,7 @@ impl History {
         since: &dyn Fn(f64) -> Sample,
     ) {
         if self.wants(SPECTRUM) {
-            push_components(&mut self.displacement, prepared, &sample.displacement);
+            push_places(&mut self.displacement, prepared, &sample.displacement);
         }
         if self.wants(JOINT_WORK) || self.wants(SHOCK_SPECTRUM) {
             let mut work = self.work.last().cloned().unwrap_or_default();
@@ -98,7 +98,7 @@ impl History {
                 let ground = records.ground_acceleration(time);
                 acceleration.iter_mut().zip(ground).for_each(|(own, ground)| *own += ground);
             }
-            push_components(&mut self.acceleration, prepared, &acceleration);
+            push_places(&mut self.acceleration, prepared, &acceleration);
         }
         let joints = prepared.system.joints().iter().zip(&sample.joints);
         let now: Vec<[f64; 2]> = joints
@@ -176,11 +176,11 @@ impl History {
     }
 }
 
-/// Adds the components of a motion of all degrees of freedom along every place.
-fn push_components(of_places: &mut Vec<Vec<f64>>, prepared: &PreparedCase, motion: &[f64]) {
-    let axes = prepared.system.place_axes();
-    of_places.resize(axes.len(), Vec::new());
-    of_places.iter_mut().zip(axes).for_each(|(values, axis)| values.push(axis.component(motion)));
+/// Adds a motion of all degrees of freedom to the values of every place.
+fn push_places(of_places: &mut Vec<Vec<f64>>, prepared: &PreparedCase, motion: &[f64]) {
+    let now = prepared.system.at_places(motion);
+    of_places.resize(now.len(), Vec::new());
+    of_places.iter_mut().zip(now).for_each(|(values, value)| values.push(value));
 }
 
 /// Returns the largest absolute acceleration of an oscillator on a base with this acceleration.

@@ -155,14 +155,14 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let cycles = if free { points * periods.floor() } else { 0.0 };
     let summaries = if free { points } else { 0.0 };
     let wanted = inputs.case.values.names("also").unwrap_or_default();
+    let wants = |name: &str| wanted.iter().any(|wanted| wanted == name);
     let further = |name: &str, rows: f64| TableShape {
-        rows: if wanted.iter().any(|wanted| wanted == name) { points * rows } else { 0.0 },
+        rows: if wants(name) { points * rows } else { 0.0 },
         numbers: table.numbers,
         words: 0.0,
     };
     // displacements and work of all samples, and accelerations of all instants
-    let instants =
-        if wanted.iter().any(|wanted| wanted == further_tables::SHOCK_SPECTRUM) { further_tables::INSTANTS } else { 0 };
+    let instants = if wants(further_tables::SHOCK_SPECTRUM) { further_tables::INSTANTS } else { 0 };
     let kept = if wanted.is_empty() { 0.0 } else { 8.0 * (2 + instants) as f64 * samples * table.numbers };
     PlannedSize {
         tables: vec![

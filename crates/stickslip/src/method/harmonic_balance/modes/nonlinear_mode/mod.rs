@@ -32,6 +32,7 @@ use crate::method::harmonic_balance::static_equilibrium::static_equilibrium_of;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
+use stickslip_numerics::dense::{ProductShape, Transpose};
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::{dense, interrupt};
 
@@ -416,11 +417,13 @@ impl<'a> ModeEquations<'a> {
             let by_frequency = self.aft.by_frequency.as_ref().filter(|_| jacobian.is_some());
             tangents.push((tangent, by_frequency.cloned()));
         }
-        let Some(jacobian) = jacobian else { return };
+        let Some(jacobian) = jacobian.filter(|_| !self.motion_ports.is_empty()) else { return };
         // all axes at once: in reduced structures every axis moves all places
         let axes: Vec<&DVector<f64>> = self.motion_ports.iter().flat_map(|placed| &placed.directions).collect();
         let places_by_axes: Vec<f64> = (0..n).flat_map(|i| axes.iter().map(move |w| w[i])).collect();
-        let mut slopes = vec![0.0; axes.len() * (size - 1)];
+        let (mut slopes, mut by_places) = (vec![0.0; axes.len() * (size - 1)], vec![0.0; n * (size - 1)]);
+        // by columns, as the product reads its matrices: the slopes of an axis, the axes of a place
+        let shape = ProductShape { rows: size - 1, inner: axes.len(), columns: n };
         for (k, part) in (0..nh).flat_map(|k| [(k, 0), (k, 1)]) {
             let mut of_axes = slopes.chunks_exact_mut(size - 1);
             for (placed, (tangent, by_frequency)) in self.motion_ports.iter().zip(&tangents) {
@@ -431,8 +434,11 @@ impl<'a> ModeEquations<'a> {
                     slopes[size - 2] = [by_frequency.re, by_frequency.im][part];
                 }
             }
-            let rows = &mut jacobian[(2 * k * n + part) * size..];
-            dense::add_product(&places_by_axes, &slopes, axes.len(), rows, 2 * size);
+            dense::multiply_blocked(&slopes, &places_by_axes, &mut by_places, shape, Transpose::No);
+            for (i, slopes) in by_places.chunks_exact(size - 1).enumerate() {
+                let row = &mut jacobian[(2 * (k * n + i) + part) * size..];
+                row.iter_mut().zip(slopes).for_each(|(entry, slope)| *entry += slope);
+            }
         }
     }
 
