@@ -7,8 +7,9 @@ use super::{
     Alternatives, Budget, Method, MethodError, MethodInfo, Options, OrbitError, Request, Solver, WIDTH, event_driven,
     transient,
 };
-use crate::model::System;
+use crate::model::{FrictionDirection, System};
 use crate::orbit::Orbit;
+use std::sync::OnceLock;
 
 /// Makes the solver of a method for one system, with errors that name alternative methods.
 ///
@@ -34,7 +35,7 @@ pub fn solver_with_alternatives<'a>(
     system: &'a System,
 ) -> Result<Box<dyn Solver + Send + 'a>, MethodError> {
     let solver = method.solver(system).map_err(|error| error.with_alternatives(alternatives(system)))?;
-    Ok(Box::new(WithAlternatives { solver, system }))
+    Ok(Box::new(WithAlternatives { solver, system, creeping: OnceLock::new() }))
 }
 
 /// Returns the methods of the list that take a system.
@@ -75,12 +76,41 @@ fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Alternat
 struct WithAlternatives<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     system: &'a System,
+    /// Directions in which friction alone holds a body, computed at the first failure.
+    creeping: OnceLock<Vec<FrictionDirection>>,
 }
 
 impl Solver for WithAlternatives<'_> {
     fn solve(&mut self, request: &Request<'_>, budget: &mut Budget) -> Result<Orbit, OrbitError> {
-        self.solver.solve(request, budget).map_err(|error| with_alternatives(error, self.system))
+        self.solver.solve(request, budget).map_err(|error| {
+            let mut error = with_alternatives(error, self.system);
+            if let OrbitError::NotConverged { advice, omega, .. } | OrbitError::Drift { advice, omega, .. } = &mut error
+            {
+                let creeping = self.creeping.get_or_init(|| self.system.directions_held_by_friction());
+                advice.push_str(&creeping_advice(creeping, *omega));
+            }
+            error
+        })
     }
+}
+
+/// Returns advice about bodies that friction alone holds along some directions, as text that
+/// follows other text; empty if there are none.
+fn creeping_advice(directions: &[FrictionDirection], omega: f64) -> String {
+    // Number of directions that are named.
+    let max_named = 3;
+    let Some(first) = directions.first() else { return String::new() };
+    let names: Vec<String> = directions.iter().take(max_named).map(|one| format!("`{}`", one.place)).collect();
+    let more = directions.len().saturating_sub(max_named);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!(
+        "; friction alone holds {}{more}, where a body may creep without end: hold it as the real part is held, or by a \
+         soft spring ({:.1e} {} on `{}` is soft against its inertia)",
+        names.join(", "),
+        first.spring(omega),
+        if first.is_rotation { "N m/rad" } else { "N/m" },
+        first.place,
+    )
 }
 
 /// Adds alternative methods to an error.
@@ -103,7 +133,9 @@ fn with_alternatives(mut error: OrbitError, system: &System) -> OrbitError {
         }
         OrbitError::Unsettled { method, advice, repeats: None, .. } => *advice = words(&|name| name != *method),
         OrbitError::Drift { method, advice, .. } if *method != event_driven::INFO.name => {
-            *advice = words(&|name| name == event_driven::INFO.name);
+            let exact = words(&|name| name == event_driven::INFO.name);
+            *advice =
+                if exact.is_empty() { exact } else { format!("{exact}, which may find a motion that friction holds") };
         }
         _ => {}
     }

@@ -29,7 +29,9 @@ pub use displacement_field::DisplacementField;
 pub use error::{Element, ElementFault, ModelError};
 pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};
-pub use survey::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, Survey, UnloadedContacts, WaveModes};
+pub use survey::{
+    FirstSlip, FrictionDirection, LinearModes, LooseBody, NaturalMode, SlipOnset, Survey, UnloadedContacts, WaveModes,
+};
 pub use system::{
     Axis, CyclicSymmetry, ExcitationHarmonic, ExcitationSum, MovedPlace, System, SystemBuilder, SystemError,
     SystemJoint,

@@ -288,9 +288,8 @@ pub enum OrbitError {
     /// No stiffness, or friction alone, carries the mean of the forces.
     #[error(
         "{method} found no periodic motion at {}, because a body drifts: friction or contacts alone hold part of the \
-         structure, and the mean force exceeds what they carry; increase the normal loads, or add a spring{}",
-        hertz(*omega),
-        if .advice.is_empty() { String::new() } else { format!("{advice}, which may find a motion that friction holds") }
+         structure, and the mean force exceeds what they carry; increase the normal loads, or add a spring{advice}",
+        hertz(*omega)
     )]
     Drift {
         /// Name of the method.

@@ -11,6 +11,7 @@
 
 use super::sector_boundary::RingEntry;
 use super::{Structure, StructureError, is_full, to_full};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -24,14 +25,31 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// of sums in another order. It is relative to the largest entry.
 const SECTOR_ROUNDING: f64 = 1e-12;
 
+/// Row, column, offset of the column in sectors, values of mass, damping, stiffness.
+type SectorEntry = (usize, usize, usize, [f64; 3]);
+
+/// Returns the entries sorted, with those of the same row, column and offset summed.
+fn summed(mut entries: Vec<SectorEntry>) -> Vec<SectorEntry> {
+    // stable, so that sums keep their order
+    entries.sort_by_key(|entry| (entry.0, entry.1, entry.2));
+    entries.dedup_by(|next, kept| {
+        let same = (next.0, next.1, next.2) == (kept.0, kept.1, kept.2);
+        if same {
+            (0..3).for_each(|k| kept.3[k] += next.3[k]);
+        }
+        same
+    });
+    entries.shrink_to_fit();
+    entries
+}
+
 /// The rows of the first sector in the matrices of a ring.
 #[derive(Debug)]
 pub struct RingSector {
     sectors: usize,
     places: Vec<String>,
-    /// Row, column, offset of the column in sectors, values of mass, damping, stiffness. They are
-    /// sorted.
-    entries: Vec<(usize, usize, usize, [f64; 3])>,
+    /// They are sorted.
+    entries: Vec<SectorEntry>,
     /// Waves that were requested before, by nodal diameter.
     waves: Mutex<BTreeMap<usize, Wave>>,
 }
@@ -216,17 +234,37 @@ impl RingSector {
                 (row, column, shift.rem_euclid(sectors as i64) as usize, values)
             }));
         }
-        // stable, so that sums keep their order
-        entries.sort_by_key(|entry: &(usize, usize, usize, [f64; 3])| (entry.0, entry.1, entry.2));
-        entries.dedup_by(|next, kept| {
-            let same = (next.0, next.1, next.2) == (kept.0, kept.1, kept.2);
-            if same {
-                (0..3).for_each(|k| kept.3[k] += next.3[k]);
+        RingSector { sectors, places, entries: summed(entries), waves: Mutex::default() }
+    }
+
+    /// Returns this sector with additional springs, which every sector has. Each has a direction,
+    /// as rows of the ring with weights, and a stiffness, N/m. Returns `None` if an entry is then
+    /// not finite.
+    pub(crate) fn with_springs<'a>(
+        &self,
+        springs: impl IntoIterator<Item = (&'a Vec<(usize, f64)>, f64)>,
+    ) -> Option<RingSector> {
+        let (n, sectors) = (self.dofs(), self.sectors);
+        // the stiffness by the offset of the column in sectors: an axis of a reduced structure has
+        // many rows
+        let mut added: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
+        for (rows, k) in springs {
+            for &(i, w) in rows {
+                for &(l, v) in rows {
+                    let shift = (l / n + sectors - i / n) % sectors;
+                    added.entry(shift).or_insert_with(|| DMatrix::zeros(n, n))[(i % n, l % n)] += w * v * k;
+                }
             }
-            same
-        });
-        entries.shrink_to_fit();
-        RingSector { sectors, places, entries, waves: Mutex::default() }
+        }
+        let mut entries = self.entries.clone();
+        for (shift, matrix) in &added {
+            let all = (0..n).flat_map(|row| (0..n).map(move |column| (row, column)));
+            let own = all.map(|at| (at.0, at.1, *shift, [0.0, 0.0, matrix[at]]));
+            entries.extend(own.filter(|entry| entry.3[2] != 0.0));
+        }
+        let sector =
+            RingSector { entries: summed(entries), places: self.places.clone(), sectors, waves: Mutex::default() };
+        sector.largest()[2].is_finite().then_some(sector)
     }
 
     /// Returns the largest absolute entries of mass, damping and stiffness.
@@ -246,7 +284,7 @@ impl RingSector {
     pub(super) fn ring_entries(&self) -> impl Iterator<Item = (usize, usize, [f64; 3])> + '_ {
         let (n, sectors) = (self.dofs(), self.sectors);
         (0..sectors).flat_map(move |sector| {
-            let of = move |&(row, column, shift, values): &(usize, usize, usize, [f64; 3])| {
+            let of = move |&(row, column, shift, values): &SectorEntry| {
                 (sector * n + row, (sector + shift) % sectors * n + column, values)
             };
             self.entries.iter().map(of)

@@ -929,3 +929,28 @@ fn slip_limits_are_those_at_rest() {
     let inclined = block("[\"-sin(35 deg)\", 0, \"cos(35 deg)\"]", 0.25, "");
     assert!(inclined.joints.iter().all(|joint| joint.normal_force_at_rest.is_none()), "{inclined}");
 }
+
+/// Friction alone holds a pressed block along its plate. The suggested spring is a tenth of the
+/// inertia of 0.2 kg at 10 Hz, `0.1 · 0.2 · (2π · 10)²` = 78.96 N/m.
+#[test]
+fn directions_that_friction_alone_holds_are_named() {
+    let text = r#"schema = 1
+[[mass]]
+name = "block"
+value = "0.2 kg"
+directions = ["x", "z"]
+[[joint]]
+name = "foot"
+between = ["block", "ground"]
+law = { kind = "friction-contact", tangential = "1 N/um", normal = "2 N/um", friction = 0.3, preload = "5 N" }
+[[force]]
+on = "block.x"
+amplitude = "1 N"
+[study]
+kind = "response"
+frequency = { from = "5 Hz", to = "10 Hz", points = 3 }
+"#;
+    let shown = summary(text).to_string();
+    let line = shown.lines().find(|line| line.trim_start().starts_with("friction ")).unwrap();
+    assert!(line.contains("alone holds `block.x`:") && line.contains("(78.96 N/m on `block.x`"), "{line}");
+}

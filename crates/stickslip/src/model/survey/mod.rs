@@ -8,6 +8,7 @@
 //! two, because springs and constraints only raise the frequency of every mode (Courant,
 //! Fischer).
 
+mod friction_hold;
 mod linear_modes;
 mod preload;
 mod results;
@@ -16,6 +17,7 @@ mod slip_onset;
 mod stuck_joint;
 mod wave_modes;
 
+pub use friction_hold::FrictionDirection;
 pub use results::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, UnloadedContacts};
 pub use wave_modes::WaveModes;
 
@@ -113,7 +115,7 @@ impl Model {
 
     /// Returns the survey of [`Model::survey_under_load`] for the assembled model.
     pub fn survey_of(&self, system: &System, forces: &dyn Fn(&System) -> Option<Vec<[f64; MAX_DIRECTIONS]>>) -> Survey {
-        let forces = if system.dofs() > MAX_DOFS { None } else { forces(system) };
+        let forces = forces(system);
         // contact force and law of joints without preload that the constant loads press
         // together
         let pressed = |index: usize, joint: &SystemJoint| -> Option<(f64, SharedLaw)> {

@@ -30,7 +30,7 @@ use crate::syntax::error::StudyError;
 use serde_json::{Value as Json, json};
 use std::f64::consts::TAU;
 use stickslip::curve::bidirectional_sweep;
-use stickslip::model::{LinearModes, SlipOnset, System};
+use stickslip::model::{FrictionDirection, LinearModes, SlipOnset, System};
 
 /// Summary of a study before it is run.
 #[derive(Debug, Clone)]
@@ -48,6 +48,8 @@ pub struct ModelSummary {
     pub contacts: Vec<ContactSummary>,
     /// The rigid bodies in words; on a disk, those of the first sector.
     pub bodies: Vec<String>,
+    /// Directions in which friction alone holds a body; on a disk, those of the first sector.
+    pub held_by_friction: Vec<FrictionDirection>,
     /// True if the model has too many degrees of freedom for the modes, which are then absent.
     pub too_large: bool,
     /// Modes with all joints free.
@@ -189,6 +191,9 @@ impl ModelSummary {
         let joints = joints.collect();
         let kind = kinds::kind_of(study);
         let counts = SizeInputs::new(study, &cases[0]);
+        let mut held_by_friction = first.system().directions_held_by_friction();
+        let sectors = shown.case.model.ring.map_or(1, |ring| ring.sectors.max(1));
+        held_by_friction.truncate(held_by_friction.len().div_ceil(sectors));
         Ok(ModelSummary {
             case: shown.case.label(),
             cases: study.cases(),
@@ -196,6 +201,7 @@ impl ModelSummary {
             structure: StructureSummary::new(study, &cases[0]),
             contacts: study.structure.mesh.contacts.clone(),
             bodies: bodies::described(&cases[0].case.model),
+            held_by_friction,
             too_large: first.is_too_large(),
             free: first.free().clone(),
             stuck: first.stuck().clone(),
@@ -237,6 +243,7 @@ impl ModelSummary {
             "case": self.case,
             "degrees_of_freedom": self.dofs,
             "bodies": self.bodies,
+            "held_by_friction": self.held_by_friction.iter().map(|one| one.place.as_str()).collect::<Vec<_>>(),
             "structure": self.structure.as_ref().map(StructureSummary::to_json),
             "contacts": self.contacts.iter().map(ContactSummary::to_json).collect::<Vec<_>>(),
             "joints_free": modes(&self.free),

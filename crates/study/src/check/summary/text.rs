@@ -1,5 +1,6 @@
 //! The summary in words, for a terminal.
 
+use super::warnings::list_names;
 use super::{JointSummary, ModelSummary, OrbitCount, ROUNDING_SLIP_FACTOR, relative_load};
 use crate::syntax::format::{format_bytes, format_significant, format_with_prefix, plural_suffix};
 use std::collections::{BTreeMap, BTreeSet};
@@ -52,6 +53,22 @@ impl ModelSummary {
             );
         }
         text
+    }
+
+    /// Describes the directions in which friction alone holds a body, if there are any.
+    fn friction_text(&self) -> Option<String> {
+        let first = self.held_by_friction.first()?;
+        let names: Vec<String> = self.held_by_friction.iter().map(|one| one.place.clone()).collect();
+        let spring = self.range.map_or_else(String::new, |(_, highest)| {
+            let unit = if first.is_rotation { "N m/rad" } else { "N/m" };
+            let stiffness = format_with_prefix(first.spring(highest), unit);
+            format!(" ({stiffness} on `{}` is soft against its inertia)", first.place)
+        });
+        Some(format!(
+            "alone holds {}: a vibration may move a body along such a direction without end; if no orbit is found, hold \
+             the body as the real part is held, or by a soft spring{spring}",
+            list_names(&names)
+        ))
     }
 
     fn joint(&self, joint: &JointSummary) -> String {
@@ -188,6 +205,9 @@ impl fmt::Display for ModelSummary {
         }
         for (number, body) in self.bodies.iter().enumerate() {
             line(if number == 0 { "bodies" } else { "" }, body)?;
+        }
+        if let Some(text) = self.friction_text() {
+            line("friction", &text)?;
         }
         if self.dofs > 0 {
             line(if joints > 0 { "joints free" } else { "modes" }, &self.modes(&self.free))?;

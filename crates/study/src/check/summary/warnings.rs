@@ -50,7 +50,7 @@ fn ineffective_options(study: &Study, one: &SurveyedCase) -> Option<String> {
 }
 
 /// Lists names in a sentence: `a, b and 3 more`.
-fn list_names(names: &[String]) -> String {
+pub(super) fn list_names(names: &[String]) -> String {
     let shown: Vec<String> = names.iter().take(MAX_NAMED).map(|name| format!("`{name}`")).collect();
     match names.len().checked_sub(MAX_NAMED) {
         None | Some(0) => shown.join(", "),

@@ -205,16 +205,12 @@ impl LinearDynamics {
             let modes = closed_contacts::ClosedModes::new(&springs, uncoupled);
             return Some(ClosedContacts { springs, form: ClosedForm::Modes(modes) });
         }
-        let (sectors, size) = self.sectors();
-        // in a ring, each direction in every sector
-        let around: Vec<(Vec<(usize, f64)>, f64)> = (0..sectors)
-            .flat_map(|sector| self.directions.iter().zip(&springs).map(move |(rows, k)| (sector, rows, *k)))
-            .map(|(sector, rows, k)| (rows.iter().map(|&(i, w)| ((i + sector * size) % self.n, w)).collect(), k))
-            .collect();
-        let structure = self.structure.with_springs(&around)?;
         let form = match &self.form {
-            Form::Waves(waves) => Form::Waves(TravellingWaves::new(&structure, waves.cyclic, &self.directions)?),
-            _ => Form::Factored(FactoredDynamics::new(&structure, &self.directions)),
+            Form::Waves(waves) => Form::Waves(waves.with_springs(&springs)?),
+            _ => {
+                let all: Vec<_> = self.directions.iter().cloned().zip(springs.iter().copied()).collect();
+                Form::Factored(FactoredDynamics::new(&self.structure.with_springs(&all)?, &self.directions))
+            }
         };
         Some(ClosedContacts { springs, form: ClosedForm::Rows(Box::new(form)) })
     }

@@ -28,6 +28,13 @@ impl TravellingWaves {
         Some(TravellingWaves { cyclic, sector, directions: directions.clone(), factors: RefCell::default() })
     }
 
+    /// Returns the waves of the ring with springs along the axes of every sector, N/m. Returns
+    /// `None` if an entry is then not finite.
+    pub fn with_springs(&self, springs: &[f64]) -> Option<Self> {
+        let sector = Arc::new(self.sector.with_springs(self.directions.iter().zip(springs.iter().copied()))?);
+        Some(TravellingWaves { sector, directions: self.directions.clone(), factors: RefCell::default(), ..*self })
+    }
+
     /// Replaces complex forces on the first sector by its displacements in a wave, column by
     /// column.
     fn solve(
