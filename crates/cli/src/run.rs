@@ -7,11 +7,13 @@ use crate::{browser, messages};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Read, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stickslip::orbit::Accuracy;
+use stickslip_numerics::interrupt::{Interrupted, StopFlag};
 use stickslip_report::assemble::{Assembled, Parts, assemble};
 use stickslip_report::journal::{Journal, JournalError};
 use stickslip_report::output::json::write_dataset_json;
@@ -63,6 +65,18 @@ impl Request<'_> {
             }
         }
         if wrong { Err(Exit::WrongInput) } else { Ok(studies) }
+    }
+
+    /// Reads as [`Request::read`] does until `stop` is set: a reduction may take minutes.
+    fn read_until(&self, stop: &Arc<AtomicBool>) -> Result<Vec<CheckedStudy>, Exit> {
+        let stop = stop.clone();
+        let flag = StopFlag::with_callback(move || stop.load(Ordering::Relaxed));
+        catch_unwind(AssertUnwindSafe(|| flag.watch(|| self.read()))).unwrap_or_else(|reason| {
+            if !reason.is::<Interrupted>() {
+                resume_unwind(reason);
+            }
+            Err(Exit::Failed("interrupted while the study was read; nothing was computed".to_owned()))
+        })
     }
 }
 
@@ -255,7 +269,7 @@ fn once(
     options: &RunOptions<'_>,
     workers: Workers<'_>,
 ) -> Exit {
-    let studies = match request.read() {
+    let studies = match request.read_until(workers.stop) {
         Ok(studies) => studies,
         Err(exit) => return exit,
     };

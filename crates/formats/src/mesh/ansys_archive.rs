@@ -363,7 +363,7 @@ mod tests {
         assert_eq!((mesh.nodes()[13].number, mesh.nodes()[13].position), (14, [1.75, 0.0, 0.0]));
         let shapes: Vec<String> = mesh.elements().iter().map(|element| element.shape.to_string()).collect();
         assert_eq!(shapes, ["tetrahedra of 10 nodes", "tetrahedra of 4 nodes"]);
-        assert_eq!(mesh.notes(), ["1 elements lack some of their middle nodes and are read with their corners"]);
+        assert_eq!(mesh.notes(), ["elements that lack some of their middle nodes are read with their corners: 1"]);
     }
 
     #[test]

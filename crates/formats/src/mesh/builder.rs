@@ -201,7 +201,7 @@ impl MeshBuilder {
         if self.incomplete > 0 {
             let count = self.incomplete;
             self.notes
-                .push(format!("{count} elements lack some of their middle nodes and are read with their corners"));
+                .push(format!("elements that lack some of their middle nodes are read with their corners: {count}"));
         }
         let MeshBuilder { nodes, by_number, elements, notes, .. } = self;
         Ok(Mesh { nodes, by_number, elements, connectivity, sets, notes, ..Mesh::default() })

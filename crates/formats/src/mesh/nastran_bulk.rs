@@ -332,7 +332,7 @@ mod tests {
         assert_eq!(mesh.element_nodes(0), [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(
             mesh.notes().last().unwrap(),
-            "1 elements lack some of their middle nodes and are read with their corners"
+            "elements that lack some of their middle nodes are read with their corners: 1"
         );
     }
 

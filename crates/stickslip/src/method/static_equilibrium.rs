@@ -217,10 +217,12 @@ fn rigid_friction_spring(system: &System, joint: &SystemJoint) -> Option<SharedL
         (None, None) if law.prox().is_some() && law.rate().is_none() => law.force_scale(),
         (None, None) => 0.0,
     };
+    if !(limit > 0.0 && limit.is_finite()) {
+        return None;
+    }
     let stiffest = joint.axes().iter().map(|axis| stiffness_along(system, axis)).fold(0.0, f64::max);
     let stiffness = RIGID * stiffest;
     match joint.axes() {
-        _ if limit.is_nan() || limit <= 0.0 || limit.is_infinite() => None,
         [_] => Some(Arc::new(Jenkins { stiffness, limit })),
         [_, _] => Some(Arc::new(Jenkins2d { stiffness, limit })),
         _ => None,

@@ -95,7 +95,7 @@ impl Solver for WithAlternatives<'_> {
 }
 
 /// Returns advice about bodies that friction alone holds along some directions, as text that
-/// follows other text; empty if there are none.
+/// follows other text. Without such bodies it is empty.
 fn creeping_advice(directions: &[FrictionDirection], omega: f64) -> String {
     // Number of directions that are named.
     let max_named = 3;

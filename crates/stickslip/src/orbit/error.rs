@@ -191,9 +191,10 @@ impl IntegrationError {
 pub enum OrbitError {
     /// The iteration did not converge.
     #[error(
-        "{method} stopped at {} after {iterations} iterations, residual {residual:.1e}{}; use finer steps of the \
+        "{method} stopped at {} after {iterations} iteration{}, residual {residual:.1e}{}; use finer steps of the \
          frequency, or check that a periodic motion exists (an undamped resonance has none){advice}",
         hertz(*omega),
+        if *iterations == 1 { "" } else { "s" },
         if *work_limit_reached { ", at the work limit of a point" } else { "" }
     )]
     NotConverged {

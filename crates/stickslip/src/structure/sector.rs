@@ -247,19 +247,22 @@ impl RingSector {
         let (n, sectors) = (self.dofs(), self.sectors);
         // the stiffness by the offset of the column in sectors: an axis of a reduced structure has
         // many rows
-        let mut added: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
+        let mut added: Vec<DMatrix<f64>> = vec![DMatrix::zeros(0, 0); sectors];
         for (rows, k) in springs {
             for &(i, w) in rows {
                 for &(l, v) in rows {
-                    let shift = (l / n + sectors - i / n) % sectors;
-                    added.entry(shift).or_insert_with(|| DMatrix::zeros(n, n))[(i % n, l % n)] += w * v * k;
+                    let matrix = &mut added[(l / n + sectors - i / n) % sectors];
+                    if matrix.is_empty() {
+                        *matrix = DMatrix::zeros(n, n);
+                    }
+                    matrix[(i % n, l % n)] += w * v * k;
                 }
             }
         }
         let mut entries = self.entries.clone();
-        for (shift, matrix) in &added {
+        for (shift, matrix) in added.iter().enumerate().filter(|(_, matrix)| !matrix.is_empty()) {
             let all = (0..n).flat_map(|row| (0..n).map(move |column| (row, column)));
-            let own = all.map(|at| (at.0, at.1, *shift, [0.0, 0.0, matrix[at]]));
+            let own = all.map(|at| (at.0, at.1, shift, [0.0, 0.0, matrix[at]]));
             entries.extend(own.filter(|entry| entry.3[2] != 0.0));
         }
         let sector =
@@ -629,6 +632,32 @@ mod tests {
             );
             assert_eq!(sorted.len(), general.len());
         }
+    }
+
+    /// Springs of one sector, also to the next and to the previous one, are those of the whole
+    /// ring in every sector.
+    #[test]
+    fn every_sector_gets_the_springs_of_the_first() {
+        let (sectors, n) = (5, 2);
+        let whole = ring(sectors, 0.0);
+        let all = sectors * n;
+        let springs = [(vec![(0, 1.0), (n + 1, -0.5)], 3.0), (vec![(1, 1.0), (all - 2, -1.0)], 7.0)];
+        let turned = |sector: usize| {
+            let turn = move |rows: &Vec<(usize, f64)>| rows.iter().map(|&(i, w)| ((i + sector * n) % all, w)).collect();
+            springs.iter().map(move |(rows, k)| (turn(rows), *k)).collect::<Vec<_>>()
+        };
+        let around: Vec<_> = (0..sectors).flat_map(turned).collect();
+        let expected = RingSector::from_ring(&whole.with_springs(&around).unwrap(), sectors).unwrap();
+        let sector = RingSector::from_ring(&whole, sectors).unwrap();
+        let found = sector.with_springs(springs.iter().map(|(rows, k)| (rows, *k))).unwrap();
+        let entries = |sector: &RingSector| -> Vec<(usize, usize, [f64; 3])> { sector.ring_entries().collect() };
+        let (found, expected) = (entries(&found), entries(&expected));
+        assert_eq!(found.len(), expected.len());
+        for (own, other) in found.iter().zip(&expected) {
+            let near = own.2.iter().zip(other.2).all(|(a, b)| (a - b).abs() < 1e-12 * (1.0 + b.abs()));
+            assert!((own.0, own.1) == (other.0, other.1) && near, "{own:?} {other:?}");
+        }
+        assert!(sector.with_springs([(&springs[0].0, f64::INFINITY)]).is_none());
     }
 
     #[test]

@@ -247,7 +247,15 @@ impl<'a> SizeInputs<'a> {
     /// Returns the instants of a period in a table: `samples` steps, both ends, and the
     /// switches.
     pub fn instants(&self) -> f64 {
-        self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + self.memory.switches * self.joints
+        let switches = self.memory.switches * self.joints;
+        // those of harmonic balance lie at its samples of the period
+        let switches = if self.is_series() { switches.min(self.series_samples()) } else { switches };
+        self.case.values.count("samples").unwrap_or(720) as f64 + 1.0 + switches
+    }
+
+    /// Returns the number of samples of a period in harmonic balance.
+    fn series_samples(&self) -> f64 {
+        self.case.method.options.get("samples").copied().unwrap_or(self.memory.reference_samples)
     }
 
     /// Returns the lowest and highest excitation frequency, rad/s.
@@ -264,11 +272,8 @@ impl<'a> SizeInputs<'a> {
     pub fn kept_orbits(&self) -> f64 {
         let orbits = self.frequencies.min(BLOCK as f64);
         if self.is_series() {
-            let option = |name: &str, default: f64| self.case.method.options.get(name).copied().unwrap_or(default);
-            let kept = self.kept_series_bytes(
-                option("harmonics", self.memory.series_harmonics),
-                option("samples", self.memory.reference_samples),
-            );
+            let harmonics = self.case.method.options.get("harmonics").copied();
+            let kept = self.kept_series_bytes(harmonics.unwrap_or(self.memory.series_harmonics), self.series_samples());
             return orbits * kept + self.orbit_bytes();
         }
         orbits * self.orbit_bytes()

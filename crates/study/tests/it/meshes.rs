@@ -181,7 +181,9 @@ fn contacts_with_a_body_are_the_joints_of_its_points() {
     let head = HEAD.replace("kt = \"200 N/mm^3\"\n", "");
     check_equal(&found, &dataset(folder.path(), &[&head, study, body, &joints]), 1e-9);
     let summary = ModelSummary::new(&read(folder.path(), &[HEAD, study, body, &contact]).unwrap()).unwrap().to_string();
-    assert!(summary.contains("pad: 9 joints of PADS on slab, area 4 of 4 mm^2"), "{summary}");
+    // from the node at (1, 1, 1) and from the corner (0, 2, 1)
+    let line = "pad: 9 joints of PADS on slab, area 4 of 4 mm^2, nodes 1.01 to 1.849 mm from the `position` of slab";
+    assert!(summary.contains(line), "{summary}");
     let exchanged = contact.replace("[\"PADS\", \"slab\"]", "[\"slab\", \"PADS\"]");
     let error = read(folder.path(), &[HEAD, study, body, &exchanged]).unwrap_err();
     let said = format!("{error} {}", error.help_text().unwrap_or_default());
@@ -837,6 +839,16 @@ fn fields_of_modes_are_the_shapes_of_their_places() {
             compared += 1;
         }
         assert_eq!(compared, modes.rows() * 4 * 6);
+        // a chosen mode alone
+        let chosen = diameters.replace("fields = 4", "fields = 4\nnodal_diameter = 2\nmode = 1\njoints = \"stuck\"");
+        let found = dataset(folder.path(), &[&chosen.replace("reduce = false", reduction)]);
+        let one = found.tables.iter().find(|table| table.name == "fields").unwrap();
+        let [joints, all] = [one, fields].map(|table| table.texts("joints").unwrap());
+        let (diameters, numbers) = (fields.integers("nodal_diameter").unwrap(), fields.integers("mode").unwrap());
+        let own = (0..fields.rows()).filter(|&k| (&*all[k], diameters[k], numbers[k]) == ("stuck", 2, 1));
+        let expected: Vec<f64> = own.map(|k| fields.numbers("x_m").unwrap()[k]).collect();
+        assert_eq!((one.rows(), one.numbers("x_m").unwrap()), (each, &expected[..]));
+        assert!(joints.iter().all(|state| state == "stuck"));
     }
     write_files(folder.path(), 0.01, true);
     let kind = "kind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\nfields = 4\n";

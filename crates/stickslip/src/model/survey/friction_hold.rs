@@ -45,8 +45,8 @@ impl System {
     /// use std::sync::Arc;
     /// use stickslip::law::FrictionContact;
     /// use stickslip::model::{GROUND, Joint, Mass, Model};
-    /// let law =
-    ///     FrictionContact { tangential: 1e6, normal: 2e6, friction: 0.3, preload: 5.0, tangents: 1 };
+    /// let (tangential, normal) = (1e6, 2e6);
+    /// let law = FrictionContact { tangential, normal, friction: 0.3, preload: 5.0, tangents: 1 };
     /// let block = Mass::new("block", 0.2).along(&["x", "z"]);
     /// let foot = Joint {
     ///     name: "foot".into(),

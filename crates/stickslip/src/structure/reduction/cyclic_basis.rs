@@ -29,6 +29,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
 use stickslip_numerics::eigen;
+use stickslip_numerics::interrupt;
 use stickslip_numerics::parallel::{map, try_map};
 use stickslip_numerics::sparse::{SparseMatrix, multi_vector};
 
@@ -47,6 +48,11 @@ pub(super) const HALF_WIDTH: f64 = 1e-3;
 /// Largest number of samples in the comparison of a wave; each needs a factorization of twice
 /// the size of a sector.
 const SAMPLES: usize = 5;
+
+/// Largest number of residual vectors of one basis. The matrix of their inner products takes 0.2 GB
+/// and its eigenvalues half a minute. More would be needed if some hundred contact nodes lie on a
+/// sector.
+const MOST_VECTORS: usize = 5000;
 
 /// Largest number of waves that are computed at once, on as many threads: each needs a
 /// factorization, and that of 60,000 rows takes half a gigabyte.
@@ -124,6 +130,22 @@ struct WaveCollection<'a> {
     /// For different blades: the blade, and the highest frequency of interest.
     blade: Option<(&'a Blade, f64)>,
     computed: Vec<ComputedWave>,
+    /// The vectors of the last basis: the next one often drops fewer of their combinations.
+    vectors: Option<SectorVectors>,
+}
+
+/// Vectors of several waves over the remaining rows, and their combinations that are orthogonal
+/// in the energy of the sector.
+struct SectorVectors {
+    /// Nodal diameters, orders of residual vectors, and the multiple of the frequency of interest
+    /// up to which modes are included.
+    source: (Vec<usize>, usize, f64),
+    kind: String,
+    columns: Vec<f64>,
+    /// Weights of the vectors in each combination of unit energy, one column per combination.
+    weights: DMatrix<f64>,
+    /// Eigenvalues of the Gram matrix relative to the largest one, falling.
+    shares: Vec<f64>,
 }
 
 impl SectorBasis {
@@ -247,6 +269,7 @@ fn congruence(matrix: &SparseMatrix, columns: &[f64]) -> DMatrix<f64> {
     // product of matrices.
     let together = 32;
     let parts = map(columns.chunks((together * n).max(1)), threads(), |part| {
+        interrupt::check();
         multi_vector::inner_products(n, columns, &matrix.multiply_columns(part))
     });
     DMatrix::from_iterator(count, count, parts.iter().flat_map(DMatrix::iter).copied())
@@ -257,7 +280,7 @@ impl<'a> WaveCollection<'a> {
         let shifted = |entries: &Vec<RingEntry>| ShiftedMatrices::new(sector.dofs, entries);
         let damping = sector.damping.as_ref().map(shifted).transpose()?;
         let matrices = (shifted(&sector.mass)?, shifted(&sector.stiffness)?, damping);
-        Ok(WaveCollection { sector, matrices, seen, blade, computed: Vec::new() })
+        Ok(WaveCollection { sector, matrices, seen, blade, computed: Vec::new(), vectors: None })
     }
 
     /// Computes the waves of these diameters, with all modes up to `extent` times the frequency
@@ -320,6 +343,11 @@ impl<'a> WaveCollection<'a> {
         for (extent, size) in tried_bases().skip(from) {
             loop {
                 let taken = self.sector.diameters(level);
+                let columns = |diameter: &usize| if is_real(*diameter, self.sector.sectors) { 1 } else { 2 };
+                if best.is_some() && size.0 * self.seen.len() * taken.iter().map(columns).sum::<usize>() > MOST_VECTORS
+                {
+                    break;
+                }
                 let between = self.sector.diameters(level + 1);
                 self.compute(&between, (up_to, extent), &taken)?;
                 let reduced = self.basis(&taken, size, kind)?;
@@ -405,6 +433,24 @@ impl<'a> WaveCollection<'a> {
         (order, share): (usize, f64),
         kind: ReductionKind,
     ) -> Result<ReducedSector, ReductionError> {
+        let extent = self.computed.iter().fold(0.0f64, |most, wave| most.max(wave.extent));
+        let source = (diameters.to_vec(), order, extent);
+        let vectors = match self.vectors.take() {
+            Some(known) if known.source == source => known,
+            _ => self.sector_vectors(source, kind)?,
+        };
+        let reduced = self.projected(vectors.kind.clone(), self.independent(&vectors, share));
+        self.vectors = Some(vectors);
+        Ok(reduced)
+    }
+
+    /// Collects the vectors of the waves of some diameters.
+    fn sector_vectors(
+        &mut self,
+        source: (Vec<usize>, usize, f64),
+        kind: ReductionKind,
+    ) -> Result<SectorVectors, ReductionError> {
+        let (diameters, order) = (&source.0, source.1);
         let n = self.sector.dofs;
         let (mut vectors, mut counts): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut modes = 0;
@@ -432,7 +478,7 @@ impl<'a> WaveCollection<'a> {
             let both = kind == ReductionKind::Rubin && !is_real(diameter, sector.sectors);
             counts.resize(vectors.len() / n.max(1), if both { 2.0 } else { 1.0 });
         }
-        let basis = self.independent(&vectors, &counts, share)?;
+        let (weights, shares) = self.combinations(&vectors, &counts)?;
         let name = match kind {
             ReductionKind::Rubin => "modes and residual vectors",
             ReductionKind::CraigBampton => "Craig-Bampton",
@@ -441,14 +487,12 @@ impl<'a> WaveCollection<'a> {
         let differing = if self.blade.is_some() { ", with blade vectors" } else { "" };
         let modes = modes.div_ceil(2).max(1);
         let kind = format!("one sector: {name} of {count} nodal diameters, up to {modes} modes each{differing}");
-        Ok(self.projected(kind, basis, n))
+        Ok(SectorVectors { source, kind, columns: vectors, weights, shares })
     }
 
-    /// Returns combinations of columns over the remaining rows that are orthogonal in the
-    /// energy of the sector. Nearly dependent combinations are dropped. Each is scaled to unit
-    /// displacement at the port that moves most. A column counts as often as `counts` states.
-    fn independent(&self, vectors: &[f64], counts: &[f64], share: f64) -> Result<Vec<f64>, ReductionError> {
-        let n = self.sector.dofs;
+    /// Returns the weights and shares of [`SectorVectors`]. A column counts as often as `counts`
+    /// states.
+    fn combinations(&self, vectors: &[f64], counts: &[f64]) -> Result<(DMatrix<f64>, Vec<f64>), ReductionError> {
         let highest =
             self.computed.iter().flat_map(|wave| wave.modes.values.last()).fold(0.0f64, |most, v| most.max(*v));
         let weighted =
@@ -464,7 +508,8 @@ impl<'a> WaveCollection<'a> {
         });
         let eigen = eigen::symmetric(gram).ok_or(ReductionError::OutOfRange)?;
         let largest = eigen.eigenvalues.amax();
-        let mut kept: Vec<usize> = (0..moving.len()).filter(|&k| eigen.eigenvalues[k] > share * largest).collect();
+        let least = SIZES.iter().fold(1.0f64, |least, (_, share)| least.min(*share));
+        let mut kept: Vec<usize> = (0..moving.len()).filter(|&k| eigen.eigenvalues[k] > least * largest).collect();
         kept.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         let mut weights = DMatrix::zeros(size.len(), kept.len());
         for (column, &k) in kept.iter().enumerate() {
@@ -472,7 +517,16 @@ impl<'a> WaveCollection<'a> {
                 weights[(row, column)] = eigen.eigenvectors[(i, k)] / (eigen.eigenvalues[k].sqrt() * size[row]);
             }
         }
-        let mut basis = multi_vector::combine(n, vectors, &weights);
+        let shares = kept.iter().map(|&k| eigen.eigenvalues[k] / largest).collect();
+        Ok((weights, shares))
+    }
+
+    /// Returns the combinations of which this share of the energy is independent of the others.
+    /// Each is scaled to unit displacement at the port that moves most.
+    fn independent(&self, vectors: &SectorVectors, share: f64) -> Vec<f64> {
+        let n = self.sector.dofs;
+        let count = vectors.shares.partition_point(|own| *own > share);
+        let mut basis = multi_vector::combine(n, &vectors.columns, &vectors.weights.columns(0, count).into_owned());
         let seen: Vec<_> = self.seen.iter().map(|row| self.sector.row(row)).collect();
         for column in basis.chunks_exact_mut(n.max(1)) {
             let largest = column.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -481,11 +535,12 @@ impl<'a> WaveCollection<'a> {
             let size = if port > super::UNSEEN * largest { port } else { largest };
             column.iter_mut().for_each(|x| *x /= size);
         }
-        Ok(basis)
+        basis
     }
 
-    fn projected(&self, kind: String, basis: Vec<f64>, n: usize) -> ReducedSector {
+    fn projected(&self, kind: String, basis: Vec<f64>) -> ReducedSector {
         let sector = self.sector;
+        let n = sector.dofs;
         let (mass, stiffness, damping) = &self.matrices;
         let mut ports = Vec::new();
         for (port, row) in self.seen.iter().enumerate() {

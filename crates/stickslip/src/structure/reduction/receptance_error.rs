@@ -13,6 +13,7 @@
 use super::{FullStructure, ReducedMatrices, ReductionError, ResidualSeries, StructureDamping};
 use nalgebra::{Complex, DMatrix};
 use serde::{Deserialize, Serialize};
+use stickslip_numerics::interrupt;
 use stickslip_numerics::random::SplitMix64;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix};
 
@@ -147,6 +148,7 @@ impl Factors<'_> {
     /// Computes the receptance of the whole structure at ω, or slightly above if ω is at a
     /// mode. `together` contains loads on all ports; `None` loads each port separately.
     fn sample(&mut self, omega: f64, together: Option<&DMatrix<f64>>) -> Result<ReceptanceSample, ReductionError> {
+        interrupt::check();
         let mut failed = ReductionError::OutOfRange;
         // Attempts to shift a sample away from a mode.
         for attempt in 0..5 {

@@ -17,6 +17,7 @@
 //! augmentation methods for modal response analysis".
 
 use super::{COLUMN_BLOCK, FullStructure, ReductionError};
+use stickslip_numerics::interrupt;
 use stickslip_numerics::sparse::{LdlFactor, NaturalModes, SparseMatrix, multi_vector};
 
 /// Returns the modes and the blocks `X₀, …` up to `order`, n × (k + p J), and the shift,
@@ -38,6 +39,7 @@ pub(super) fn basis(
     basis.extend_from_slice(&modes.shapes);
     for block in 0..order {
         for first in (0..ports).step_by(COLUMN_BLOCK) {
+            interrupt::check();
             let numbers = first..ports.min(first + COLUMN_BLOCK);
             let mut some = match block.checked_sub(1) {
                 Some(last) => {

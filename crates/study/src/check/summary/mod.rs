@@ -52,6 +52,8 @@ pub struct ModelSummary {
     pub held_by_friction: Vec<FrictionDirection>,
     /// True if the model has too many degrees of freedom for the modes, which are then absent.
     pub too_large: bool,
+    /// True for a disk of equal sectors.
+    pub is_tuned_disk: bool,
     /// Modes with all joints free.
     pub free: LinearModes,
     /// Modes with all joints stuck.
@@ -203,6 +205,7 @@ impl ModelSummary {
             bodies: bodies::described(&cases[0].case.model),
             held_by_friction,
             too_large: first.is_too_large(),
+            is_tuned_disk: shown.case.model.ring.is_some_and(|ring| ring.equal),
             free: first.free().clone(),
             stuck: first.stuck().clone(),
             joints,

@@ -14,7 +14,8 @@ const MAX_LISTED: usize = 10;
 impl ModelSummary {
     fn modes(&self, modes: &LinearModes) -> String {
         if self.too_large {
-            return format!("not computed for {} degrees of freedom", self.dofs);
+            let other = if self.is_tuned_disk { "; kind `nodal-diameter` computes them" } else { "" };
+            return format!("not computed for {} degrees of freedom{other}", self.dofs);
         }
         let mut order: Vec<&NaturalMode> = modes.elastic.iter().collect();
         let count = order.len();

@@ -36,6 +36,8 @@ pub struct ContactSummary {
     /// Smallest and largest distance along the normal, m, negative where the faces overlap; `None`
     /// on the ground.
     pub gaps: Option<[f64; 2]>,
+    /// Smallest and largest distance of the nodes from the position of the body that they touch, m.
+    pub body_distances: Option<[f64; 2]>,
     /// Largest angle between both faces, rad.
     pub angle: f64,
     /// The pairs of all joints, for a picture.
@@ -207,6 +209,12 @@ pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Resu
         counterpart: pair.opposite.as_ref().map(|found| in_first(found.point.position)),
     };
     expanded.summary.pairs = pairs.iter().map(shown).collect();
+    expanded.summary.body_distances = body.as_ref().and_then(|body| {
+        range(pairs.iter().map(|pair| {
+            let to_node = [0, 1, 2].map(|axis| pair.node.position[axis] * source.length - body.position[axis]);
+            dot(&to_node, &to_node).sqrt()
+        }))
+    });
     let mut areas = Vec::with_capacity(pairs.len());
     for pair in &pairs {
         let number = source.number(pair.node.node);
@@ -471,10 +479,6 @@ fn summary(
         let between = &pair.opposite.as_ref()?.point.position;
         Some(dot(&[0, 1, 2].map(|axis| between[axis] - pair.node.position[axis]), &pair.normal) * source.length)
     };
-    let gaps = pairs.iter().filter_map(gap).fold(None, |range: Option<[f64; 2]>, gap| {
-        let [low, high] = range.unwrap_or([gap, gap]);
-        Some([low.min(gap), high.max(gap)])
-    });
     let angle = |pair: &Pair| -> f64 {
         pair.opposite
             .as_ref()
@@ -487,7 +491,8 @@ fn summary(
         between: between(contact).map_or_else(|_| Default::default(), |(sets, _)| sets),
         joints: pairs.len(),
         area: [paired * square, first.area() * square],
-        gaps,
+        gaps: range(pairs.iter().filter_map(gap)),
+        body_distances: None,
         angle: pairs.iter().map(angle).fold(0.0, f64::max),
         pairs: Vec::new(),
         unpaired,
@@ -495,11 +500,28 @@ fn summary(
     }
 }
 
+/// Returns the smallest and the largest value; `None` without values.
+fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    values.fold(None, |range: Option<[f64; 2]>, value| {
+        let [low, high] = range.unwrap_or([value, value]);
+        Some([low.min(value), high.max(value)])
+    })
+}
+
 impl ContactSummary {
     /// Describes the contact in a line.
     pub(crate) fn text(&self) -> String {
         let Self {
-            name, between: [first, second], joints, area: [paired, all], gaps, angle, unpaired, preload, ..
+            name,
+            between: [first, second],
+            joints,
+            area: [paired, all],
+            gaps,
+            body_distances,
+            angle,
+            unpaired,
+            preload,
+            ..
         } = self;
         let number = |value: f64| format_significant(value, 4);
         let mut text = format!(
@@ -516,6 +538,10 @@ impl ContactSummary {
                 // decimals of coordinates in the file turn faces by less
                 number((angle.to_degrees() * 1e3).round() * 1e-3)
             );
+        }
+        if let Some([low, high]) = body_distances {
+            text +=
+                &format!(", nodes {} to {} mm from the `position` of {second}", number(low * 1e3), number(high * 1e3));
         }
         if let Some(PreloadSummary { total, pressures: [low, high], is_scaled, joints_without_row, .. }) = preload {
             text += &format!(
@@ -548,6 +574,7 @@ impl ContactSummary {
             "area_m2": self.area[0],
             "face_area_m2": self.area[1],
             "gaps_m": self.gaps,
+            "distances_from_body_m": self.body_distances,
             "largest_angle_rad": self.angle,
             "unpaired_nodes": self.unpaired,
             "preload_N": self.preload.as_ref().map(|preload| preload.total),

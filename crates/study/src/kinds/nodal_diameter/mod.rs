@@ -43,21 +43,22 @@ pub(super) const KIND: Kind = Kind {
             optional(
                 DIAMETER,
                 ValueType::Count(0, 100_000),
-                "the nodal diameter whose lowest modes are drawn; default: the first mode (or `mode`) of the lowest \
-                 nodal diameters",
+                "the nodal diameter whose lowest modes are drawn, and whose `fields` are written; default: the first mode \
+                 (or `mode`) of the lowest nodal diameters is drawn",
                 "3",
             ),
             optional(
                 MODE,
                 ValueType::Count(1, 100),
-                "number of the drawn mode, by ascending frequency in its nodal diameter",
+                "number of the mode that is drawn, and whose `fields` are written, by ascending frequency in its nodal \
+                 diameter",
                 "1",
             ),
             default(
                 JOINTS,
                 ValueType::Choice(states),
                 STATES[0],
-                "state of the joints in the drawn shapes",
+                "state of the joints in the drawn shapes and, if stated, in `fields`",
                 "\"stuck\"",
             ),
             fields::KEY,
@@ -123,7 +124,10 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
     let (waves, each) = (sectors / 2.0 + 1.0, 2.0 * inputs.dofs / sectors);
     let rows = inputs.cases * waves * 2.0 * modes;
     let shapes = 2.0 * inputs.places / sectors;
-    let nodes = fields::size(inputs, rows);
+    let selected = WrittenModes::new(&inputs.case.values);
+    let of = |is_stated: bool, all: f64| if is_stated { 1.0 } else { all };
+    let written = of(selected.diameter.is_some(), waves) * of(selected.mode.is_some(), modes);
+    let nodes = fields::size(inputs, inputs.cases * written * of(selected.joints.is_some(), 2.0));
     PlannedSize {
         drawn: rows + nodes.rows,
         tables: vec![
@@ -160,12 +164,13 @@ fn compute(work: &UnitTask<'_>) -> Computed {
             part.count(|| location_of(prepared), CONVERGED, None);
             write(prepared, &waves, &mut rows);
             if let Some(nodes) = Fields::new(work.study, prepared, &mut part) {
-                each_mode(prepared, &waves, |head, omega, motion| {
+                let selected = WrittenModes::new(&prepared.case.values);
+                each_mode(prepared, &waves, &selected, |head, omega, motion| {
                     nodes.write_harmonic(prepared, omega, motion, head, &mut of_nodes);
                 });
             }
             if let Some(stresses) = Stresses::new(work.study, prepared, &mut part) {
-                each_mode(prepared, &waves, |head, omega, motion| {
+                each_mode(prepared, &waves, &WrittenModes::default(), |head, omega, motion| {
                     let head = |rows: &mut TableBuilder| {
                         head(rows);
                         rows.number(FREQUENCY, hertz(omega));
@@ -216,11 +221,32 @@ fn write(prepared: &PreparedCase, waves: &[WaveModes], rows: &mut TableBuilder) 
     }
 }
 
-/// Calls `write` with every mode of unit modal mass: its columns in the table, its frequency
-/// (rad/s), and its motion of all degrees of freedom of the ring.
+/// The modes that are written; all where nothing is stated.
+#[derive(Default)]
+struct WrittenModes<'a> {
+    joints: Option<&'a str>,
+    diameter: Option<u64>,
+    mode: Option<u64>,
+}
+
+impl<'a> WrittenModes<'a> {
+    fn new(values: &'a Values) -> Self {
+        WrittenModes { joints: values.text(JOINTS), diameter: values.count(DIAMETER), mode: values.count(MODE) }
+    }
+
+    fn contains(&self, joints: &str, diameter: usize, mode: usize) -> bool {
+        self.joints.is_none_or(|own| own == joints)
+            && self.diameter.is_none_or(|own| own == diameter as u64)
+            && self.mode.is_none_or(|own| own == mode as u64)
+    }
+}
+
+/// Calls `write` with every written mode of unit modal mass: its columns in the table, its
+/// frequency (rad/s), and its motion of all degrees of freedom of the ring.
 fn each_mode(
     prepared: &PreparedCase,
     waves: &[WaveModes],
+    written: &WrittenModes<'_>,
     mut write: impl FnMut(&dyn Fn(&mut TableBuilder), f64, &[Complex64]),
 ) {
     let most = prepared.case.values.count("modes").unwrap_or(4) as usize;
@@ -230,6 +256,9 @@ fn each_mode(
             let symmetry = CyclicSymmetry { sectors, order: wave.diameter };
             let (modes, motions) = [(&wave.free, &wave.free_motions), (&wave.stuck, &wave.stuck_motions)][state];
             for (mode, (found, motion)) in modes.elastic.iter().zip(motions).take(most).enumerate() {
+                if !written.contains(name, wave.diameter, mode + 1) {
+                    continue;
+                }
                 let turns = (0..sectors).map(|sector| symmetry.phase_factor(1, sector));
                 let motion: Vec<Complex64> = turns.flat_map(|turn| motion.iter().map(move |x| x * turn)).collect();
                 let head = |rows: &mut TableBuilder| {

@@ -7,15 +7,16 @@ use crate::syntax::format::{format_hertz, prefixed_unit};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+/// Largest number of curves in a panel: more have no colours and line styles of their own.
+pub(super) const MAX_CURVES: usize = 12;
+
 /// Returns the indices of the curves with the largest range, ascending.
 fn largest_ranges(curves: &[Vec<f64>]) -> Vec<usize> {
-    // Largest number of curves in a panel: more have no colours and line styles of their own.
-    let most = 12;
     let largest = |curve: &[f64], sign: f64| curve.iter().map(|y| sign * y).fold(f64::NEG_INFINITY, f64::max);
     let range = |index: usize| largest(&curves[index], 1.0) + largest(&curves[index], -1.0);
     let mut shown: Vec<usize> = (0..curves.len()).collect();
     shown.sort_by(|&a, &b| range(b).total_cmp(&range(a)));
-    shown.truncate(most);
+    shown.truncate(MAX_CURVES);
     shown.sort_unstable();
     shown
 }

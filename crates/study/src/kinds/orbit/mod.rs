@@ -68,8 +68,9 @@ fn size(inputs: &SizeInputs<'_>) -> PlannedSize {
             fields,
             stress::size(inputs, points, sectors),
         ],
-        // the panels beyond the limit are also built; all fields are held until they are written
-        drawn: rows * (inputs.places + inputs.joints) + fields.rows,
+        // two panels of each orbit, also beyond the limit of panels; all fields are held until they
+        // are written
+        drawn: rows * 2.0 * (inputs.places + inputs.joints).min(figure::MAX_CURVES as f64) + fields.rows,
         unit: inputs.kept_orbits(),
     }
 }
