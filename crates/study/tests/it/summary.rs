@@ -937,7 +937,7 @@ fn directions_that_friction_alone_holds_are_named() {
     let text = r#"schema = 1
 [[mass]]
 name = "block"
-value = "0.2 kg"
+mass = "0.2 kg"
 directions = ["x", "z"]
 [[joint]]
 name = "foot"

@@ -7,7 +7,7 @@
 use super::super::{Axis, System, SystemJoint};
 use super::rigid_body::DisjointSets;
 use nalgebra::{DMatrix, DVector};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use stickslip_numerics::eigen;
 
 /// Largest number of degrees of freedom of a body, or of bodies on common springs. Larger parts of
@@ -59,17 +59,12 @@ impl System {
     /// assert!((directions[0].spring(100.0) - 200.0).abs() < 1e-12);
     /// ```
     pub fn directions_held_by_friction(&self) -> Vec<FrictionDirection> {
-        let parts = self.small_parts();
-        let mut is_small = vec![false; self.dofs()];
-        parts.iter().flatten().for_each(|row| is_small[*row] = true);
-        let entries = self.structure().entries().map(|(row, column, [.., k])| (row, column, k));
-        let stiffness: Vec<_> = entries.filter(|(row, _, k)| is_small[*row] && *k != 0.0).collect();
-        parts.iter().flat_map(|rows| self.directions_of_part(rows, &stiffness)).collect()
+        self.small_parts().iter().flat_map(|part| part.free_directions(self)).collect()
     }
 
     /// Returns the rows of each part of the structure that has few rows. A joint connects the
     /// coordinates of a body, but not two large parts of the structure.
-    fn small_parts(&self) -> Vec<Vec<usize>> {
+    fn small_row_sets(&self) -> Vec<Vec<usize>> {
         let n = self.dofs();
         let mut connected = DisjointSets::new(n);
         // modal damping couples all rows of a reduced structure
@@ -84,71 +79,101 @@ impl System {
             let rows: Vec<usize> = rows.filter(|row| is_small[*row]).collect();
             rows.windows(2).for_each(|pair| connected.union(pair[0], pair[1]));
         }
-        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        (0..n).filter(|row| is_small[*row]).for_each(|row| parts.entry(connected.find(row)).or_default().push(row));
-        parts.into_values().filter(|rows| rows.len() <= LARGEST_PART).collect()
+        let mut of_set: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        (0..n).filter(|row| is_small[*row]).for_each(|row| of_set.entry(connected.find(row)).or_default().push(row));
+        of_set.into_values().filter(|rows| rows.len() <= LARGEST_PART).collect()
     }
 
-    fn directions_of_part(&self, rows: &[usize], stiffness: &[(usize, usize, f64)]) -> Vec<FrictionDirection> {
-        let n = rows.len();
-        let index: HashMap<usize, usize> = rows.iter().enumerate().map(|(new, row)| (*row, new)).collect();
-        let mass: Vec<f64> = rows.iter().map(|row| self.structure().diagonal_mass(*row)).collect();
-        if mass.iter().any(|mass| *mass <= 0.0) {
+    /// Returns the parts of the structure that have few rows, with all that holds them.
+    fn small_parts(&self) -> Vec<SmallPart<'_>> {
+        let mut parts: Vec<SmallPart> = self.small_row_sets().into_iter().map(SmallPart::new).collect();
+        // the part of each row, and its index in the part
+        let mut place = vec![None; self.dofs()];
+        for (part, own) in parts.iter().enumerate() {
+            own.rows.iter().enumerate().for_each(|(index, row)| place[*row] = Some((part, index)));
+        }
+        for (row, column, [.., k]) in self.structure().entries() {
+            if let (Some((part, row)), Some((_, column))) = (place[row], place[column]) {
+                parts[part].stiffness[(row, column)] += k;
+            }
+        }
+        let axes = self.joints().iter().flat_map(|joint| holding_axes(joint).iter().map(move |axis| (joint, axis)));
+        for (joint, axis) in axes {
+            let mut touched: Vec<usize> = axis.rows().iter().filter_map(|(row, _)| Some(place[*row]?.0)).collect();
+            touched.sort_unstable();
+            touched.dedup();
+            for part in touched {
+                parts[part].holding.push(axis);
+                parts[part].has_faces |= joint.law().normal().is_some();
+            }
+        }
+        for (name, axis) in self.places().iter().zip(self.place_axes()) {
+            if let [(row, _)] = *axis.rows()
+                && let Some((part, index)) = place[row]
+            {
+                parts[part].places.push((index, name, axis));
+            }
+        }
+        parts
+    }
+}
+
+/// A part of a structure with few rows.
+struct SmallPart<'a> {
+    rows: Vec<usize>,
+    stiffness: DMatrix<f64>,
+    /// Axes along which joints hold it without friction.
+    holding: Vec<&'a Axis>,
+    /// True if one of these axes is across faces.
+    has_faces: bool,
+    /// Places along one coordinate: its index in `rows`, name and axis.
+    places: Vec<(usize, &'a String, &'a Axis)>,
+}
+
+impl SmallPart<'_> {
+    fn new(rows: Vec<usize>) -> Self {
+        let stiffness = DMatrix::zeros(rows.len(), rows.len());
+        SmallPart { rows, stiffness, holding: Vec::new(), has_faces: false, places: Vec::new() }
+    }
+
+    /// Returns the directions that neither stiffness nor closed faces hold.
+    fn free_directions(&self, system: &System) -> Vec<FrictionDirection> {
+        let n = self.rows.len();
+        let mass: Vec<f64> = self.rows.iter().map(|row| system.structure().diagonal_mass(*row)).collect();
+        if !self.has_faces || mass.iter().any(|mass| *mass <= 0.0) {
             return Vec::new();
         }
-        // a direction of the part in coordinates of equal kinetic energy, with unit length
-        let direction = |axis: &Axis| -> Option<DVector<f64>> {
-            let mut along = DVector::zeros(n);
-            for (row, weight) in axis.rows() {
-                if let Some(new) = index.get(row) {
-                    along[*new] += weight / mass[*new].sqrt();
-                }
-            }
-            along.try_normalize(0.0)
-        };
-        let mut held = DMatrix::zeros(n, n);
-        for (row, column, k) in stiffness {
-            if let (Some(row), Some(column)) = (index.get(row), index.get(column)) {
-                held[(*row, *column)] += k / (mass[*row] * mass[*column]).sqrt();
-            }
-        }
+        // in coordinates of equal kinetic energy
+        let mut held = DMatrix::from_fn(n, n, |i, k| self.stiffness[(i, k)] / (mass[i] * mass[k]).sqrt());
         let stiffest = held.amax();
         if stiffest > 0.0 {
             held /= stiffest;
         }
-        let mut touched = false;
-        for joint in self.joints() {
-            for along in holding_axes(joint).iter().filter_map(direction) {
-                held += &along * along.transpose();
-                touched |= joint.law().normal().is_some();
+        for axis in &self.holding {
+            let mut along: DVector<f64> = DVector::zeros(n);
+            for (row, weight) in axis.rows() {
+                if let Ok(index) = self.rows.binary_search(row) {
+                    along[index] += weight / mass[index].sqrt();
+                }
             }
-        }
-        if !touched {
-            return Vec::new();
+            if let Some(along) = along.try_normalize(0.0) {
+                held += &along * along.transpose();
+            }
         }
         let Some(eigen) = eigen::symmetric(held) else { return Vec::new() };
         let largest = eigen.eigenvalues.amax();
         // Stiffness of a direction relative to the stiffest one, below which it is rounding.
         let free: Vec<usize> = (0..n).filter(|&k| eigen.eigenvalues[k] <= 1e-9 * largest).collect();
         let mut free = eigen.eigenvectors.select_columns(&free);
-        let places: Vec<(usize, &String, &Axis)> = self
-            .places()
-            .iter()
-            .zip(self.place_axes())
-            .filter_map(|(name, axis)| match axis.rows() {
-                [(row, _)] => Some((*index.get(row)?, name, axis)),
-                _ => None,
-            })
-            .collect();
         let mut found = Vec::new();
         // one place for each free direction: that which moves most in the directions left
         for _ in 0..free.ncols() {
-            let share = |row: usize| free.row(row).norm_squared();
-            let most = places.iter().reduce(|a, b| if share(b.0) > 1.01 * share(a.0) { b } else { a });
-            let Some(&(row, name, axis)) = most.filter(|most| share(most.0) > 1e-6) else { break };
-            let taken = free.row(row).transpose().normalize();
+            let share = |index: usize| free.row(index).norm_squared();
+            let most = self.places.iter().reduce(|a, b| if share(b.0) > 1.01 * share(a.0) { b } else { a });
+            let Some(&(index, name, axis)) = most.filter(|most| share(most.0) > 1e-6) else { break };
+            let taken = free.row(index).transpose().normalize();
             free -= &free * &taken * taken.transpose();
-            found.push(FrictionDirection { place: name.clone(), is_rotation: axis.is_rotation(), mass: mass[row] });
+            found.push(FrictionDirection { place: name.clone(), is_rotation: axis.is_rotation(), mass: mass[index] });
         }
         found
     }

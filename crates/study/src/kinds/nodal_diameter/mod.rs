@@ -54,11 +54,10 @@ pub(super) const KIND: Kind = Kind {
                  diameter",
                 "1",
             ),
-            default(
+            optional(
                 JOINTS,
                 ValueType::Choice(states),
-                STATES[0],
-                "state of the joints in the drawn shapes and, if stated, in `fields`",
+                "state of the joints in the drawn shapes (default: free) and in `fields` (default: both states)",
                 "\"stuck\"",
             ),
             fields::KEY,
