@@ -29,6 +29,7 @@ pub use displacement_field::DisplacementField;
 pub use error::{Element, ElementFault, ModelError};
 pub use name_resolution::{is_identifier, is_place};
 pub use place::{Frame, FrameError, Place};
+pub(crate) use survey::soft_spring;
 pub use survey::{
     FirstSlip, FrictionDirection, LinearModes, LooseBody, NaturalMode, SlipOnset, Survey, UnloadedContacts, WaveModes,
 };

@@ -374,8 +374,7 @@ pub enum ObservedMotion {
         speed: f64,
         /// The constant force along its direction, N.
         load: f64,
-        /// Stiffness of a spring that holds it and hardly changes its vibration, N/m: a hundredth
-        /// of the mass that moves, times the squared frequency.
+        /// Stiffness of a spring that holds it and is soft against its inertia, N/m.
         spring: f64,
         /// The joint that is separated for the largest fraction of the last period.
         joint: Box<str>,
@@ -431,13 +430,13 @@ impl std::fmt::Display for ObservedMotion {
                         f,
                         ", and `{joint}` is separated throughout the last period: if a force or a preload should close it, \
                          exchange the two places of its `between`, or reverse the force; otherwise increase the \
-                         normal loads, or hold the body by a weak spring along this direction"
+                         normal loads, or hold the body by a soft spring along this direction"
                     );
                 }
                 write!(
                     f,
-                    "{}; hold it by a weak spring along this direction ({spring:.1e} {of_spring} hardly changes the \
-                     vibration), increase the normal loads, or add damping",
+                    "{}; hold it by a soft spring along this direction ({spring:.1e} {of_spring} is soft against its \
+                     inertia), increase the normal loads, or add damping",
                     apart(joint, *open_fraction)
                 )
             }

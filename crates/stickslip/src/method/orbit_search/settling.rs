@@ -7,7 +7,7 @@ use crate::law::Contact;
 use crate::method::flow::Flow;
 use crate::method::flow::average_acceleration::equal_steps::AverageAccelerationFlow;
 use crate::method::flow::integrator_choice::IntegratorKind;
-use crate::model::{Axis, System};
+use crate::model::{Axis, System, soft_spring};
 use crate::orbit::{ObservedMotion, Path, Sample, Symmetry};
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
@@ -234,7 +234,7 @@ fn drifting(
         periods: periods as u32,
         load: axis.component(system.constant_forces().as_slice()) / squares,
         speed: drift * omega / (periods as f64 * TAU),
-        spring: 0.01 * mass * omega * omega,
+        spring: soft_spring(mass, omega),
         joint: joint.into(),
         open_fraction,
     }
@@ -295,7 +295,7 @@ mod tests {
             assert_eq!(push, load[0] + load[1] - if along == "x" { 10.0 } else { 0.0 });
             assert!((measured.abs() / speed - 1.0).abs() < 1e-3, "{measured} {speed}");
             // the block has 1 kg
-            assert_eq!(spring, 0.01 * OMEGA * OMEGA);
+            assert!((spring / (0.1 * OMEGA * OMEGA) - 1.0).abs() < 1e-12, "{spring}");
             assert_eq!(open_fraction, if along == "z" { 1.0 } else { 0.0 });
             assert!(course.to_string().contains(&format!("`{along}`")), "{course}");
             // the force that lifts the block may have been meant to press it

@@ -27,12 +27,17 @@ pub struct FrictionDirection {
 
 impl FrictionDirection {
     /// Returns the stiffness of a spring that holds the body along this direction and is soft
-    /// against its inertia at `omega` (rad/s): a tenth of the mass times the squared frequency,
-    /// N/m (N m/rad for a rotation). A wedge damper on a spring of a hundredth moves so far that
-    /// harmonic balance fails at a third of the points.
+    /// against its inertia at `omega` (rad/s), N/m (N m/rad for a rotation).
     pub fn spring(&self, omega: f64) -> f64 {
-        0.1 * self.mass * omega * omega
+        soft_spring(self.mass, omega)
     }
+}
+
+/// Returns the stiffness of a spring that holds a creeping mass and is soft against its inertia,
+/// N/m: a tenth of the mass (kg) times the squared frequency (rad/s). On a spring of a hundredth,
+/// a wedge damper moves so far that harmonic balance fails at a third of the points.
+pub(crate) fn soft_spring(mass: f64, omega: f64) -> f64 {
+    0.1 * mass * omega * omega
 }
 
 impl System {

@@ -18,6 +18,7 @@ mod stuck_joint;
 mod wave_modes;
 
 pub use friction_hold::FrictionDirection;
+pub(crate) use friction_hold::soft_spring;
 pub use results::{FirstSlip, LinearModes, LooseBody, NaturalMode, SlipOnset, UnloadedContacts};
 pub use wave_modes::WaveModes;
 
