@@ -208,8 +208,8 @@ pub enum OrbitError {
         residual: f64,
         /// True if the search exhausted the work limit of a point.
         work_limit_reached: bool,
-        /// Advice about other methods, as text that follows a comma; empty if no method was
-        /// asked or none applies.
+        /// Advice about other methods and about bodies that friction alone holds, as text that
+        /// follows the message; empty if there is none.
         advice: String,
     },
     /// The motion does not settle.
@@ -297,8 +297,8 @@ pub enum OrbitError {
         method: &'static str,
         /// Excitation frequency, rad/s.
         omega: f64,
-        /// Advice about methods that can follow such a motion, as text that follows a comma;
-        /// empty if no method was asked or none applies.
+        /// Advice about methods that can follow such a motion and about bodies that friction alone
+        /// holds, as text that follows the message; empty if there is none.
         advice: String,
     },
     /// No orbit was found. A motion that was integrated from static equilibrium shows the actual
