@@ -35,7 +35,7 @@ impl FrictionDirection {
 
 /// Returns the stiffness of a spring that holds a creeping mass and is soft against its inertia,
 /// N/m: a tenth of the mass (kg) times the squared frequency (rad/s). On a spring of a hundredth,
-/// a wedge damper moves so far that harmonic balance fails at a third of the points.
+/// a wedge damper moves so far that harmonic balance fails at half of the points.
 pub(crate) fn soft_spring(mass: f64, omega: f64) -> f64 {
     0.1 * mass * omega * omega
 }
