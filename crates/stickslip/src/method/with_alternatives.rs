@@ -1,4 +1,5 @@
-//! Alternative methods for a method that refuses a system or finds no orbit.
+//! Advice for a method that refuses a system or finds no orbit: alternative methods, and bodies
+//! that friction alone holds.
 //!
 //! The functions try to make a solver of every method in the list.
 
@@ -72,7 +73,7 @@ fn alternatives_among(system: &System, asked: impl Fn(&str) -> bool) -> Alternat
     alternatives
 }
 
-/// A solver whose errors name other methods that take the system and may find the orbit.
+/// A solver whose errors name other methods that may find the orbit, and bodies that may creep.
 struct WithAlternatives<'a> {
     solver: Box<dyn Solver + Send + 'a>,
     system: &'a System,
@@ -108,7 +109,7 @@ fn creeping_advice(directions: &[FrictionDirection], omega: f64) -> String {
          soft spring ({:.1e} {} on `{}` is soft against its inertia)",
         names.join(", "),
         first.spring(omega),
-        if first.is_rotation { "N m/rad" } else { "N/m" },
+        first.spring_unit(),
         first.place,
     )
 }

@@ -31,6 +31,11 @@ impl FrictionDirection {
     pub fn spring(&self, omega: f64) -> f64 {
         soft_spring(self.mass, omega)
     }
+
+    /// Returns the unit of [`FrictionDirection::spring`].
+    pub fn spring_unit(&self) -> &'static str {
+        if self.is_rotation { "N m/rad" } else { "N/m" }
+    }
 }
 
 /// Returns the stiffness of a spring that holds a creeping mass and is soft against its inertia,
@@ -64,6 +69,10 @@ impl System {
     /// assert!((directions[0].spring(100.0) - 200.0).abs() < 1e-12);
     /// ```
     pub fn directions_held_by_friction(&self) -> Vec<FrictionDirection> {
+        // without faces the parts of the structure, which may be large, need not be known
+        if self.joints().iter().all(|joint| joint.law().normal().is_none()) {
+            return Vec::new();
+        }
         self.small_parts().iter().flat_map(|part| part.free_directions(self)).collect()
     }
 

@@ -61,8 +61,7 @@ impl ModelSummary {
         let first = self.held_by_friction.first()?;
         let names: Vec<String> = self.held_by_friction.iter().map(|one| one.place.clone()).collect();
         let spring = self.range.map_or_else(String::new, |(_, highest)| {
-            let unit = if first.is_rotation { "N m/rad" } else { "N/m" };
-            let stiffness = format_with_prefix(first.spring(highest), unit);
+            let stiffness = format_with_prefix(first.spring(highest), first.spring_unit());
             format!(" ({stiffness} on `{}` is soft against its inertia)", first.place)
         });
         Some(format!(
