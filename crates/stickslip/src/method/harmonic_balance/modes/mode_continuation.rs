@@ -7,13 +7,10 @@
 //! Source: Keller (1977); Allgower and Georg, "Introduction to Numerical Continuation Methods"
 //! (2003), Ch. 6.
 
+use super::mode_newton::NewtonLimits;
 use super::nonlinear_mode::{ModeEquations, ModeSettings, ModeState};
-use crate::method::harmonic_balance::line_search::LineSearch;
-use crate::method::harmonic_balance::settings::NewtonSettings;
 use num_complex::Complex64;
-use stickslip_numerics::min_norm::{min_norm_step, null_directions};
 use stickslip_numerics::vector::dot;
-use stickslip_numerics::{dense, interrupt};
 
 /// Point of the curve: modal amplitude, m √kg, and motion.
 #[derive(Debug, Clone)]
@@ -45,7 +42,7 @@ impl ModeArc {
     }
 
     /// Changes shape, forces, ω, ζ and `ln a` by a multiple of `direction`.
-    fn shift(&mut self, direction: &[f64], length: f64) {
+    pub(super) fn shift(&mut self, direction: &[f64], length: f64) {
         let n = direction.len() - 1;
         let after = self.amplitude * (length * direction[n]).exp();
         let pairs = direction.chunks_exact(2);
@@ -104,7 +101,7 @@ impl ModeEquations<'_> {
         let mut row = vec![0.0; self.size() + 1];
         row[self.size()] = -1.0;
         let point = ModeArc { amplitude, state: state.clone(), tangent: row.clone(), determinant_sign: 1.0 };
-        self.corrector(point, &row, false).map(|(point, _)| point)
+        self.corrected_point(point, &row, false).map(|(point, _)| point)
     }
 
     /// Takes a step of the given arc length. Returns `None` if the corrector does not converge.
@@ -117,10 +114,24 @@ impl ModeEquations<'_> {
         if !(predicted.state.omega > 0.0 && predicted.amplitude.is_finite()) {
             return None;
         }
-        let (to, iterations) = self.corrector(predicted.clone(), &row, bold)?;
+        let (to, iterations) = self.corrected_point(predicted.clone(), &row, bold)?;
         let off = self.length(from, &predicted.difference_to(&to));
         let straight = dot(&row, &to.tangent);
         Some(ModeStep { to, iterations, predictor_distance: off, tangent_cosine: straight })
+    }
+
+    /// Returns the solution in the plane through `point` with the normal `row`, with its unit
+    /// tangent on the side of `row`, and the Newton iterations.
+    fn corrected_point(&mut self, point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
+        let iterations = ModeSettings::default().step_iterations;
+        let found = self.newton(point, row, NewtonLimits { iterations, bold })?;
+        let (mut tangent, determinant_sign) = self.direction(&found, row)?;
+        let length = self.length(&found.point, &tangent);
+        if !(length > 0.0 && length.is_finite()) {
+            return None;
+        }
+        tangent.iter_mut().for_each(|t| *t /= length);
+        Some((ModeArc { tangent, determinant_sign, ..found.point }, found.iterations))
     }
 
     /// Returns the arc length from a point to a motion along the straight line.
@@ -197,99 +208,5 @@ impl ModeEquations<'_> {
         let weight = 0.5;
         out[last] = direction[last] * weight * weight;
         out
-    }
-
-    /// Newton's method in the plane through `point` with the normal `row`.
-    ///
-    /// The line search halves steps as in [`ModeEquations::solve`]. Returns the solution with
-    /// its unit tangent, on the side of `row`, and the iterations.
-    fn corrector(&mut self, mut point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
-        let settings = ModeSettings::default();
-        let size = self.size();
-        let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
-        let (mut bordered, mut right) = (vec![0.0; (size + 1) * (size + 1)], vec![0.0; size + 1]);
-        let start = point.clone();
-        let scale = self.units(&start.state, start.amplitude);
-        let norm = |r: &[f64]| r.iter().zip(&scale).map(|(r, s)| (r / s) * (r / s)).sum::<f64>().sqrt();
-        let evaluate = |this: &mut Self, point: &ModeArc, residual: &mut [f64], jacobian: &mut [f64]| {
-            this.evaluate(&point.state, (&start.state, point.amplitude), residual, Some(jacobian));
-            norm(residual)
-        };
-        let mut now = evaluate(self, &point, &mut residual, &mut jacobian);
-        let mut enough = settings.tolerance;
-        let mut iteration = 0;
-        while iteration <= settings.step_iterations {
-            interrupt::check();
-            let solved = now <= enough;
-            self.border(&point, &scale, &jacobian, row, &mut bordered);
-            if solved {
-                right.fill(0.0);
-                right[size] = 1.0;
-            } else {
-                for i in 0..size {
-                    right[i] = residual[i] / scale[i];
-                }
-                right[size] = 0.0;
-            }
-            let open = if self.may_be_singular { null_directions(&bordered, size + 1) } else { Vec::new() };
-            let mut sign = dense::solve_with_determinant_sign(&mut bordered, size + 1, &mut right)?;
-            if !open.is_empty() {
-                sign = 0.0;
-                min_norm_step(&mut right, open, &|one, other| self.inner(&point, one, other));
-            }
-            if solved {
-                let length = self.length(&point, &right);
-                if !(length > 0.0 && length.is_finite()) {
-                    return None;
-                }
-                right.iter_mut().for_each(|t| *t /= length);
-                point.tangent.copy_from_slice(&right);
-                point.determinant_sign = sign;
-                return Some((point, iteration));
-            }
-            iteration += 1;
-            let mut trial = point.clone();
-            let mut step = |this: &mut Self, fraction: f64| {
-                trial.clone_from(&point);
-                trial.shift(&right, -fraction);
-                let sensible = trial.state.omega > 0.0 && trial.amplitude.is_finite() && trial.amplitude > 0.0;
-                if sensible { evaluate(this, &trial, &mut residual, &mut jacobian) } else { f64::INFINITY }
-            };
-            match LineSearch::default().run(now, |fraction| step(self, fraction)) {
-                Some(after) => (point, now) = (trial, after),
-                None if now <= settings.rounded => {
-                    // rounding prevents a smaller residual
-                    enough = settings.rounded;
-                    now = evaluate(self, &point, &mut residual, &mut jacobian);
-                }
-                None => {
-                    let after = Some(step(self, 1.0))
-                        .filter(|after| bold && *after < NewtonSettings::default().divergence * now)?;
-                    (point, now) = (trial, after);
-                }
-            }
-        }
-        None
-    }
-
-    /// Sets `out` to the Jacobian by shape, forces, ω, ζ and `ln a`, in units of `scale`, with
-    /// the last row `row`.
-    fn border(&self, point: &ModeArc, scale: &[f64], jacobian: &[f64], row: &[f64], out: &mut [f64]) {
-        let size = self.size();
-        let motions = 2 * point.state.x.len();
-        for i in 0..size {
-            let from = &jacobian[i * size..(i + 1) * size];
-            let to = &mut out[i * (size + 1)..(i + 1) * (size + 1)];
-            let mut by_amplitude = 0.0;
-            for (k, x) in point.state.x.iter().enumerate() {
-                by_amplitude += from[2 * k] * x.re + from[2 * k + 1] * x.im;
-            }
-            for k in 0..size {
-                to[k] = from[k] / scale[i] * if k < motions { point.amplitude } else { 1.0 };
-            }
-            // amplitude and phase conditions depend on the shape alone
-            to[size] = if i + 2 < size { by_amplitude / scale[i] } else { 0.0 };
-        }
-        out[size * (size + 1)..].copy_from_slice(row);
     }
 }

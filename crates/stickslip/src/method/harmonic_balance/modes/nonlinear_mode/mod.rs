@@ -27,14 +27,11 @@ use crate::method::MethodError;
 use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
 use crate::method::harmonic_balance::equations::contact_parameter::contact_parameter;
 use crate::method::harmonic_balance::equations::regularization::{LEAST_EPSILON_RATIO, force_regularization};
-use crate::method::harmonic_balance::line_search::LineSearch;
 use crate::method::harmonic_balance::static_equilibrium::static_equilibrium_of;
 use crate::model::System;
 use nalgebra::DVector;
 use num_complex::Complex64;
-use stickslip_numerics::dense::{ProductShape, Transpose};
-use stickslip_numerics::min_norm::{min_norm_step, null_directions};
-use stickslip_numerics::{dense, interrupt};
+use stickslip_numerics::dense::{self, ProductShape, Transpose};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Settings of Newton's method for a nonlinear mode.
@@ -545,71 +542,10 @@ impl<'a> ModeEquations<'a> {
         }
         scaled
     }
-
-    /// Solves at amplitude `a` from `start`, whose motion is scaled to `a`. Forces along laws
-    /// of velocity keep their values, as in slip.
-    ///
-    /// Newton's method with a line search, as in forced vibration. If no halved step reduces
-    /// the residual, the full step is taken. It may break a cycle of slipping samples, or pass
-    /// the amplitude at which two modes coalesce.
-    pub fn solve(&mut self, start: &ModeState, before: f64, a: f64) -> Option<ModeState> {
-        let settings = ModeSettings::default();
-        let size = self.size();
-        let mut start = start.clone();
-        start.x.iter_mut().for_each(|x| *x *= a / before);
-        let mut state = start.clone();
-        let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
-        let scale = self.units(&start, a);
-        let norm = |residual: &[f64]| scaled_norm(&scale, residual);
-        self.evaluate(&state, (&start, a), &mut residual, Some(&mut jacobian));
-        let mut now = norm(&residual);
-        for _ in 0..settings.iterations {
-            interrupt::check();
-            if now <= settings.tolerance {
-                return Some(state);
-            }
-            for (row, scale) in scale.iter().enumerate() {
-                residual[row] /= scale;
-                jacobian[row * size..(row + 1) * size].iter_mut().for_each(|x| *x /= scale);
-            }
-            let open = if self.may_be_singular { null_directions(&jacobian, size) } else { Vec::new() };
-            if !dense::solve(&mut jacobian, size, &mut residual) {
-                return None;
-            }
-            let mut step = residual.clone();
-            if !open.is_empty() {
-                let motions = 2 * state.x.len();
-                min_norm_step(&mut step, open, &|one, other| {
-                    self.kinetic_inner_product(&one[..motions], &other[..motions])
-                });
-            }
-            let mut trial = state.clone();
-            let mut evaluate = |fraction: f64| {
-                trial.clone_from(&state);
-                for (value, d) in trial.x.iter_mut().chain(&mut trial.force).zip(step.chunks_exact(2)) {
-                    *value -= Complex64::new(d[0], d[1]) * fraction;
-                }
-                trial.omega -= step[size - 2] * fraction;
-                trial.damping -= step[size - 1] * fraction;
-                if trial.omega <= 0.0 {
-                    return f64::INFINITY;
-                }
-                self.evaluate(&trial, (&start, a), &mut residual, Some(&mut jacobian));
-                norm(&residual)
-            };
-            now = match LineSearch::default().run(now, &mut evaluate) {
-                Some(after) => after,
-                None if now <= settings.rounded => return Some(state),
-                None => Some(evaluate(1.0)).filter(|after| after.is_finite())?,
-            };
-            state = trial;
-        }
-        (now <= settings.rounded).then_some(state)
-    }
 }
 
 /// Returns the norm of a residual whose entries have these units.
-fn scaled_norm(units: &[f64], residual: &[f64]) -> f64 {
+pub(super) fn scaled_norm(units: &[f64], residual: &[f64]) -> f64 {
     residual.iter().zip(units).map(|(r, unit)| (r / unit) * (r / unit)).sum::<f64>().sqrt()
 }
 

@@ -57,16 +57,6 @@ impl ModeEquations<'_> {
         first >= others
     }
 
-    /// Returns the mass inner product of two changes of motion, summed over all harmonics.
-    pub(super) fn kinetic_inner_product(&self, one: &[f64], other: &[f64]) -> f64 {
-        let n = self.system.dofs();
-        let shape = |parts: &[f64]| -> Vec<Complex64> {
-            parts.chunks_exact(2).map(|part| Complex64::new(part[0], part[1])).collect()
-        };
-        let harmonics = one.chunks_exact(2 * n).zip(other.chunks_exact(2 * n));
-        harmonics.map(|(one, other)| self.mass_inner_product(&shape(one), &shape(other)).re).sum()
-    }
-
     /// Returns the contribution of the viscous dampers to the damping ratio. It is the energy
     /// that they dissipate per cycle relative to the energy that `2 ζ ω M` supplies for ζ = 1.
     pub fn viscous_damping_ratio(&self, state: &ModeState) -> f64 {
