@@ -1,6 +1,7 @@
 //! Peak tables for the terminal: the largest peak of every case first, equal sectors merged.
 
 use stickslip_study::dataset::{CellValues, Column, Table};
+use stickslip_study::results::place_and_sector;
 
 /// A peak of a case.
 struct PeakRow {
@@ -35,7 +36,7 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
             // Relative difference up to which the peaks of two sectors are equal: the accuracy
             // of peak refinement.
             let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * a.abs();
-            let place = without_sector_number(&names[row]);
+            let place = place_and_sector(&names[row]).map(|(place, _)| place);
             let alike = |peak: &&mut PeakRow| {
                 place.as_ref() == Some(&peak.place)
                     && near(peak.frequency, frequency)
@@ -65,14 +66,6 @@ pub(crate) fn worst_first(table: &Table) -> Option<Table> {
         },
     };
     Some(Table { name: table.name.clone(), columns: table.columns.iter().map(picked).collect() })
-}
-
-/// Returns the name of a place without its sector number: `blade.x` for `blade_3.x`.
-fn without_sector_number(name: &str) -> Option<String> {
-    let (node, direction) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
-    let (place, number) = node.rsplit_once('_')?;
-    number.parse::<usize>().ok()?;
-    Some(direction.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}")))
 }
 
 #[cfg(test)]

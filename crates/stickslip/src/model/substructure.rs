@@ -8,6 +8,7 @@ use crate::structure::reduction::{ReducedMatrices, ReductionError, Row, Structur
 use crate::structure::{
     BladeCache, ModalDamping, ReducedComponent, ReducedForm, Reduction, RingEntry, RingRow, SectorBasis, SectorCache,
 };
+use nalgebra::DMatrix;
 use std::sync::Arc;
 use stickslip_numerics::sparse::ModesError;
 
@@ -123,23 +124,14 @@ impl SubstructureParts {
         let damped = damping_law(substructure, &component).map(|damping| reduced.damped(&damping));
         let damped = damped.transpose().map_err(reduction_error)?;
         let reduced = damped.as_ref().unwrap_or(reduced);
-        let entries = |matrix: &nalgebra::DMatrix<f64>| -> Entries {
+        let entries = |matrix: &DMatrix<f64>| -> Entries {
             let all = (0..matrix.ncols()).flat_map(|k| (0..matrix.nrows()).map(move |i| (i, k)));
             all.map(|at| (at.0, at.1, matrix[at])).filter(|entry| entry.2 != 0.0).collect()
         };
         let ReducedMatrices { mass, damping, stiffness, ports, .. } = reduced;
-        let row = |port: usize| ports.row(port).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
-        let mut next = 0;
-        let of_place = |place: &Place| -> Vec<Row> {
-            if place.view_of.is_some() {
-                return Vec::new();
-            }
-            next += place.rows.len();
-            place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<_>>())
-        };
         Ok(SubstructureParts {
             names: (1..=reduced.dofs()).map(|number| format!("coordinate {number}")).collect(),
-            places: model.places.iter().map(of_place).collect(),
+            places: displacements(&model.places, ports),
             entries: [entries(mass), entries(damping), entries(stiffness)],
             ring: None,
             modes: None,
@@ -235,25 +227,30 @@ impl SubstructureParts {
         let ReducedForm::Ring(modes) = component.form() else { return Err(reduction_error(ReductionError::NoPorts)) };
         let damping = modes.damped(damping_law(substructure, &component).as_ref()).map_err(reduction_error)?;
         let own = |of: usize| modes.own.iter().enumerate().map(|(k, own)| (k, k, own[of])).collect();
-        let mut next = 0;
-        let of_place = |place: &Place| {
-            if place.view_of.is_some() {
-                return Vec::new();
-            }
-            next += place.rows.len();
-            let rows = (next - place.rows.len()..next)
-                .map(|row| modes.seen.row(row).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect());
-            place.displacements(&rows.collect::<Vec<Row>>())
-        };
         Ok(SubstructureParts {
             names: (1..=modes.own.len()).map(|number| format!("mode {number}")).collect(),
-            places: model.places.iter().map(of_place).collect(),
+            places: displacements(&model.places, &modes.seen),
             entries: [own(0), damping, own(1)],
             ring: None,
             modes: None,
             reduced: Some(component),
         })
     }
+}
+
+/// Returns the displacements of each place as weighted sums of the coordinates, from the rows of
+/// all observed displacements. A view of another place has none.
+fn displacements(places: &[Place], observed: &DMatrix<f64>) -> Vec<Vec<Row>> {
+    let row = |row: usize| observed.row(row).iter().copied().enumerate().filter(|(_, w)| *w != 0.0).collect();
+    let mut next = 0;
+    let of_place = |place: &Place| {
+        if place.view_of.is_some() {
+            return Vec::new();
+        }
+        next += place.rows.len();
+        place.displacements(&(next - place.rows.len()..next).map(row).collect::<Vec<Row>>())
+    };
+    places.iter().map(of_place).collect()
 }
 
 /// One sector as a part of a ring.

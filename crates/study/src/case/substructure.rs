@@ -231,7 +231,7 @@ pub(crate) fn place_on_element(table: &CompiledTable, values: &Values, model: &M
     if let Some(key) = ["dof", "dofs", "nodes", "sum"].into_iter().find(|key| table.entry(key).is_some()) {
         let message =
             format!("`of` makes this a place of a mass or a body, but `{key}` makes it a place of a structure");
-        return Err(problem(key, message).map_help("remove one of the two keys"));
+        return Err(Box::new(problem(key, message).help("remove one of the two keys")));
     }
     let of = values.text("of").unwrap_or_default();
     let masses = model.masses.iter().map(|mass| mass.name.as_str());
@@ -241,7 +241,7 @@ pub(crate) fn place_on_element(table: &CompiledTable, values: &Values, model: &M
             Some(near) => format!("did you mean `{near}`?"),
             None => "name a [[body]], or a [[mass]] with `directions`".to_owned(),
         };
-        return Err(problem("of", format!("there is no mass and no body `{}`", excerpt(of))).map_help(&help));
+        return Err(Box::new(problem("of", format!("there is no mass and no body `{}`", excerpt(of))).help(help)));
     }
     let view = View {
         offset: values.vector("offset"),
@@ -279,8 +279,10 @@ fn directions(table: &CompiledTable, values: &Values) -> Result<(Vec<String>, Ve
     let count = values.names("dofs").map(<[String]>::len).or(sums);
     if let Some(count) = count.filter(|count| *count > TRANSLATIONS.len()) {
         let key = if sums.is_some() { "sum" } else { "dofs" };
-        return Err(problem(key, format!("a node has at most three directions, but {count} rows are named"))
-            .map_help("for the mean of several nodes use nodes = [\"188\", \"189\"], for a weighted sum sum = { … }"));
+        return Err(Box::new(
+            problem(key, format!("a node has at most three directions, but {count} rows are named"))
+                .help("for the mean of several nodes use nodes = [\"188\", \"189\"], for a weighted sum sum = { … }"),
+        ));
     }
     let names = match (framed, &stated, values.names("dofs")) {
         (false, _, _) if values.names("dof").is_some() => stated.unwrap_or_default(),
@@ -297,27 +299,18 @@ fn directions(table: &CompiledTable, values: &Values) -> Result<(Vec<String>, Ve
     };
     let rows = if framed { owned(&TRANSLATIONS) } else { names.clone() };
     if framed && count.is_some_and(|count| count != TRANSLATIONS.len()) {
-        return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned()).map_help(
-            "for a plane structure name the rows in the order tangent, normal and remove the frame, or \
+        return Err(Box::new(
+            problem("normal", "a local frame needs three rows: those of x, y and z".to_owned()).help(
+                "for a plane structure name the rows in the order tangent, normal and remove the frame, or \
                 rotate them with sum = { … }",
+            ),
         ));
     }
     if let Some(count) = count.filter(|count| *count != names.len()) {
         let message = format!("{} names in `directions` for {count} rows", names.len());
-        return Err(problem("directions", message).map_help("give each row the name of its direction"));
+        return Err(Box::new(problem("directions", message).help("give each row the name of its direction")));
     }
     Ok((names, rows))
-}
-
-trait WithHelp {
-    fn map_help(self, help: &str) -> Self;
-}
-
-impl WithHelp for Box<Problem> {
-    fn map_help(mut self, help: &str) -> Self {
-        self.help = Some(help.to_owned());
-        self
-    }
 }
 
 fn build_place(table: &CompiledTable, values: &Values, component: &Component) -> Result<Place, Box<Problem>> {
@@ -329,8 +322,10 @@ fn build_place(table: &CompiledTable, values: &Values, component: &Component) ->
             [] => "the place has no row: one of `dof`, `dofs`, `nodes`, `sum` is needed".to_owned(),
             _ => format!("a place takes only one of `{}`", stated.join("`, `")),
         };
-        return Err(problem(stated.last().copied().unwrap_or("name"), message).map_help(
-            "write dof = \"1353.y\", dofs = [\"188.x\", \"188.y\", \"188.z\"], or nodes = [\"188\", \"189\"]",
+        return Err(Box::new(
+            problem(stated.last().copied().unwrap_or("name"), message).help(
+                "write dof = \"1353.y\", dofs = [\"188.x\", \"188.y\", \"188.z\"], or nodes = [\"188\", \"189\"]",
+            ),
         ));
     };
     let find = |name: &str| {
@@ -373,8 +368,9 @@ fn build_place(table: &CompiledTable, values: &Values, component: &Component) ->
             let framed = values.vector("normal").is_some();
             let ordered = if framed { in_frame_order(names) } else { Some(names.iter().collect()) };
             let ordered = ordered.ok_or_else(|| {
-                problem("normal", format!("a local frame needs the rows of x, y and z, not {}", names.join(", ")))
-                    .map_help("name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]")
+                let message = format!("a local frame needs the rows of x, y and z, not {}", names.join(", "));
+                let help = "name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]";
+                Box::new(problem("normal", message).help(help))
             })?;
             for name in ordered {
                 rows.push(vec![(find(name)?, 1.0)]);
@@ -384,17 +380,20 @@ fn build_place(table: &CompiledTable, values: &Values, component: &Component) ->
     let frame = match values.vector("normal") {
         Some(normal) => {
             if rows.len() != TRANSLATIONS.len() {
-                return Err(problem("normal", "a local frame needs three rows: those of x, y and z".to_owned())
-                    .map_help(
+                return Err(Box::new(
+                    problem("normal", "a local frame needs three rows: those of x, y and z".to_owned()).help(
                         "name them in dofs = [\"188.x\", \"188.y\", \"188.z\"], or the node in nodes = [\"188\"]",
-                    ));
+                    ),
+                ));
             }
             let frame = Frame::new(normal, values.vector("tangent"));
             Some(frame.map_err(|error| problem("normal", error.to_string()))?)
         }
         None if values.vector("tangent").is_some() => {
-            return Err(problem("tangent", "a local frame needs a normal; only `tangent` is stated".to_owned())
-                .map_help("add normal = [0, 0, 1]"));
+            return Err(Box::new(
+                problem("tangent", "a local frame needs a normal; only `tangent` is stated".to_owned())
+                    .help("add normal = [0, 0, 1]"),
+            ));
         }
         None => None,
     };

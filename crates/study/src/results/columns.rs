@@ -61,3 +61,20 @@ pub(crate) fn stick_fraction(joint: &str) -> String {
 pub(crate) fn open_fraction(joint: &str) -> String {
     format!("{joint}_open_fraction")
 }
+
+/// Returns the name of a ring place in its sector, and the sector number.
+///
+/// Returns `None` for a name without a sector number.
+///
+/// # Example
+/// ```
+/// use stickslip_study::results::place_and_sector;
+/// assert_eq!(place_and_sector("tip_12.x"), Some(("tip.x".to_owned(), 12)));
+/// assert_eq!(place_and_sector("blade"), None);
+/// ```
+pub fn place_and_sector(name: &str) -> Option<(String, usize)> {
+    let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
+    let (place, sector) = node.rsplit_once('_')?;
+    let place = along.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}"));
+    Some((place, sector.parse().ok()?))
+}

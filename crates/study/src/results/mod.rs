@@ -30,6 +30,7 @@ pub(crate) mod torsion_columns;
 mod typed;
 pub(crate) mod weibull;
 
+pub use columns::place_and_sector;
 pub use fitted_study::fitted_study;
 pub(crate) use typed::Results;
 pub use typed::{Evidence, Peak, ResultsError, worst_evidence};

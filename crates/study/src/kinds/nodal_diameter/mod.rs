@@ -3,7 +3,6 @@
 
 mod figure;
 
-use super::shared::disk_shape::place_and_sector;
 use super::shared::fields::{self, Fields};
 use super::shared::keys::no_requirements;
 use super::shared::stress::{self, STRESS, Stresses};
@@ -11,7 +10,7 @@ use crate::case::values::{Values, hertz};
 use crate::check::size::{PlannedSize, SizeInputs, TableShape};
 use crate::kinds::info::{KeyError, KindInfo};
 use crate::kinds::kind::{Kind, Probe};
-use crate::results::columns::{FREQUENCY, phase_of, shape_of};
+use crate::results::columns::{FREQUENCY, phase_of, place_and_sector, shape_of};
 use crate::results::dataset::FIELDS;
 use crate::results::table_builder::TableBuilder;
 use crate::run::work::{CONVERGED, Computed, PreparedCase, UnitResult, UnitSize, UnitTask};

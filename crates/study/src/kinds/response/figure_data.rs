@@ -1,9 +1,9 @@
 //! Data of a response figure: curves of places and joints, read from the tables.
 
 use crate::kinds::shared::contact_states::{self, ContactState};
-use crate::kinds::shared::disk_shape::{self, place_and_sector};
+use crate::kinds::shared::disk_shape;
 use crate::kinds::shared::points_to_doubt::PointsToDoubt;
-use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of};
+use crate::results::columns::{FREQUENCY as DRIVE, amplitude_of, phase_of, place_and_sector};
 use crate::results::dataset::{Axis, Column, Panel, Series, Style, Table, column_name};
 use crate::results::drawing::{CaseRows, FigureInput, join_title, numbers};
 use std::collections::{BTreeSet, HashMap};

@@ -3,6 +3,7 @@
 //! Displacements are drawn as distances from a circle, sector by sector. The picture shows
 //! nodal diameters and the participating blades.
 
+use crate::results::columns::place_and_sector;
 use crate::results::dataset::{Axis, Panel, Series};
 use crate::results::drawing::join_title;
 use std::f64::consts::TAU;
@@ -49,15 +50,6 @@ impl PlaceInSectors {
     fn largest(&self) -> f64 {
         self.sectors.iter().map(|(_, size, _)| *size).filter(|size| size.is_finite()).fold(0.0, f64::max)
     }
-}
-
-/// Returns the name of a ring place in its sector, and the sector number: `blade` and 3 for
-/// `blade_3`, `blade.x` and 3 for `blade_3.x`.
-pub(in crate::kinds) fn place_and_sector(name: &str) -> Option<(String, usize)> {
-    let (node, along) = name.split_once('.').map_or((name, None), |(node, along)| (node, Some(along)));
-    let (place, sector) = node.rsplit_once('_')?;
-    let place = along.map_or_else(|| place.to_owned(), |along| format!("{place}.{along}"));
-    Some((place, sector.parse().ok()?))
 }
 
 /// Length of the largest displacement as a share of the radius of the circle.
@@ -168,8 +160,6 @@ mod tests {
 
     #[test]
     fn places_of_a_ring_by_their_sector() {
-        assert_eq!(place_and_sector("tip_12.x"), Some(("tip.x".to_owned(), 12)));
-        assert_eq!(place_and_sector("blade"), None);
         let all = PlaceInSectors::from_ring([("a_0", 1.0, 0.0), ("b_0", 2.0, 0.0), ("a_1", 3.0, 0.0)]).unwrap();
         assert_eq!(
             all.iter().map(|around| (around.place.as_str(), around.sectors.len())).collect::<Vec<_>>(),
