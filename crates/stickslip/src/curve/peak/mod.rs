@@ -128,25 +128,117 @@ pub fn local_peaks(
     wanted: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
 ) -> Result<Vec<QuantityPeak>, MethodError> {
-    let tops = (1..points.len().saturating_sub(1)).flat_map(|i| {
+    let tops = maxima(points, &|_, quantity| quantity < wanted);
+    let found = refined(method, system, points, tops, quantities)?;
+    Ok(sorted(found.into_iter().map(|(_, peak)| peak).collect()))
+}
+
+/// Returns all local maxima of quantity 0, which is the largest of the others, among the inner
+/// `points`, refined, in order of frequency. `points` are in order of frequency.
+///
+/// Between three points, several quantities may have a peak. The peak of quantity 0 there is the
+/// highest of them.
+///
+/// # Errors
+/// The method does not support the system.
+///
+/// # Example
+/// ```
+/// use stickslip::curve::peak::{CurvePoint, envelope_peaks};
+/// use stickslip::method::{Method, event_driven::EventDriven};
+/// use stickslip::orbit::Orbit;
+/// let system = stickslip::model::example::blade_couple().assemble().unwrap();
+/// let amplitudes = |orbit: &Orbit| {
+///     let places: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
+///     [vec![places.iter().copied().fold(0.0, f64::max)], places].concat()
+/// };
+/// let mut solver = EventDriven.solver(&system).unwrap();
+/// let points: Vec<CurvePoint> = (0..9)
+///     .map(|i| solver.orbit(std::f64::consts::TAU * (120.5 + 0.2 * f64::from(i))).unwrap())
+///     .map(|orbit| CurvePoint::new(&orbit, &amplitudes))
+///     .collect();
+/// let peaks = envelope_peaks(&EventDriven, &system, &points, 3, &amplitudes).unwrap();
+/// assert!(peaks.iter().all(|peak| peak.peak.value >= peak.values[1]));
+/// ```
+pub fn envelope_peaks(
+    method: &dyn Method,
+    system: &System,
+    points: &[CurvePoint],
+    others: usize,
+    quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
+) -> Result<Vec<QuantityPeak>, MethodError> {
+    let tops = maxima(points, &|_, quantity| quantity == 0);
+    let mut found = refined(method, system, points, tops, quantities)?;
+    // Largest share of the highest value that a quantity reaches which is not searched. The vertex
+    // of its parabola is above its peak, or near it if the points are close to each other.
+    let share = 0.95;
+    // Quantities that reach this share of the largest one at its peak have been searched with it.
+    let equal = 1.0 - 1e-9;
+    let may_be_higher = |i: usize, quantity: usize| {
         let near = &points[i - 1..=i + 1];
-        let here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
-        // Number of peaks at one point that share a solver and its stored data. It is small
-        // enough to keep all threads busy, and does not depend on their number.
-        here.chunks(12).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
+        found.iter().filter(|(top, _)| top.abs_diff(i) <= 1).any(|(_, of)| {
+            (1..=others).contains(&quantity)
+                && of.values[quantity] < equal * of.peak.value
+                && vertex_value(near, quantity) >= share * of.peak.value
+        })
+    };
+    let candidates = refined(method, system, points, maxima(points, &may_be_higher), quantities)?;
+    for (top, peak) in &mut found {
+        for (_, other) in candidates.iter().filter(|(i, _)| i.abs_diff(*top) <= 1) {
+            let value = other.values[0];
+            if value > peak.peak.value {
+                *peak = QuantityPeak { quantity: 0, peak: Peak { value, ..other.peak }, ..other.clone() };
+            }
+        }
+    }
+    let mut peaks = sorted(found.into_iter().map(|(_, peak)| peak).collect());
+    peaks.dedup_by_key(|peak| peak.peak.omega);
+    Ok(peaks)
+}
+
+/// Returns the inner points at which some of the `wanted` quantities have a maximum, with these
+/// quantities.
+fn maxima(points: &[CurvePoint], wanted: &dyn Fn(usize, usize) -> bool) -> Vec<(usize, Vec<usize>)> {
+    let inner = 1..points.len().saturating_sub(1);
+    let tops = inner.map(|i| {
+        let quantities = 0..points[i].values.len();
+        let is_top = |quantity: &usize| is_maximum(&points[i - 1..=i + 1], *quantity) && wanted(i, *quantity);
+        (i, quantities.filter(is_top).collect::<Vec<usize>>())
     });
-    let tops: Vec<(&[CurvePoint], Vec<usize>)> = tops.collect();
-    let found: Vec<Result<Vec<QuantityPeak>, MethodError>> = tops
+    tops.filter(|(_, quantities)| !quantities.is_empty()).collect()
+}
+
+/// Refines maxima on all threads. Returns their points and peaks.
+fn refined(
+    method: &dyn Method,
+    system: &System,
+    points: &[CurvePoint],
+    tops: Vec<(usize, Vec<usize>)>,
+    quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
+) -> Result<Vec<(usize, QuantityPeak)>, MethodError> {
+    // Number of peaks at one point that share a solver and its stored data. It is small enough to
+    // keep all threads busy, and does not depend on their number.
+    let parts: Vec<(usize, &[usize])> =
+        tops.iter().flat_map(|(i, here)| here.chunks(12).map(move |some| (*i, some))).collect();
+    let found: Vec<Result<Vec<QuantityPeak>, MethodError>> = parts
         .par_iter()
-        .map(|(near, wanted)| Ok(refine(&mut *branch_following::solver(method, system)?, near, wanted, quantities)))
+        .map(|&(i, wanted)| {
+            let solver = &mut *branch_following::solver(method, system)?;
+            Ok(refine(solver, &points[i - 1..=i + 1], wanted, quantities))
+        })
         .collect();
     let mut peaks = Vec::new();
-    for some in found {
-        peaks.extend(some?);
+    for (some, (i, _)) in found.into_iter().zip(parts) {
+        peaks.extend(some?.into_iter().map(|peak| (i, peak)));
     }
-    // peaks at one point stay in the order of their quantities
-    peaks.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
     Ok(peaks)
+}
+
+/// Returns the peaks in order of frequency; peaks at one point stay in the order of their
+/// quantities.
+fn sorted(mut peaks: Vec<QuantityPeak>) -> Vec<QuantityPeak> {
+    peaks.sort_by(|a, b| a.peak.omega.total_cmp(&b.peak.omega));
+    peaks
 }
 
 /// Drops the series of the point before the last one, unless a peak search begins there. Series
@@ -207,6 +299,34 @@ mod tests {
             (peak.value / expected - 1.0).abs() < ReductionSettings::default().min_rise && peak.unresolved.is_none(),
             "{peak:?}"
         );
+    }
+
+    /// Two separate masses with resonances of |x| = F / (c ω) at 100.1 and 100.55 rad/s, half a
+    /// distance of the points apart. The first is the larger one at the points; the second has the
+    /// higher peak.
+    #[test]
+    fn the_largest_of_several_places_has_their_highest_peak() {
+        let mut model = Model::default();
+        for (name, omega, amplitude) in [("first", 100.1f64, 1.0), ("second", 100.55, 1.02)] {
+            model.masses.push(Mass::new(name, 1.0));
+            let stiffness = omega * omega;
+            model.springs.push(Spring { between: [name.to_owned(), GROUND.to_owned()], stiffness, damping: 1.0 });
+            model.forces.push(Force { on: name.to_owned(), amplitude, phase: 0.0, harmonic: 1 });
+        }
+        let system = model.assemble().unwrap();
+        let amplitudes = |orbit: &Orbit| {
+            let places: Vec<f64> = orbit.places.iter().map(|place| place.amplitude()).collect();
+            vec![places[0].max(places[1]), places[0], places[1]]
+        };
+        let mut solver = EventDriven.solver(&system).unwrap();
+        let mut point = |i: i32| CurvePoint::new(&solver.orbit(f64::from(i)).unwrap(), &amplitudes);
+        let points: Vec<CurvePoint> = (95..107).map(&mut point).collect();
+        assert!(points[5].values[0] > points[6].values[0] && points[5].values[0] == points[5].values[1]);
+        let peaks = envelope_peaks(&EventDriven, &system, &points, 2, &amplitudes).unwrap();
+        // F / (c √(k/m - c²/4m²))
+        let expected = 1.02 / f64::sqrt(100.55 * 100.55 - 0.25);
+        assert_eq!(peaks.len(), 1);
+        assert!((peaks[0].peak.value / expected - 1.0).abs() < 1e-6, "{:?} {expected}", peaks[0]);
     }
 
     /// Without damping, a slider of 2 N cannot bound the response to 10 N, since 4/π·2 N < 10 N.

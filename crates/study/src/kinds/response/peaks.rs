@@ -200,7 +200,11 @@ fn peaks_of(work: &UnitTask<'_>, points: Vec<CurvePoint>) -> Result<Vec<FoundPea
     // Amplitudes below this share of the largest are rounding.
     let moves = |peak: &Peak| peak.value > (1e-10 * largest).max(held_amplitude(&prepared.system, peak.omega));
     let quantities = |orbit: &Orbit| sought.quantities(orbit);
-    let mut inner = peak::local_peaks(&*prepared.method, &prepared.system, &points, wanted, &quantities)?;
+    let (method, system) = (&*prepared.method, &prepared.system);
+    let mut inner = match sought.named.len() {
+        0 => peak::local_peaks(method, system, &points, wanted, &quantities)?,
+        others => peak::envelope_peaks(method, system, &points, others, &quantities)?,
+    };
     inner.retain(|found| !is_end_of_plateau(&points, found.quantity, &found.peak));
     let inner = inner.into_iter().map(|found| {
         let mass = sought.mass(found.quantity, &found.values);
