@@ -258,7 +258,14 @@ impl Disk {
                 return Ok(());
             }
             let message = format!("there is no place `{place}` in a sector");
-            Err(ModelError { wrong_name: Some(place.to_owned()), ..ModelError::new(element, key, message) })
+            let adjacent = place.split_once('.').map(|(_, own)| own).filter(|own| known.contains(*own));
+            Err(match adjacent {
+                Some(own) => {
+                    let message = format!("{message}; for that of the next sector write `{NEXT}{own}`");
+                    ModelError::new(element, key, message)
+                }
+                None => ModelError { wrong_name: Some(place.to_owned()), ..ModelError::new(element, key, message) },
+            })
         };
         for (i, spring) in sector.springs.iter().enumerate() {
             spring.between.iter().try_for_each(|name| find(name, Element::Spring(i), "between"))?;

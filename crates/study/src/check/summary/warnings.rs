@@ -6,7 +6,7 @@ use crate::check::summary::mesh_fit::mesh_misfit;
 use crate::check::summary::structure::mass_along;
 use crate::check::summary::text::joint_of_direction;
 use crate::check::survey::SurveyedCase;
-use crate::compile::compiled::{CompiledTable, Environment};
+use crate::compile::compiled::Environment;
 use crate::results::notes::WARNING;
 use crate::syntax::expression::quantity_text;
 use crate::syntax::format::format_significant;
@@ -31,6 +31,7 @@ pub(super) fn all(study: &Study, of_kind: Vec<String>, cases: &[SurveyedCase]) -
     let component = cases[0].case.model.substructure.as_ref().map(|substructure| &substructure.component);
     warnings.extend(component.zip(study.structure.mesh.source.as_ref()).and_then(|(own, mesh)| mesh_misfit(own, mesh)));
     warnings.extend(unused(study));
+    warnings.extend(mistuned_without_effect(study));
     warnings.extend(ineffective_options(study, &cases[0]));
     if let Some(environment) = first_values(study) {
         warnings.extend(bare_numbers(study, &environment));
@@ -315,23 +316,37 @@ fn unused(study: &Study) -> Option<String> {
     }
 }
 
+/// Warns of a mistuned parameter on which no part of a sector depends.
+fn mistuned_without_effect(study: &Study) -> Option<String> {
+    let index = study.structure.lists.disk.as_ref()?.mistuned_parameter(&study.names)?;
+    let of_parts = with_dependencies(study, parameters_of_parts(study));
+    (!of_parts.contains(&index))
+        .then(|| format!("no part of a sector depends on `{}`, so its `mistuning` has no effect", study.names[index]))
+}
+
 /// Returns the parameters on which a value of the model, the study or the method depends.
 fn used_parameters(study: &Study) -> BTreeSet<usize> {
-    let mut open: Vec<usize> = Vec::new();
-    let mut from = |table: &CompiledTable| {
+    let mut open = parameters_of_parts(study);
+    let disk = study.structure.lists.disk.as_ref();
+    for table in [Some(&study.study), Some(&study.method), disk.map(|disk| &disk.table)].into_iter().flatten() {
         table.each_quantity(&mut |_, quantity, _| open.extend(quantity.expression.parameters()));
-    };
-    from(&study.study);
-    from(&study.method);
-    let lists = &study.structure.lists;
-    study.structure.matrices.iter().for_each(|matrices| from(&matrices.table));
-    for list in lists.all() {
-        list.iter().for_each(&mut from);
     }
-    if let Some(disk) = &lists.disk {
-        from(&disk.table);
+    open.extend(disk.and_then(|disk| disk.mistuned_parameter(&study.names)));
+    with_dependencies(study, open)
+}
+
+/// Returns the parameters in the values of masses, springs, joints and the other parts.
+fn parameters_of_parts(study: &Study) -> Vec<usize> {
+    let mut found = Vec::new();
+    let matrices = study.structure.matrices.iter().map(|matrices| &matrices.table);
+    for table in matrices.chain(study.structure.lists.all().into_iter().flatten()) {
+        table.each_quantity(&mut |_, quantity, _| found.extend(quantity.expression.parameters()));
     }
-    open.extend(lists.disk.iter().flat_map(|disk| disk.mistuned_parameter(&study.names)));
+    found
+}
+
+/// Returns these parameters and those on which they depend.
+fn with_dependencies(study: &Study, mut open: Vec<usize>) -> BTreeSet<usize> {
     let mut used = BTreeSet::new();
     while let Some(index) = open.pop() {
         if used.insert(index) {
