@@ -2,6 +2,7 @@
 
 use super::differences::{DIFFERENCES, FIRST};
 use crate::terminal;
+use std::collections::BTreeSet;
 use stickslip_study::dataset::{CellValues, Column, Dataset, Table};
 
 /// Returns the comparison with units and percentages. Quantities that are equal in all runs are
@@ -24,15 +25,20 @@ pub fn for_terminal(comparison: &Dataset) -> Dataset {
         }
         if table.name == DIFFERENCES {
             let same = shown_differences(table);
+            // Maximum number of names: an orbit of a disk has a hundred equal columns.
+            let most = 8;
+            let more = same.len().saturating_sub(most);
+            let more = if more > 0 { format!(", and {more} more") } else { String::new() };
             if !same.is_empty() {
-                formatted.notes.push(format!("Equal in all runs: {}.", same.join(", ")));
+                let named = &same[..same.len().min(most)];
+                formatted.notes.push(format!("Equal in all runs: {}{more}.", named.join(", ")));
             }
         }
     }
     formatted
 }
 
-/// Formats the differences. Returns the names of columns without any difference.
+/// Formats the differences. Returns the names of columns without any difference in all runs.
 fn shown_differences(table: &mut Table) -> Vec<String> {
     let words = |name: &str| match table.column(name).map(|column| &column.values) {
         Some(CellValues::Text(words)) => words.clone(),
@@ -50,12 +56,25 @@ fn shown_differences(table: &mut Table) -> Vec<String> {
     let shown = differ.iter().map(|row| terminal::quantity(&column_of(*row), differences[*row]));
     made.push(Column::texts("largest_difference", shown.collect()));
     made.push(Column::texts("relative", differ.iter().map(|row| percent(relative[*row], false)).collect()));
-    made.push(Column::texts("at", of(&places).iter().map(|place| rounded(place)).collect()));
+    made.push(Column::texts("at", without_common_parts(of(&places).iter().map(|place| rounded(place)).collect())));
     made.push(Column::texts("how", of(&ways)));
     table.columns = made;
-    let mut names: Vec<String> = same.iter().map(|row| format!("{} of {}", columns[*row], tables[*row])).collect();
-    names.dedup();
-    names
+    let name = |row: &usize| format!("{} of {}", columns[*row], tables[*row]);
+    let different: BTreeSet<String> = differ.iter().map(name).collect();
+    let mut listed = BTreeSet::new();
+    same.iter().map(name).filter(|name| !different.contains(name) && listed.insert(name.clone())).collect()
+}
+
+/// Removes the values that are the same in all places, such as `frequency_Hz = 121` of the only
+/// orbit, because a narrow column shows only one value. The table file has all of them.
+fn without_common_parts(places: Vec<String>) -> Vec<String> {
+    let parts: Vec<Vec<&str>> = places.iter().map(|place| place.split(", ").collect()).collect();
+    let is_common = |part: &str| parts.len() > 1 && parts.iter().all(|place| place.contains(&part));
+    let shortened = parts.iter().zip(&places).map(|(parts, place)| {
+        let own: Vec<&str> = parts.iter().copied().filter(|part| !is_common(part)).collect();
+        if own.is_empty() { place.clone() } else { own.join(", ") }
+    });
+    shortened.collect()
 }
 
 /// Rounds the numbers in a text.
@@ -102,6 +121,9 @@ mod tests {
         assert_eq!(quantity("blade1_amplitude_m", 4.987_65e-5), "49.9 µm");
         assert_eq!(quantity("blade1_receptance_m_per_N", 4.7e-4), "470 µm/N");
         assert_eq!(quantity("slip_fraction", 0.038_24), "0.0382");
+        let places = ["f_Hz = 121, t_s = 0.1", "f_Hz = 121, t_s = 0.2"].map(str::to_owned);
+        assert_eq!(without_common_parts(places.to_vec()), ["t_s = 0.1", "t_s = 0.2"]);
+        assert_eq!(without_common_parts(places[..1].to_vec()), places[..1]);
         assert_eq!(rounded("Ft_N = 6.0, time_s = 0.030387205387205383"), "Ft_N = 6, time_s = 0.03038721");
     }
 }
