@@ -9,9 +9,9 @@
 //! range or points. Once all joints stick, every smaller motion is a multiple of the last one.
 //! The requested points are solved from neighbouring states of the continuation.
 //! If the curve ends above the smallest amplitude, a second continuation proceeds upwards from
-//! the smallest amplitude. It begins at the mode of the same number with all joints linearized
-//! for small motion. Under constant forces only this second continuation is used, because they
-//! may press bodies together that have no large motion.
+//! the smallest amplitude. It begins at the mode of the most similar shape with all joints
+//! linearized for small motion. Under constant forces only this second continuation is used,
+//! because they may press bodies together that have no large motion.
 //!
 //! Friction can bring two frequencies together, so that two modes nearly coalesce:
 //! [`Mode::coalescences`]. Below this amplitude there are two modes again, with other shapes.
@@ -210,7 +210,12 @@ impl ModeBranches {
         falling.drop_other_mode(equations);
         let end = falling.smallest_amplitude().min(high);
         let is_sought = rising.is_none() && falling.ended.is_some() && end > low;
-        let below = if is_sought { ModeCurve::from_small_amplitude(equations, request.mode, low, end) } else { None };
+        let below = if is_sought {
+            let last = falling.last_state().and_then(|last| equations.most_similar_small_mode(last, request.mode));
+            ModeCurve::from_small_amplitude(equations, last.unwrap_or(request.mode), low, end)
+        } else {
+            None
+        };
         let reaches_end = |below: &&ModeCurve| below.largest_amplitude() >= end && end < high;
         if below.as_ref().filter(reaches_end).is_some_and(|below| !falling.meets(below, equations)) {
             falling.ended = Some(ModeEnd { at: end, reason: ModeEndCause::Apart });

@@ -59,8 +59,8 @@ pub enum ModeEndCause {
     /// The curve from small amplitudes is another motion where it should meet the one from large
     /// amplitudes.
     #[error(
-        "the curve from large amplitudes ends there; the rows below follow the mode of this number from small \
-         amplitudes, which is another motion; see also the neighbouring modes"
+        "the curve from large amplitudes ends there; the rows below follow the stuck mode of the most similar shape, \
+         which is another motion where they meet; see also the neighbouring modes"
     )]
     Apart,
     /// The maximum number of steps is reached.
@@ -345,6 +345,11 @@ impl ModeCurve {
     /// Tells whether the mode is one of the two travelling waves of a pair.
     pub(super) fn travels(&self) -> bool {
         self.travels
+    }
+
+    /// Returns the motion with the smallest amplitude on the curve.
+    pub(super) fn last_state(&self) -> Option<&ModeState> {
+        self.arcs.iter().min_by(|a, b| a.amplitude.total_cmp(&b.amplitude)).map(|arc| &arc.state)
     }
 
     /// Returns the smallest amplitude on the curve.

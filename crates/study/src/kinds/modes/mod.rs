@@ -42,8 +42,9 @@ pub(super) const KIND: Kind = Kind {
             required(
                 "amplitude",
                 ValueType::Table(AMPLITUDE),
-                "amplitude of the place that moves most in the mode of the structure without joints; under constant \
-                 forces, in the mode of small motions about equilibrium",
+                "size of the motion, as the amplitude of the place that moves most in the mode of the structure without \
+                 joints with the same `φᵀ M φ`; the amplitudes of the places are in the table. Under constant forces the \
+                 mode of small motions about equilibrium replaces that without joints",
                 "{ from = \"1 um\", to = \"10 mm\" }",
             ),
             default("mode", ValueType::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),
@@ -275,8 +276,8 @@ fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
         .collect();
     if mode.is_travelling_wave {
         let text = "two modes have this frequency, and any combination of them is a mode while the joints stick. The \
-            travelling wave is computed: equal places of all sectors have equal amplitudes with a phase shift. The \
-            other mode is the wave in the opposite direction. Standing waves slip differently.";
+            travelling wave is computed: in a ring of equal sectors, equal places have equal amplitudes with a phase \
+            shift. The other mode is the wave in the opposite direction. Standing waves slip differently.";
         remarks.push(text.to_owned());
     }
     if let Some(point) = mode.points.iter().rfind(|point| point.damping > 1.0) {

@@ -124,8 +124,8 @@ impl ModeEquations<'_> {
     /// tangent on the side of `row`, and the Newton iterations.
     fn corrected_point(&mut self, point: ModeArc, row: &[f64], bold: bool) -> Option<(ModeArc, usize)> {
         let iterations = ModeSettings::default().step_iterations;
-        let found = self.newton(point, row, NewtonLimits { iterations, bold })?;
-        let (mut tangent, determinant_sign) = self.direction(&found, row)?;
+        let mut found = self.newton(point, Some(row), NewtonLimits { iterations, bold })?;
+        let (mut tangent, determinant_sign) = self.direction(&mut found, row)?;
         let length = self.length(&found.point, &tangent);
         if !(length > 0.0 && length.is_finite()) {
             return None;

@@ -180,10 +180,7 @@ impl ModeEquations<'_> {
         let mut square = (structure.stiffness().amax() + of_joints) / structure.mass().amax();
         let mut found = None;
         for _ in 0..settings.iterations {
-            let omega = square.sqrt();
-            let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
-            stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
-            self.add_equilibrium_stiffness(omega, &mut stiffness);
+            let stiffness = self.small_motion_stiffness(square.sqrt());
             let eigen = eigen::symmetric(&inverse * stiffness.map(|k| k.re) * inverse.transpose())?;
             let mut order: Vec<usize> = (0..n).collect();
             order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
@@ -220,6 +217,43 @@ impl ModeEquations<'_> {
             Some(wave) => SmallMode { state: motion(wave), standing: Some(motion(standing)) },
             None => SmallMode { state: motion(standing), standing: None },
         })
+    }
+
+    /// Returns the number of the linear mode of small motions about the equilibrium whose shape is
+    /// the most similar to that of a motion. Of modes with equal frequencies, it is `preferred` if
+    /// that is one of them.
+    ///
+    /// Modes without joints have other numbers if joints alone hold a body, or if joints change the
+    /// sequence of the frequencies.
+    pub fn most_similar_small_mode(&mut self, state: &ModeState, preferred: usize) -> Option<usize> {
+        let settings = LinearModeSettings::default();
+        let structure = self.system.structure();
+        let lower = structure.mass().clone().cholesky()?.l();
+        let inverse = lower.solve_lower_triangular(&DMatrix::identity(structure.dofs(), structure.dofs()))?;
+        let stiffness = self.small_motion_stiffness(state.omega).map(|k| k.re);
+        let eigen = eigen::symmetric(&inverse * stiffness * inverse.transpose())?;
+        let x = DVector::from_column_slice(self.first_harmonic(state));
+        let parts = [x.map(|x| x.re), x.map(|x| x.im)].map(|part| lower.transpose() * part);
+        let share = |k: usize| parts.iter().map(|part| eigen.eigenvectors.column(k).dot(part).powi(2)).sum::<f64>();
+        let mut modes: Vec<(f64, f64)> = (0..x.len()).map(|k| (eigen.eigenvalues[k], share(k))).collect();
+        modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let equal = |a: &(f64, f64), b: &(f64, f64)| b.0 - a.0 <= settings.equal_frequencies * b.0.abs();
+        let mut first = 0;
+        let groups = modes.chunk_by(equal).map(|group| {
+            first += group.len();
+            (first - group.len()..first, group.iter().map(|mode| mode.1).sum::<f64>())
+        });
+        let (most_similar, _) = groups.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(if most_similar.contains(&preferred) { preferred } else { most_similar.start })
+    }
+
+    /// Returns the complex stiffness for small motions about the equilibrium, N/m.
+    fn small_motion_stiffness(&mut self, omega: f64) -> DMatrix<Complex64> {
+        let structure = self.system.structure();
+        let mut stiffness = structure.stiffness().map(|k| Complex64::new(k, 0.0));
+        stiffness += structure.damping().map(|c| Complex64::new(0.0, omega * c));
+        self.add_equilibrium_stiffness(omega, &mut stiffness);
+        stiffness
     }
 
     /// Adds the complex stiffness of the joints for small motions about the equilibrium, N/m: the

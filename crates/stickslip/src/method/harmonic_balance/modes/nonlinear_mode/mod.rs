@@ -588,6 +588,29 @@ mod tests {
         model.assemble().unwrap()
     }
 
+    /// A small mass on a big one, held by its joint alone. Without the joint, the free motion of
+    /// the small mass is the first mode. With the stiff joint, both masses move in the first mode.
+    #[test]
+    fn the_stuck_mode_of_the_most_similar_shape_has_another_number() {
+        let name = |i: usize| format!("m{i}");
+        let law: SharedLaw = Arc::new(Jenkins { stiffness: 100.0, limit: 0.3 });
+        let model = Model {
+            masses: vec![Mass::new(name(0), 1.0), Mass::new(name(1), 0.01)],
+            springs: vec![Spring { between: [name(0), GROUND.into()], stiffness: 1.0, damping: 0.02 }],
+            joints: vec![Joint { name: "j".into(), between: [name(0), name(1)], law }],
+            ..Model::default()
+        };
+        let system = model.assemble().unwrap();
+        let mut equations = ModeEquations::new(&system, 3, 64).unwrap();
+        let linear = equations.linear_modes();
+        assert!(linear[0].squared_frequency == 0.0 && (linear[1].squared_frequency - 1.0).abs() < 1e-3);
+        let state = equations.linear_state(&linear[1], 1.0).unwrap();
+        assert_eq!(equations.most_similar_small_mode(&state, 1), Some(0));
+        let stuck = equations.small_amplitude_mode(0, 1.0).unwrap().state;
+        assert!((stuck.omega - 1.01f64.sqrt().recip()).abs() < 1e-4, "{}", stuck.omega);
+        assert_eq!(equations.most_similar_small_mode(&stuck, 1), Some(0));
+    }
+
     /// Newton's method converges quadratically if forces depend on the frequency of the motion:
     /// bristles with dampers, creep, viscous terms.
     #[test]
