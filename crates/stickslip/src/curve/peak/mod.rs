@@ -11,7 +11,7 @@ use super::branch_following;
 use crate::method::{Method, MethodError, Solver};
 use crate::model::System;
 use crate::orbit::Orbit;
-use bracket::{Bracket, refine, vertex_value};
+use bracket::{Bracket, highest_inner, refine, vertex_value};
 pub use point::{CurvePoint, Peak, QuantityPeak, UnresolvedPeak};
 use rayon::prelude::*;
 
@@ -128,9 +128,23 @@ pub fn local_peaks(
     wanted: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
 ) -> Result<Vec<QuantityPeak>, MethodError> {
-    let tops = maxima(points, &|_, quantity| quantity < wanted);
-    let found = refined(method, system, points, tops, quantities)?;
-    Ok(sorted(found.into_iter().map(|(_, peak)| peak).collect()))
+    let tops = (1..points.len().saturating_sub(1)).flat_map(|i| {
+        let near = &points[i - 1..=i + 1];
+        let here: Vec<usize> = (0..wanted).filter(|&quantity| is_maximum(near, quantity)).collect();
+        // Number of peaks at one point that share a solver and its stored data. It is small
+        // enough to keep all threads busy, and does not depend on their number.
+        here.chunks(12).map(|some| (near, some.to_vec())).collect::<Vec<_>>()
+    });
+    let tops: Vec<(&[CurvePoint], Vec<usize>)> = tops.collect();
+    let found: Vec<Result<Vec<QuantityPeak>, MethodError>> = tops
+        .par_iter()
+        .map(|(near, wanted)| Ok(refine(&mut *branch_following::solver(method, system)?, near, wanted, quantities)))
+        .collect();
+    let mut peaks = Vec::new();
+    for some in found {
+        peaks.extend(some?);
+    }
+    Ok(sorted(peaks))
 }
 
 /// Returns all local maxima of quantity 0, which is the largest of the others, among the inner
@@ -167,71 +181,55 @@ pub fn envelope_peaks(
     others: usize,
     quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
 ) -> Result<Vec<QuantityPeak>, MethodError> {
-    let tops = maxima(points, &|_, quantity| quantity == 0);
-    let mut found = refined(method, system, points, tops, quantities)?;
-    // Largest share of the highest value that a quantity reaches which is not searched. The vertex
-    // of its parabola is above its peak, or near it if the points are close to each other.
-    let share = 0.95;
-    // Quantities that reach this share of the largest one at its peak have been searched with it.
-    let equal = 1.0 - 1e-9;
-    let may_be_higher = |i: usize, quantity: usize| {
-        let near = &points[i - 1..=i + 1];
-        found.iter().filter(|(top, _)| top.abs_diff(i) <= 1).any(|(_, of)| {
-            (1..=others).contains(&quantity)
-                && of.values[quantity] < equal * of.peak.value
-                && vertex_value(near, quantity) >= share * of.peak.value
+    let inner = 1..points.len().saturating_sub(1);
+    let tops: Vec<usize> = inner.filter(|&i| is_maximum(&points[i - 1..=i + 1], 0)).collect();
+    let found: Vec<Result<QuantityPeak, MethodError>> = tops
+        .par_iter()
+        .map(|&i| {
+            let solver = &mut *branch_following::solver(method, system)?;
+            Ok(envelope_peak(solver, points, i, others, quantities))
         })
-    };
-    let candidates = refined(method, system, points, maxima(points, &may_be_higher), quantities)?;
-    for (top, peak) in &mut found {
-        for (_, other) in candidates.iter().filter(|(i, _)| i.abs_diff(*top) <= 1) {
-            let value = other.values[0];
-            if value > peak.peak.value {
-                *peak = QuantityPeak { quantity: 0, peak: Peak { value, ..other.peak }, ..other.clone() };
-            }
-        }
-    }
-    let mut peaks = sorted(found.into_iter().map(|(_, peak)| peak).collect());
+        .collect();
+    let mut peaks = sorted(found.into_iter().collect::<Result<_, _>>()?);
     peaks.dedup_by_key(|peak| peak.peak.omega);
     Ok(peaks)
 }
 
-/// Returns the inner points at which some of the `wanted` quantities have a maximum, with these
-/// quantities.
-fn maxima(points: &[CurvePoint], wanted: &dyn Fn(usize, usize) -> bool) -> Vec<(usize, Vec<usize>)> {
-    let inner = 1..points.len().saturating_sub(1);
-    let tops = inner.map(|i| {
-        let quantities = 0..points[i].values.len();
-        let is_top = |quantity: &usize| is_maximum(&points[i - 1..=i + 1], *quantity) && wanted(i, *quantity);
-        (i, quantities.filter(is_top).collect::<Vec<usize>>())
-    });
-    tops.filter(|(_, quantities)| !quantities.is_empty()).collect()
-}
-
-/// Refines maxima on all threads. Returns their points and peaks.
-fn refined(
-    method: &dyn Method,
-    system: &System,
+/// Returns the peak of quantity 0 next to point `i`, at which it has a maximum. The other quantities
+/// may have a higher peak between this point and the next but one on either side.
+fn envelope_peak(
+    solver: &mut dyn Solver,
     points: &[CurvePoint],
-    tops: Vec<(usize, Vec<usize>)>,
-    quantities: &(dyn Fn(&Orbit) -> Vec<f64> + Sync),
-) -> Result<Vec<(usize, QuantityPeak)>, MethodError> {
-    // Number of peaks at one point that share a solver and its stored data. It is small enough to
-    // keep all threads busy, and does not depend on their number.
-    let parts: Vec<(usize, &[usize])> =
-        tops.iter().flat_map(|(i, here)| here.chunks(12).map(move |some| (*i, some))).collect();
-    let found: Vec<Result<Vec<QuantityPeak>, MethodError>> = parts
-        .par_iter()
-        .map(|&(i, wanted)| {
-            let solver = &mut *branch_following::solver(method, system)?;
-            Ok(refine(solver, &points[i - 1..=i + 1], wanted, quantities))
-        })
-        .collect();
-    let mut peaks = Vec::new();
-    for (some, (i, _)) in found.into_iter().zip(parts) {
-        peaks.extend(some?.into_iter().map(|peak| (i, peak)));
+    i: usize,
+    others: usize,
+    quantities: &dyn Fn(&Orbit) -> Vec<f64>,
+) -> QuantityPeak {
+    // A quantity is searched only if the vertex of its parabola reaches this fraction of the
+    // highest value. Orbits that the search for quantity 0 added predict it well.
+    let share = 0.98;
+    let mut bracket = Bracket::new(&points[i - 1..=i + 1]);
+    bracket.refine(solver, 0, quantities);
+    let mut highest = bracket.peak(0);
+    bracket.points.splice(0..0, i.checked_sub(2).map(|before| points[before].clone()));
+    bracket.points.extend(points.get(i + 2).cloned());
+    let mut candidates: Vec<usize> = (1..=others).collect();
+    candidates.sort_by(|&a, &b| bracket.vertex_value(b).total_cmp(&bracket.vertex_value(a)));
+    for quantity in candidates {
+        let top = highest_inner(&bracket.points, quantity);
+        // a quantity that is the largest one at the peak has been searched with it
+        let is_higher = bracket.points[top].omega != highest.peak.omega
+            && is_maximum(&bracket.points[top - 1..=top + 1], quantity)
+            && bracket.vertex_value(quantity) >= share * highest.peak.value;
+        if is_higher {
+            bracket.refine(solver, quantity, quantities);
+            let found = bracket.peak(quantity);
+            if found.values[0] > highest.peak.value {
+                let peak = Peak { value: found.values[0], ..found.peak };
+                highest = QuantityPeak { quantity: 0, peak, ..found };
+            }
+        }
     }
-    Ok(peaks)
+    highest
 }
 
 /// Returns the peaks in order of frequency; peaks at one point stay in the order of their
