@@ -195,8 +195,8 @@ pub fn envelope_peaks(
     Ok(peaks)
 }
 
-/// Returns the peak of quantity 0 next to point `i`, at which it has a maximum. The other quantities
-/// may have a higher peak between this point and the next but one on either side.
+/// Returns the peak of quantity 0 next to point `i`, at which it has a maximum. Another quantity
+/// may have a higher peak up to two points away.
 fn envelope_peak(
     solver: &mut dyn Solver,
     points: &[CurvePoint],

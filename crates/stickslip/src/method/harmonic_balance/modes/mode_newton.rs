@@ -67,7 +67,8 @@ impl ModeEquations<'_> {
             self.solve_bordered(&point, (&jacobian, &units), row, (&mut bordered, &mut step))?;
             iterations += 1;
             let mut trial = point.clone();
-            // whole steps are usual; shorter ones are tried without the Jacobian, most of the time
+            // The Jacobian takes most of the time of an evaluation, and most steps are whole.
+            // Shorter steps are tried without it.
             let mut is_whole = true;
             let mut try_fraction = |fraction: f64| {
                 is_whole = fraction == 1.0;
