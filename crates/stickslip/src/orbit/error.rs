@@ -481,7 +481,11 @@ fn resonance_advice(resonance: f64) -> String {
         return "some bodies have no support; add a spring, or a constant force or preload that closes their contacts"
             .to_owned();
     }
-    format!("its motion is unbounded at {}; add damping, or choose another frequency", hertz(resonance))
+    format!(
+        "its motion is unbounded at {}; add damping, or choose another frequency; a part without mass that only \
+         contacts hold needs a mass or a soft spring",
+        hertz(resonance)
+    )
 }
 
 impl OrbitError {
