@@ -53,6 +53,15 @@ pub fn map<T: Send, R: Send>(items: impl IntoIterator<Item = T>, threads: usize,
     results.into_iter().map(|(_, result)| result).collect()
 }
 
+/// Returns `f` of every item of an array as [`map`] does.
+///
+/// # Panics
+/// Unwinds with the reason of an item that panics.
+pub fn map_array<T: Send, R: Send, const N: usize>(items: [T; N], threads: usize, f: impl Fn(T) -> R + Sync) -> [R; N] {
+    let Ok(results) = map(items, threads, f).try_into() else { unreachable!("every item has a result") };
+    results
+}
+
 /// Returns `f` of every item as [`map`] does.
 ///
 /// # Errors

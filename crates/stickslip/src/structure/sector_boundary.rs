@@ -13,6 +13,8 @@ use super::reduction::{FullStructure, ReductionError, Row, StructureDamping};
 use super::sector::{symmetric_wave_entries, wave_entries};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
+use std::sync::{Arc, OnceLock};
+use stickslip_numerics::parallel::map_array;
 use stickslip_numerics::sparse::{SparseMatrix, SymbolicAnalysis};
 
 /// The coupling between the two sides of a sector.
@@ -278,6 +280,8 @@ pub(crate) struct CyclicSector {
     /// Entries of the damping matrix, if any.
     pub damping: Option<Vec<RingEntry>>,
     pub stiffness: Vec<RingEntry>,
+    /// Analyses of the matrices of real and of complex waves.
+    analyses: [OnceLock<Arc<SymbolicAnalysis>>; 2],
 }
 
 impl CyclicSector {
@@ -300,8 +304,10 @@ impl CyclicSector {
             .collect();
         let part = |matrix: &SparseMatrix| eliminated(matrix, &rows);
         let symmetric = |matrix: &SparseMatrix| symmetrized(part(matrix));
-        let (mass, damping, stiffness) = (symmetric(mass), damping.map(part), symmetric(stiffness));
-        CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness }
+        let [mass, stiffness] = map_array([mass, stiffness], rayon::current_num_threads(), symmetric);
+        let damping = damping.map(part);
+        let analyses = Default::default();
+        CyclicSector { sectors, dofs: kept.len(), rows, kept, mass, damping, stiffness, analyses }
     }
 
     /// Returns the matrix of a sector with the adjacent sectors fixed.
@@ -357,7 +363,8 @@ impl CyclicSector {
             None => StructureDamping::Rayleigh { mass: 0.0, stiffness: 0.0 },
         };
         let symmetric = |entries: &[RingEntry]| sparse(symmetric_wave_entries(entries, n, diameter, sectors));
-        let whole = FullStructure::without_ports(symmetric(&self.mass)?, damping, symmetric(&self.stiffness)?)?;
+        let (mass, stiffness) = (symmetric(&self.mass)?, symmetric(&self.stiffness)?);
+        let whole = FullStructure::from_valid(mass, damping, stiffness, self.analysis(copies)?);
         let mut ports = vec![Row::new(); copies * seen.len()];
         for (p, row) in seen.iter().enumerate() {
             let all = self.row(row).into_iter().map(|(at, shift, weight)| (p, at, shift, weight));
@@ -367,6 +374,25 @@ impl CyclicSector {
             }
         }
         whole.with_ports(ports)
+    }
+
+    /// Returns the analysis of the matrices of all real waves (one copy of the rows) or of all
+    /// complex ones (two copies).
+    fn analysis(&self, copies: usize) -> Result<Arc<SymbolicAnalysis>, ReductionError> {
+        if let Some(known) = self.analyses[copies - 1].get() {
+            return Ok(known.clone());
+        }
+        let n = self.dofs;
+        let matrices = [Some(&self.mass), Some(&self.stiffness), self.damping.as_ref()];
+        let entries = matrices.into_iter().flatten().flatten();
+        // entries within a sector have no imaginary part; in a wave, others may cancel
+        let triplets = entries.flat_map(|&(row, column, shift, _)| {
+            let blocks = (0..copies).flat_map(move |i| (0..copies).map(move |k| (i, k)));
+            let blocks = blocks.filter(move |(i, k)| i == k || shift != 0);
+            blocks.map(move |(i, k)| (i * n + row, k * n + column, 1.0))
+        });
+        let pattern = SparseMatrix::from_triplets(copies * n, triplets).map_err(|_| ReductionError::OutOfRange)?;
+        Ok(self.analyses[copies - 1].get_or_init(|| Arc::new(SymbolicAnalysis::new(&[&pattern]))).clone())
     }
 
     /// Returns the stiffness change per unit `δ` if the component's rows `blade` have their

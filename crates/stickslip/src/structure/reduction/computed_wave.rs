@@ -71,8 +71,6 @@ impl ComputedWave {
     /// a sector.
     pub fn vectors(&mut self, order: usize, sector_dofs: usize) -> Result<&[f64], ReductionError> {
         if self.vectors.as_ref().is_none_or(|known| known.order < order) {
-            // a request for more than the first order is followed by one for the third
-            let order = if self.vectors.is_some() { order.max(3) } else { order };
             let whole = self.whole.as_ref().ok_or(ReductionError::NoPorts)?;
             let single = self.single_modes(whole, sector_dofs);
             let mut columns: Vec<f64> = single.iter().flat_map(|&mode| self.modes.shape(mode)).copied().collect();

@@ -293,7 +293,17 @@ impl FullStructure {
         damping.check()?;
         let analysed: Vec<&SparseMatrix> = [Some(&stiffness), Some(&mass), own].into_iter().flatten().collect();
         let analysis = Arc::new(SymbolicAnalysis::new(&analysed));
-        Ok(FullStructure { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis })
+        Ok(FullStructure::from_valid(mass, damping, stiffness, analysis))
+    }
+
+    /// Creates a structure without ports from valid matrices and their analysis.
+    pub(super) fn from_valid(
+        mass: SparseMatrix,
+        damping: StructureDamping,
+        stiffness: SparseMatrix,
+        analysis: Arc<SymbolicAnalysis>,
+    ) -> Self {
+        FullStructure { mass: Arc::new(mass), damping, stiffness: Arc::new(stiffness), ports: Vec::new(), analysis }
     }
 
     /// Returns the same structure with other ports; the matrices are shared.

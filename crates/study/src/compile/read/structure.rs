@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use stickslip::structure::{Component, StructureError};
 use stickslip_formats::{self as formats, names};
+use stickslip_numerics::parallel::map_array;
 use stickslip_numerics::sparse::SparseMatrix;
 
 impl Reader {
@@ -128,14 +129,15 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<ReadStructure, Problem>
         matrix.map(|matrix| Some((key, matrix))).map_err(|(message, help)| problem(key, message).help(help))
     };
     let missing = |key| problem(key, "the file is missing".to_owned());
-    let stiffness = one("stiffness")?.ok_or_else(|| missing("stiffness"))?;
+    let [stiffness, mass] = map_array(["stiffness", "mass"], rayon::current_num_threads(), one);
+    let stiffness = stiffness?.ok_or_else(|| missing("stiffness"))?;
     // some programs leave out empty rows; the rows of the stiffness matrix determine the order
     let ordered = |(key, matrix): KeyedMatrix| {
         let path = file(stated, key).map_or_else(PathBuf::new, |file| folder.join(file.path));
         let ordered = formats::align_rows(matrix, &stiffness.1).map_err(|error| message_and_help(error, &path));
         ordered.map(|matrix| (key, matrix)).map_err(|(message, help)| problem(key, message).help(help))
     };
-    let mass = ordered(one("mass")?.ok_or_else(|| missing("mass"))?)?;
+    let mass = ordered(mass?.ok_or_else(|| missing("mass"))?)?;
     let damping = one("damping")?.map(ordered).transpose()?;
     let stiffened = one("stiffened")?.map(ordered).transpose()?;
     let rows = stiffness.1.rows();
