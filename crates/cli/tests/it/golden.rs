@@ -17,7 +17,7 @@ fn printed(study: &str, arguments: &[&str]) -> String {
     // the expected time is measured, and the memory depends on the number of processors
     let line = |line: &str| match (line.contains(" on one thread"), line.rsplit_once(", ")) {
         (true, _) => "[expected time]\n".to_owned(),
-        (_, Some((rest, memory))) if memory.ends_with(" of memory") => format!("{rest}, [memory]\n"),
+        (_, Some((rest, memory))) if memory.contains(" of memory") => format!("{rest}, [memory]\n"),
         _ => format!("{line}\n"),
     };
     let printed: String = (text(&output.stdout) + &text(&output.stderr)).lines().map(line).collect();
