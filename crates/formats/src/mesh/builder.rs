@@ -20,6 +20,8 @@ pub(super) struct MeshBuilder {
     left_out: BTreeMap<String, usize>,
     /// Number of elements that lack some middle nodes.
     incomplete: usize,
+    /// Coordinate systems along which nodes have their displacements, unless they are x, y and z.
+    displacement_systems: BTreeMap<i64, i64>,
     notes: Vec<String>,
 }
 
@@ -93,6 +95,11 @@ impl MeshBuilder {
     /// Counts an element that lacks some of its middle nodes, and is read with its corners.
     pub fn count_incomplete(&mut self) {
         self.incomplete += 1;
+    }
+
+    /// States that the displacements of a node are along the axes of a coordinate system.
+    pub fn set_displacement_system(&mut self, node: i64, system: i64) {
+        self.displacement_systems.insert(node, system);
     }
 
     /// Adds members to a set, which is made if it does not exist. Upper and lower case are equal.
@@ -203,7 +210,12 @@ impl MeshBuilder {
             self.notes
                 .push(format!("elements that lack some of their middle nodes are read with their corners: {count}"));
         }
-        let MeshBuilder { nodes, by_number, elements, notes, .. } = self;
-        Ok(Mesh { nodes, by_number, elements, connectivity, sets, notes, ..Mesh::default() })
+        if let Some((node, system)) = self.displacement_systems.first_key_value() {
+            let count = self.displacement_systems.len();
+            let first = format!("node {node}: coordinate system {system}");
+            self.notes.push(format!("{count} nodes have displacements along other axes than x, y and z ({first})"));
+        }
+        let MeshBuilder { nodes, by_number, elements, displacement_systems, notes, .. } = self;
+        Ok(Mesh { nodes, by_number, elements, connectivity, sets, displacement_systems, notes, ..Mesh::default() })
     }
 }

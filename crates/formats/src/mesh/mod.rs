@@ -28,6 +28,7 @@ mod face;
 mod gmsh;
 mod include;
 mod nastran_bulk;
+mod nastran_coordinates;
 mod patch;
 mod report;
 mod shape;
@@ -43,7 +44,7 @@ pub use vtk_unstructured::vtk_cell_type;
 use crate::error::{Error, ErrorKind, Location};
 use crate::file::load;
 use builder::MeshBuilder;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -57,6 +58,7 @@ pub struct Mesh {
     elements: Vec<Element>,
     connectivity: Vec<u32>,
     sets: Vec<MeshSet>,
+    displacement_systems: BTreeMap<i64, i64>,
     notes: Vec<String>,
     /// The sides that no two solids share, once they are known.
     outer: OnceLock<Vec<Side>>,
@@ -216,6 +218,12 @@ impl Mesh {
     /// Returns the sets, in file order.
     pub fn sets(&self) -> &[MeshSet] {
         &self.sets
+    }
+
+    /// Returns the numbers of nodes whose displacements in the matrices are not along x, y and z,
+    /// with the number of the coordinate system that they are along.
+    pub fn displacement_systems(&self) -> &BTreeMap<i64, i64> {
+        &self.displacement_systems
     }
 
     /// Returns what the reader left out.

@@ -9,14 +9,15 @@
 //! ```
 //! The elements of a property become the set `property_3`, the grid points of `SET1`, `SET3` and of
 //! `SET 5 = …` in the case control the set `set_5`. Files named by `INCLUDE` are read in their
-//! place. Coordinate systems of grid points are refused, because the rows of the matrices follow
-//! them.
+//! place. Coordinates may be in any system (`nastran_coordinates`).
 //!
-//! Source: MSC Nastran Quick Reference Guide, bulk data entries `GRID`, `CTETRA`, `CPYRAM`,
-//! `CPENTA`, `CHEXA`, `CQUAD4`, `CQUAD8`, `CTRIA3`, `CTRIA6`, `SET1`, `SET3`; case control `SET`.
+//! Source: MSC Nastran Quick Reference Guide, bulk data entries `GRID`, `GRDSET`, `CTETRA`,
+//! `CPYRAM`, `CPENTA`, `CHEXA`, `CQUAD4`, `CQUAD8`, `CTRIA3`, `CTRIA6`, `SET1`, `SET3`; case
+//! control `SET`.
 
 use super::builder::{MeshBuilder, SetKind};
 use super::include::load_included;
+use super::nastran_coordinates::{CoordinateSystems, Coordinates, SystemKind, SystemPoints};
 use super::shape::Shape;
 use super::{MeshFile, MeshFormat};
 use crate::error::{Error, ErrorKind};
@@ -59,22 +60,53 @@ impl BulkCard<'_> {
     fn integer(&self, at: usize) -> Result<i64, Error> {
         self.line.integer(self.field(at))
     }
+
+    /// Returns the number in a field, or `default` if it is empty.
+    fn integer_or(&self, at: usize, default: i64) -> Result<i64, Error> {
+        if self.field(at).is_empty() { Ok(default) } else { self.integer(at) }
+    }
+
+    /// Returns three coordinates; empty fields are zero.
+    fn coordinates(&self, at: usize) -> Result<[f64; 3], Error> {
+        let mut values = [0.0; 3];
+        for (axis, x) in values.iter_mut().enumerate() {
+            *x = if self.field(at + axis).is_empty() { 0.0 } else { self.line.real(self.field(at + axis))? };
+        }
+        Ok(values)
+    }
+}
+
+/// What applies to all cards of a deck.
+#[derive(Default)]
+struct Deck {
+    sets: Vec<StatedSet>,
+    systems: CoordinateSystems,
+    /// Systems of coordinates and of displacements of grid points that state none.
+    default_systems: [i64; 2],
 }
 
 fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
-    let mut sets: Vec<StatedSet> = Vec::new();
-    read_deck(file, 0, &mut sets, builder)?;
+    // grid points may precede their system
+    let mut deck = Deck::default();
+    read_deck(file, 0, &mut deck, &mut |deck, card| add_system(deck, card))?;
+    let defining: BTreeSet<i64> = deck.systems.defining_points().collect();
+    if !defining.is_empty() {
+        read_deck(file, 0, &mut deck, &mut |deck, card| add_defining_point(deck, card, &defining))?;
+    }
+    deck.sets.clear();
+    read_deck(file, 0, &mut deck, &mut |deck, card| add(deck, card, builder))?;
     // a set may precede its grid points
-    sets.iter().for_each(|set| set.add(builder));
+    deck.sets.iter().for_each(|set| set.add(builder));
     Ok(())
 }
 
-/// Reads a deck, or a file that it includes, at this depth of nesting.
+/// Calls `each` for every card of a deck, or of a file that it includes, at this depth of nesting.
+/// Sets of the case control are added to the deck.
 fn read_deck(
     file: &MeshFile<'_>,
     depth: usize,
-    sets: &mut Vec<StatedSet>,
-    builder: &mut MeshBuilder,
+    deck: &mut Deck,
+    each: &mut dyn FnMut(&mut Deck, &BulkCard) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let mut card: Option<BulkCard> = None;
     let bytes = without_tabs(file.bytes);
@@ -88,21 +120,21 @@ fn read_deck(
             continue;
         }
         if let Some(card) = card.take() {
-            add(&card, sets, builder)?;
+            each(deck, &card)?;
         }
         match name(&line).as_str() {
-            "SET" => sets.extend(case_set(&line, &mut lines)),
+            "SET" => deck.sets.extend(case_set(&line, &mut lines)),
             "INCLUDE" => {
                 let name = included_name(&line, &mut lines);
                 let (path, bytes) = load_included(&line, &name, file.folder, depth)?;
                 let included = MeshFile { bytes: &bytes, folder: file.folder };
-                read_deck(&included, depth + 1, sets, builder).map_err(|error| error.with_path(&path))?;
+                read_deck(&included, depth + 1, deck, each).map_err(|error| error.with_path(&path))?;
             }
             "" => {}
             name => card = Some(BulkCard { name: name.to_owned(), fields: fields(&line), line }),
         }
     }
-    card.map_or(Ok(()), |card| add(&card, sets, builder))
+    card.map_or(Ok(()), |card| each(deck, &card))
 }
 
 /// Replaces tabs by spaces up to the next field of eight characters.
@@ -134,16 +166,47 @@ fn included_name(line: &Line, lines: &mut Lines) -> String {
     text.split_off("INCLUDE".len()).trim().trim_matches(quotes).to_owned()
 }
 
+/// Adds the coordinate systems that a card states.
+fn add_system(deck: &mut Deck, card: &BulkCard) -> Result<(), Error> {
+    if card.name == "GRDSET" {
+        deck.default_systems = [card.integer_or(1, 0)?, card.integer_or(5, 0)?];
+        return Ok(());
+    }
+    let Some(kind) = SystemKind::of_card(&card.name) else { return Ok(()) };
+    if card.name.starts_with("CORD2") {
+        let system = card.integer_or(1, 0)?;
+        let point = |at: usize| card.coordinates(at).map(|values| Coordinates { system, values });
+        let points = [point(2)?, point(5)?, point(8)?];
+        deck.systems.add(card.integer(0)?, kind, SystemPoints::Positions(points));
+        return Ok(());
+    }
+    // a card may state two systems
+    for at in [0, 4].into_iter().filter(|at| !card.field(*at).is_empty()) {
+        let points = [card.integer(at + 1)?, card.integer(at + 2)?, card.integer(at + 3)?];
+        deck.systems.add(card.integer(at)?, kind, SystemPoints::GridPoints(points));
+    }
+    Ok(())
+}
+
+/// Adds a grid point that defines a coordinate system.
+fn add_defining_point(deck: &mut Deck, card: &BulkCard, defining: &BTreeSet<i64>) -> Result<(), Error> {
+    if card.name == "GRID" && defining.contains(&card.integer(0)?) {
+        let at = Coordinates { system: card.integer_or(1, deck.default_systems[0])?, values: card.coordinates(2)? };
+        deck.systems.add_point(card.integer(0)?, at);
+    }
+    Ok(())
+}
+
 /// Adds what a card states.
-fn add(card: &BulkCard, sets: &mut Vec<StatedSet>, builder: &mut MeshBuilder) -> Result<(), Error> {
+fn add(deck: &mut Deck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
     let solids = ["CTETRA", "CPYRAM", "CPENTA", "CHEXA"];
     let faces = ["CTRIA3", "CTRIA6", "CTRIAR", "CQUAD4", "CQUAD8", "CQUADR"];
     match card.name.as_str() {
-        "GRID" => grid(card, builder)?,
+        "GRID" => grid(deck, card, builder)?,
         name if solids.contains(&name) || faces.contains(&name) => element(card, builder)?,
         // SET1, ID, members; SET3, ID, kind, members
-        "SET1" => sets.extend(StatedSet::of_card(card, 1)),
-        "SET3" if card.field(1).eq_ignore_ascii_case(b"GRID") => sets.extend(StatedSet::of_card(card, 2)),
+        "SET1" => deck.sets.extend(StatedSet::of_card(card, 1)),
+        "SET3" if card.field(1).eq_ignore_ascii_case(b"GRID") => deck.sets.extend(StatedSet::of_card(card, 2)),
         name => {
             let is_other =
                 name.starts_with('C') && integer(card.field(0)).is_some() && integer(card.field(1)).is_some();
@@ -156,19 +219,23 @@ fn add(card: &BulkCard, sets: &mut Vec<StatedSet>, builder: &mut MeshBuilder) ->
     Ok(())
 }
 
-fn grid(card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
-    for at in [1, 5] {
-        if !card.field(at).is_empty() && card.integer(at)? != 0 {
-            let problem = format!("grid point {} has the coordinate system {}", card.integer(0)?, card.integer(at)?);
-            let remedy = "write the model with all grid points and displacements in the basic system";
-            return Err(Error::new(ErrorKind::Unsupported, card.line.location(), problem, remedy));
-        }
+fn grid(deck: &mut Deck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
+    let number = card.integer(0)?;
+    let [system, along] = [(1, 0), (5, 1)].map(|(at, which)| card.integer_or(at, deck.default_systems[which]));
+    let unknown = |what: &str, reason: String| {
+        let problem = format!("grid point {number} has no {what}: {reason}");
+        Error::new(ErrorKind::Malformed, card.line.location(), problem, "export the deck with its coordinate systems")
+    };
+    let at = Coordinates { system: system?, values: card.coordinates(2)? };
+    let position = deck.systems.position(at).map_err(|reason| unknown("position", reason))?;
+    builder.node(number, position, &card.line)?;
+    let along = along?;
+    // a fluid point has a pressure instead
+    let is_fluid = along == -1;
+    if !is_fluid && !deck.systems.is_parallel(along).map_err(|reason| unknown("axes", reason))? {
+        builder.set_displacement_system(number, along);
     }
-    let mut position = [0.0; 3];
-    for (axis, x) in position.iter_mut().enumerate() {
-        *x = if card.field(2 + axis).is_empty() { 0.0 } else { card.line.real(card.field(2 + axis))? };
-    }
-    builder.node(card.integer(0)?, position, &card.line)
+    Ok(())
 }
 
 fn element(card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
@@ -356,7 +423,11 @@ mod tests {
     fn coordinate_systems_and_incomplete_elements_are_refused() {
         for (text, location, words) in [
             (DECK.replace("GRID,5,,", "GRID,5,2,"), Location::Line(12), "coordinate system 2"),
-            (DECK.replace("GRID,6,0,1.,0.,1.0,0", "GRID,6,0,1.,0.,1.0,9"), Location::Line(13), "coordinate system 9"),
+            (
+                DECK.replace("GRID,6,0,1.,0.,1.0,0", "GRID,6,0,1.,0.,1.0,9"),
+                Location::Line(13),
+                "no axes: coordinate system 9",
+            ),
             (DECK.replace("+              7       8\n", "+              7\n"), Location::Line(17), "a whole number"),
             (DECK.replace("GRID,7,,1.,", "GRID,7,,a,"), Location::Line(14), "`a`"),
             (DECK.replace("ENDDATA", "INCLUDE 'rest.bdf'"), Location::Line(23), "includes"),

@@ -484,6 +484,21 @@ fn wrong_sets_and_contacts_are_refused_with_their_place() {
     }
 }
 
+/// A node without rows may have its displacements along any axes.
+#[test]
+fn rows_along_other_axes_than_those_of_the_mesh_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path(), 0.01, true);
+    let head = HEAD.replace("block.inp", "block.bdf");
+    for (turned, is_refused) in [(5, true), (999, false)] {
+        let deck = format!("GRID,1,,0.,0.,0.\nGRID,{turned},,1.,0.,0.,7\nCORD2C,7,,0.,0.,0.,0.,0.,1.\n,1.\n");
+        std::fs::write(folder.path().join("block.bdf"), deck).unwrap();
+        let said = read(folder.path(), &[&head, STUDY]).err().map(|error| error.to_string());
+        assert_eq!(said.as_ref().is_some_and(|said| said.contains("node 5 are along coordinate system 7")), is_refused);
+        assert_eq!(said.is_some(), is_refused);
+    }
+}
+
 /// Displacements of nodes that are places are those of the places, with and without a reduction;
 /// the displacements of the other nodes agree between both within the error of the reduction.
 #[test]

@@ -7,7 +7,7 @@ use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::compile::mesh::contact::{ContactInputs, SectorRotation};
 use crate::compile::mesh::{MeshSource, MeshUse, NamedMembers, contact, mentioned_nodes, sets};
-use crate::compile::source_model::ModelLists;
+use crate::compile::source_model::{MatrixSource, ModelLists};
 use crate::syntax::document::{TomlTable, TomlValue};
 use crate::syntax::error::Problem;
 use crate::syntax::schema::MAX_ELEMENTS;
@@ -15,8 +15,8 @@ use crate::syntax::unit_sets;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use stickslip::structure::CoordinateAxis;
-use stickslip_formats::mesh;
+use stickslip::structure::{Component, CoordinateAxis};
+use stickslip_formats::mesh::{self, Mesh};
 
 /// The axis of `[disk]`, and its number of sectors if it is a plain number.
 #[derive(Debug, Clone, Copy, Default)]
@@ -51,12 +51,12 @@ impl Reader {
     pub(super) fn expand_sets(
         &mut self,
         lists: &mut ModelLists,
-        structure: Option<&CompiledTable>,
+        structure: Option<&MatrixSource>,
         rotation: DiskRotation,
     ) -> Option<MeshUse> {
         let before = self.problems.len();
         let mesh =
-            if self.study_file_only { None } else { structure.and_then(|table| self.mesh(table, rotation.axis)) };
+            if self.study_file_only { None } else { structure.and_then(|source| self.mesh(source, rotation.axis)) };
         let (places, contacts) = (std::mem::take(&mut lists.place), std::mem::take(&mut lists.contact));
         let (mut summaries, mut areas, mut sets) = (Vec::new(), HashMap::new(), Vec::new());
         for place in places {
@@ -112,7 +112,8 @@ impl Reader {
     }
 
     /// Reads the mesh of a structure; `None` without a mesh, or if it cannot be read.
-    fn mesh(&mut self, structure: &CompiledTable, axis: Option<CoordinateAxis>) -> Option<MeshSource> {
+    fn mesh(&mut self, structure: &MatrixSource, axis: Option<CoordinateAxis>) -> Option<MeshSource> {
+        let MatrixSource { table: structure, component, .. } = structure;
         let entry = structure.entry("mesh")?;
         let CompiledValue::Fixed(ResolvedValue::Text(name)) = &entry.value else { return None };
         let units = match &structure.entry("units")?.value {
@@ -120,7 +121,18 @@ impl Reader {
             _ => return None,
         };
         match mesh::read(self.path_of(name)) {
-            Ok(mesh) => Some(MeshSource { mesh, length: units.length, axis }),
+            Ok(mesh) => {
+                let rows = component.as_ref().map_or(&[][..], Component::rows);
+                if let Some((node, system)) = rotated_node(&mesh, rows) {
+                    let message = format!(
+                        "the displacements of node {node} are along coordinate system {system} of the mesh, not along x, y and z"
+                    );
+                    let help = "export matrices and mesh with displacements along the basic system (field CD of GRID)";
+                    self.problems.push(Problem::new(&entry.location, "mesh", message).help(help));
+                    return None;
+                }
+                Some(MeshSource { mesh, length: units.length, axis })
+            }
             Err(mut error) => {
                 let help = std::mem::take(&mut error.remedy);
                 let message = error.to_string().trim_end_matches("; ").to_owned();
@@ -144,6 +156,17 @@ impl Reader {
         let text = self.sources.first().map_or("", |source| source.text.as_str());
         table.name().map_or_else(Vec::new, |name| mentioned_nodes(text, name))
     }
+}
+
+/// Returns the first node with rows in the matrices that are not along x, y and z, and its
+/// coordinate system.
+fn rotated_node(mesh: &Mesh, rows: &[String]) -> Option<(i64, i64)> {
+    let systems = mesh.displacement_systems();
+    let of_row = |row: &String| {
+        let node: i64 = row.rsplit_once('.')?.0.parse().ok()?;
+        Some((node, *systems.get(&node)?))
+    };
+    rows.iter().find_map(of_row)
 }
 
 fn no_mesh(table: &CompiledTable, key: &str) -> Problem {

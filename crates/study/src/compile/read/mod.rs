@@ -370,11 +370,7 @@ impl Reader {
             }
             None => None,
         };
-        let mesh = self.expand_sets(
-            &mut lists,
-            matrices.as_ref().map(|matrices| &matrices.table),
-            mesh::DiskRotation::new(root),
-        )?;
+        let mesh = self.expand_sets(&mut lists, matrices.as_ref(), mesh::DiskRotation::new(root))?;
         Some(SourceModel { lists, template: None, matrices, mesh })
     }
 }
