@@ -19,9 +19,13 @@ impl fmt::Display for MeshReport<'_> {
         let shapes = if shapes.is_empty() { "no elements".to_owned() } else { shapes.join(", ") };
         writeln!(f, "mesh of {} nodes, {shapes}, from {}", mesh.nodes().len(), mesh.format())?;
         if let Some(extent) = mesh.extent() {
+            let ends = extent.iter().flat_map(|range| [range.start, range.end]);
+            let largest = ends.fold(0.0, |most: f64, end| most.max(end.abs()));
+            // coordinates that are rounding, as those of a rotated system, are shown as zero
+            let end = |end: f64| short(if end.abs() < 1e-9 * largest { 0.0 } else { end });
             let ranges = ["x", "y", "z"].iter().zip(&extent);
             let ranges: Vec<String> =
-                ranges.map(|(axis, range)| format!("{axis} {} to {}", short(range.start), short(range.end))).collect();
+                ranges.map(|(axis, range)| format!("{axis} {} to {}", end(range.start), end(range.end))).collect();
             writeln!(f, "extent {}", ranges.join(", "))?;
         }
         let faces = mesh.outer_faces();
