@@ -14,14 +14,13 @@ use stickslip_study::kinds::identify;
 /// A residual is the fitted value minus the measured one, divided by the standard deviation that
 /// ``weight`` states. SciPy's ``least_squares`` takes ``values``, ``jacobian`` and ``bounds``.
 ///
-/// A pickle contains the study, and reads the measured rows again from its files. With ``source``,
-/// the text of the study and the columns of its files, it contains the rows.
+/// A pickle contains the study, and reads the measured rows again from its files, unless `identify`
+/// received their columns.
 #[pyclass(frozen, module = "stickslip", name = "Residuals")]
 pub struct PyResiduals {
     residuals: Arc<identify::Residuals>,
     study: Py<PyStudy>,
     index: usize,
-    source: Option<Py<PyTuple>>,
 }
 
 impl PyResiduals {
@@ -40,20 +39,15 @@ impl PyResiduals {
 impl PyResiduals {
     /// Collects the measured rows of case ``index`` of a study.
     #[new]
-    #[pyo3(signature = (study, index=0, source=None))]
-    fn new(py: Python<'_>, study: Py<PyStudy>, index: usize, source: Option<Py<PyTuple>>) -> PyResult<PyResiduals> {
+    #[pyo3(signature = (study, index=0))]
+    fn new(py: Python<'_>, study: Py<PyStudy>, index: usize) -> PyResult<PyResiduals> {
         let residuals =
             identify::Residuals::new(&study.get().study, index).map_err(|cause| error::study(py, &cause))?;
-        Ok(PyResiduals { residuals: Arc::new(residuals), study, index, source })
+        Ok(PyResiduals { residuals: Arc::new(residuals), study, index })
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        Ok(match &self.source {
-            Some(source) => (py.import("stickslip._identify")?.getattr("_residuals")?, source.bind(py).clone()),
-            None => {
-                (py.get_type::<PyResiduals>().into_any(), (self.study.clone_ref(py), self.index).into_pyobject(py)?)
-            }
-        })
+        Ok((py.get_type::<PyResiduals>().into_any(), (self.study.clone_ref(py), self.index).into_pyobject(py)?))
     }
 
     /// Names of the fitted parameters.

@@ -7,7 +7,9 @@ use crate::result::{PyResultSet, Table};
 use crate::supervision::{Supervision, run_on_new_thread, run_supervised};
 use crate::{error, quantity};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyString};
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::{PyBytes, PyDict, PyList, PyString};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,7 +22,7 @@ use stickslip_explore::quantities::{path, quantities};
 use stickslip_study::dataset::{self, CellValues, Column};
 use stickslip_study::result_block::{Block, Tally};
 use stickslip_study::run::{CheckedStudy, check, figure_of_tables, units};
-use stickslip_study::{StudyError, read_bytes, read_file, templates};
+use stickslip_study::{DataContents, StudyError, read_file, read_study_with_data, templates};
 
 /// A study, read and checked.
 ///
@@ -41,6 +43,8 @@ pub struct PyStudy {
     file: String,
     overrides: Vec<(String, String)>,
     method: Option<String>,
+    /// Contents of files that `[[data]]` names.
+    data: Arc<DataContents>,
     /// Result of the check, which prepares every case. Computed on the first request.
     checked: Arc<Mutex<Option<Arc<CheckedStudy>>>>,
 }
@@ -80,12 +84,25 @@ impl PyStudy {
             }
         })?;
         let study = Arc::new(study.map_err(|cause| error::study(py, &cause))?);
-        Ok(PyStudy { study, file, overrides, method, checked: Arc::default() })
+        Ok(PyStudy { study, file, overrides, method, data: Arc::default(), checked: Arc::default() })
+    }
+
+    /// Reads a study from its text, beside contents of files of data.
+    fn from_parts(
+        py: Python<'_>,
+        (file, text): (String, String),
+        overrides: Vec<(String, String)>,
+        method: Option<String>,
+        data: Arc<DataContents>,
+    ) -> PyResult<PyStudy> {
+        let (name, contents) = (file.clone(), data.clone());
+        let read = move |set: &[(String, String)]| read_study_with_data(&name, &text, set, &contents);
+        Ok(PyStudy { data, ..PyStudy::finished(py, file, overrides, method, read)? })
     }
 
     fn again(&self, py: Python<'_>, overrides: Vec<(String, String)>, method: Option<String>) -> PyResult<PyStudy> {
-        let (file, text) = (self.file.clone(), self.study.text().to_owned());
-        PyStudy::finished(py, self.file.clone(), overrides, method, move |set| read_bytes(&file, text.as_bytes(), set))
+        let parts = (self.file.clone(), self.study.text().to_owned());
+        PyStudy::from_parts(py, parts, overrides, method, self.data.clone())
     }
 
     /// Converts values of parameters to text as on the command line.
@@ -177,10 +194,8 @@ impl PyStudy {
     #[staticmethod]
     #[pyo3(signature = (text, name="study", **set))]
     fn from_text(py: Python<'_>, text: &str, name: &str, set: Option<&Bound<'_, PyDict>>) -> PyResult<PyStudy> {
-        let (file, text) = (name.to_owned(), text.to_owned());
-        let read = move |set: &[(String, String)]| read_bytes(&file, text.as_bytes(), set);
-        let study = PyStudy::finished(py, name.to_owned(), Vec::new(), None, read)?;
-        study.set(py, set)
+        let parts = (name.to_owned(), text.to_owned());
+        PyStudy::from_parts(py, parts, Vec::new(), None, Arc::default())?.set(py, set)
     }
 
     /// Creates a study from a dictionary with the tables and keys of a study file.
@@ -393,26 +408,30 @@ impl PyStudy {
         )
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledStudy<'_>)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PickledStudy<'_, 'py>)> {
         let build = py.import("stickslip._core")?.getattr("_study")?;
-        Ok((build, (&self.file, self.study.text(), self.overrides.clone(), self.method.clone())))
+        let data = PyDict::new(py);
+        self.data.iter().try_for_each(|(name, content)| data.set_item(name, PyBytes::new(py, content)))?;
+        Ok((build, (&self.file, self.study.text(), self.overrides.clone(), self.method.clone(), data)))
     }
 }
 
-/// Pickled study: name of the file, text, values of parameters, method.
-type PickledStudy<'a> = (&'a str, &'a str, Vec<(String, String)>, Option<String>);
+/// Pickled study: name of the file, text, values of parameters, method, contents of data files.
+type PickledStudy<'a, 'py> = (&'a str, &'a str, Vec<(String, String)>, Option<String>, Bound<'py, PyDict>);
 
 /// Recreates a study from its pickle.
 #[pyfunction]
+#[pyo3(signature = (file, text, overrides, method, data=BTreeMap::new()))]
 pub fn _study(
     py: Python<'_>,
     file: String,
     text: String,
     overrides: Vec<(String, String)>,
     method: Option<String>,
+    data: BTreeMap<String, PyBackedBytes>,
 ) -> PyResult<PyStudy> {
-    let name = file.clone();
-    PyStudy::finished(py, file, overrides, method, move |set| read_bytes(&name, text.as_bytes(), set))
+    let data = data.into_iter().map(|(name, content)| (name, content.to_vec())).collect();
+    PyStudy::from_parts(py, (file, text), overrides, method, Arc::new(data))
 }
 
 /// Columns of a table from Python: name, Arrow type and values.

@@ -109,6 +109,25 @@ def test_a_fit_is_pickled_with_its_data(found, folder):
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(residuals)).values(x), residuals.values(x))
 
 
+def test_columns_replace_only_their_files(found, folder, tmp_path):
+    """The other files of the study stay where they are, beside the study file."""
+    both = STUDY.replace("data = [", 'data = [{ name = "other", file = "rig.csv" }, ').replace(
+        'name = "rig", file = "rig.csv"', 'name = "rig", file = "given.csv"'
+    )
+    (folder / "both.toml").write_text(both)
+    again = stickslip.identify(folder / "both.toml", {"given.csv": COLUMNS["rig.csv"]})
+    np.testing.assert_array_equal(again.x, found.x)
+    # without the file, and for a study that was read from it
+    (tmp_path / "rig.toml").write_text(STUDY)
+    with pytest.raises(stickslip.StudyError, match="columns are given for `test.csv`, not for `rig.csv`"):
+        stickslip.identify(tmp_path / "rig.toml", {"test.csv": COLUMNS["rig.csv"]})
+    study = stickslip.Study.from_file(folder / "rig.toml")
+    with pytest.raises(stickslip.StudyError, match="columns are given for `test.csv`, but no"):
+        stickslip.identify(study, COLUMNS | {"test.csv": COLUMNS["rig.csv"]})
+    with pytest.raises(ValueError, match="column `force_N` of `rig.csv` is complex"):
+        stickslip.identify(study, {"rig.csv": COLUMNS["rig.csv"] | {"force_N": FORCE + 0j}})
+
+
 def test_wrong_fits_are_refused_with_words(found, folder):
     with pytest.raises(stickslip.StudyError, match="kind `identify`"):
         stickslip.identify(stickslip.Study.from_template("element"))

@@ -28,8 +28,8 @@ pub use case::study::{Case, MethodChoice, Study, VariedValue};
 pub use case::values::{Frequencies, Values, hertz};
 pub use check::{memory_limit, size, summary};
 pub use compile::read::{
-    StructureCache, StructureCacheSettings, TemplateParameter, read_bytes, read_document, read_file, read_for_results,
-    read_study, read_study_with,
+    DataContents, StructureCache, StructureCacheSettings, TemplateParameter, read_bytes, read_document, read_file,
+    read_for_results, read_study, read_study_with, read_study_with_data,
 };
 pub use compile::templates;
 pub use results::{dataset, decimation};

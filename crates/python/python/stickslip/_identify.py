@@ -5,15 +5,15 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import StringIO
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _toml
-from ._core import Residuals, Result, Study
+from ._core import Residuals, Result, Study, _study
 from ._errors import ModelError, StudyError
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def identify(
     """Fits the parameters of a study of kind ``identify``.
 
     - ``study``: a :class:`Study`, a dictionary, or the path of a study file with one case.
-    - ``data``: columns instead of files, by the names that ``file`` has in ``[[data]]``.
+    - ``data``: columns instead of files, by the names that ``file`` has in ``[[data]]``. Other files
+      are relative to the study file, or to the working folder.
     - ``threads`` and ``progress``: as in :meth:`Study.run`.
 
     The values, the standard errors and the tables are those of the command.
@@ -116,20 +117,20 @@ def identify(
     >>> bool(abs(found.gradient(found.x)[0]) * found.cov[0, 0] ** 0.5 < 1e-3)
     True
     """
-    source = None
     if data is not None:
+        contents = {file: _csv(file, columns) for file, columns in data.items()}
         if isinstance(study, Study):
-            text = study.text
+            _, (name, text, overrides, method, _) = study.__reduce__()
+        elif isinstance(study, Mapping):
+            name, text, overrides, method = "study", _toml.text(study), [], None
         else:
-            text = _toml.text(study) if isinstance(study, Mapping) else Path(study).read_text(encoding="utf-8")
-        columns = {file: {title: np.asarray(values, float) for title, values in own.items()} for file, own in data.items()}
-        source = (text, columns)
-        study = _study(*source)
+            name, text, overrides, method = str(study), Path(study).read_text(encoding="utf-8"), [], None
+        study = _study(name, text, overrides, method, contents)
     elif not isinstance(study, Study):
         study = Study.from_dict(study) if isinstance(study, Mapping) else Study.from_file(study)
     if study.kind != "identify" or study.cases != 1:
         raise StudyError(f"`identify` needs a study of kind `identify` with one case, found {study!r}")
-    residuals = Residuals(study, source=source)
+    residuals = Residuals(study)
     result = study.run(threads=threads, progress=progress)
     if "parameters" not in result.tables:
         raise StudyError(f"no search ended at a minimum: {result.failures or result.notes}")
@@ -153,25 +154,20 @@ def identify(
     )
 
 
-def _study(text: str, data: Mapping[str, Mapping[str, _Array]]) -> Study:
-    """Reads a study beside columns instead of files."""
-    with TemporaryDirectory() as folder:
-        for name, columns in data.items():
-            _write(Path(folder) / name, columns)
-        return Study.from_text(text, name=str(Path(folder) / "study.toml"))
-
-
-def _residuals(text: str, data: Mapping[str, Mapping[str, _Array]]) -> Residuals:
-    """Recreates residuals from their pickle."""
-    return Residuals(_study(text, data), source=(text, data))
-
-
-def _write(path: Path, arrays: Mapping[str, _Array]) -> None:
-    """Writes columns as a CSV file."""
+def _csv(file: str, columns: Mapping[str, ArrayLike]) -> bytes:
+    """Returns columns as the text of a CSV file."""
+    arrays = {title: np.asarray(values) for title, values in columns.items()}
+    for title, array in arrays.items():
+        if np.iscomplexobj(array):
+            raise ValueError(
+                f"column `{title}` of `{file}` is complex; give its real and imaginary parts, or its amplitude and "
+                "phase, as two columns"
+            )
     lengths = {title: array.shape for title, array in arrays.items()}
     if len(set(lengths.values())) > 1 or any(array.ndim != 1 for array in arrays.values()):
-        raise ValueError(f"the columns of `{path.name}` must be one-dimensional and equally long, found {lengths}")
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(arrays)
-        writer.writerows(zip(*(array.tolist() for array in arrays.values())))
+        raise ValueError(f"the columns of `{file}` must be one-dimensional and equally long, found {lengths}")
+    text = StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(arrays)
+    writer.writerows(zip(*(np.asarray(array, float).tolist() for array in arrays.values())))
+    return text.getvalue().encode()

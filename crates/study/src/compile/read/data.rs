@@ -5,10 +5,9 @@ use crate::case::values::ResolvedValue;
 use crate::compile::compiled::{CompiledTable, CompiledValue};
 use crate::data::DataTable;
 use crate::syntax::document::TomlTable;
-use crate::syntax::error::Problem;
+use crate::syntax::error::{Location, Problem};
 use crate::syntax::schema::FILE;
-use crate::syntax::suggest::excerpt;
-use std::path::Path;
+use crate::syntax::suggest::{alternatives, excerpt};
 use stickslip_formats::data;
 
 impl Reader {
@@ -30,6 +29,17 @@ impl Reader {
         Some(read)
     }
 
+    /// Reports contents of a file that no table names.
+    pub(super) fn check_data_contents(&mut self) {
+        let tables = self.data.as_ref().map_or(&[][..], |tables| tables);
+        let is_read = |name: &String| tables.iter().any(|table| table.file == *name);
+        let Some(unread) = self.data_contents.keys().find(|name| !is_read(name)) else { return };
+        let message = format!("columns are given for `{unread}`, but no [[data]] has this `file`");
+        let files = names_of(tables.iter().map(|table| &table.file));
+        let help = if tables.is_empty() { "add a [[data]]".to_owned() } else { format!("the files are {files}") };
+        self.problems.push(Problem::new(&Location { source: 0, span: 0..0 }, "data", message).help(help));
+    }
+
     fn data_table(&mut self, table: &CompiledTable) -> Option<DataTable> {
         let text = |key: &str| match table.entry(key).map(|entry| &entry.value) {
             Some(CompiledValue::Fixed(ResolvedValue::Text(text))) => Some(text.clone()),
@@ -43,8 +53,11 @@ impl Reader {
         if self.study_file_only {
             return Some(DataTable::new(name, file, columns, None));
         }
-        let path = self.folder.as_deref().unwrap_or(Path::new("")).join(&file);
-        match data::read(&path) {
+        let content = match self.data_contents.get(&file) {
+            Some(content) => data::read_bytes(content),
+            None => data::read(self.path_of(&file)),
+        };
+        match content {
             Ok(content) => {
                 let data = DataTable::new(name, file, columns, Some(content));
                 let wrong = data.unknown_column();
@@ -59,9 +72,17 @@ impl Reader {
                 let (location, remedy) = (table.location_of("file", None), error.remedy.clone());
                 let message = error.to_string();
                 let message = message.strip_suffix(&format!("; {remedy}")).unwrap_or(&message).to_owned();
+                let remedy = match self.data_contents.is_empty() || self.data_contents.contains_key(&file) {
+                    true => remedy,
+                    false => format!("columns are given for {}, not for `{file}`", names_of(self.data_contents.keys())),
+                };
                 self.problems.push(Problem::new(location, "file", message).help(remedy));
                 None
             }
         }
     }
+}
+
+fn names_of<'a>(files: impl Iterator<Item = &'a String>) -> String {
+    alternatives(files.map(String::as_str))
 }

@@ -25,6 +25,7 @@ mod structure_cache;
 mod template;
 mod values;
 
+pub use reader::DataContents;
 pub use structure_cache::{StructureCache, StructureCacheSettings};
 pub use template::TemplateParameter;
 
@@ -183,6 +184,38 @@ pub fn read_study_with(name: &str, text: &str, structures: &Arc<StructureCache>)
     read(name, text, &[], Reader { structures: Some(structures.clone()), ..Reader::default() })
 }
 
+/// Reads a study from its text as [`read_study`] does. `data` has the contents of files that
+/// `[[data]]` names; other files are read.
+///
+/// # Errors
+/// Those of [`read_study`], and contents of a file that the study does not name.
+///
+/// # Example
+/// ```
+/// use std::{collections::BTreeMap, sync::Arc};
+/// use stickslip_study::read_study_with_data;
+/// let text = "schema = 1\n\
+///     [[data]]\nname = \"rig\"\nfile = \"rig.csv\"\n\
+///     [[motion]]\non = \"mover\"\namplitude = \"1 mm\"\n\
+///     [[joint]]\nname = \"pad\"\nbetween = [\"mover\", \"ground\"]\n\
+///     law = { kind = \"cubic\", stiffness = 1.0 }\n\
+///     [study]\nkind = \"hysteresis\"\nfrequency = \"1 Hz\"\n";
+/// let columns = b"time_s,force_N\n0,1\n1,2\n".to_vec();
+/// let data = Arc::new(BTreeMap::from([("rig.csv".to_owned(), columns)]));
+/// assert_eq!(read_study_with_data("pad", text, &[], &data).unwrap().cases(), 1);
+/// let other = text.replace("rig.csv", "test.csv");
+/// let error = read_study_with_data("pad", &other, &[], &data).unwrap_err();
+/// assert!(error.to_string().contains("test.csv"));
+/// ```
+pub fn read_study_with_data(
+    name: &str,
+    text: &str,
+    overrides: &[(String, String)],
+    data: &Arc<DataContents>,
+) -> Result<Study, StudyError> {
+    read(name, text, overrides, Reader { data_contents: data.clone(), ..Reader::default() })
+}
+
 /// Reads the study of stored results, for names only.
 ///
 /// The files that its text names may be missing. A study with `[structure]` that was read this
@@ -281,6 +314,9 @@ impl Reader {
         let source = words(self, "source");
 
         self.data = self.data(&root).map(Arc::new);
+        if self.data.is_some() {
+            self.check_data_contents();
+        }
         let (parameters, structure) = match template_and_table(&root) {
             Some((row, table)) => {
                 let TemplateFile { parameters, lists, source } = self.template(row)?;

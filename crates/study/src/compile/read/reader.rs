@@ -6,9 +6,12 @@ use crate::compile::repeat::{Iteration, Repetition};
 use crate::data::DataTable;
 use crate::syntax::error::{Location, Problem, Source, StudyError};
 use crate::syntax::expression::Expression;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// Contents of files by their names.
+pub type DataContents = BTreeMap<String, Vec<u8>>;
 
 /// Reads one file and the template that it names.
 #[derive(Default)]
@@ -32,6 +35,8 @@ pub(super) struct Reader {
     pub(super) data: Option<Arc<Vec<DataTable>>>,
     /// Structures that were read before.
     pub(super) structures: Option<Arc<StructureCache>>,
+    /// Contents of files of `[[data]]`, by the name that the study states.
+    pub(super) data_contents: Arc<DataContents>,
 }
 
 impl Reader {
