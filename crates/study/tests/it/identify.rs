@@ -196,6 +196,41 @@ fn intervals_contain_the_truth() {
     assert!((0.92..=0.98).contains(&share), "{share}");
 }
 
+/// A loss that limits outliers has intervals that contain the true value in 95 % of the cases, and
+/// hardly wider ones than squares without outliers.
+#[test]
+fn intervals_contain_the_truth_in_spite_of_outliers() {
+    let (k, kt, limit) = (1e3, 1e4, 2.0);
+    let deviation = 0.05;
+    let fitted = |loss: &str, outliers: f64, noise: &mut Noise| {
+        let rows = loops(k, kt, limit, 1e-3).into_iter().map(|(u, f)| {
+            let outlier = if noise.uniform() < outliers { 100.0 } else { 0.0 };
+            vec![u, f + deviation * noise.normal() + outlier]
+        });
+        let rows: Vec<_> = rows.collect();
+        let study = loop_study(&format!(", weight = \"{deviation} N\"")) + &format!("loss = \"{loss}\"\n");
+        identify(&csv("displacement_m,force_N", rows), &study)
+    };
+    let usual = estimate(&fitted("squares", 0.0, &mut Noise(2)), "kt").error;
+    for loss in ["soft-l1", "huber", "cauchy"] {
+        let mut noise = Noise(5);
+        let (mut inside, mut all) = (0, 0);
+        for _ in 0..40 {
+            let dataset = fitted(loss, 0.03, &mut noise);
+            for (name, truth) in [("kt", kt), ("Ft", limit), ("k", k)] {
+                let found = estimate(&dataset, name);
+                all += 1;
+                inside += i32::from(found.low <= truth && truth <= found.high);
+            }
+            let error = estimate(&dataset, "kt").error;
+            assert!((0.8..1.6).contains(&(error / usual)), "{loss}: {error} instead of about {usual}");
+        }
+        let share = f64::from(inside) / f64::from(all);
+        // 120 intervals: 95 % with a standard deviation of 2 %
+        assert!((0.90..=0.99).contains(&share), "{loss}: {share}");
+    }
+}
+
 /// Study of an oscillator with one fitted spring and damper.
 fn oscillator(targets: &str, more: &str) -> String {
     format!(

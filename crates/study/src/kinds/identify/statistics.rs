@@ -6,7 +6,12 @@
 //! residuals their common size. As many residuals as parameters tell no size: then the weights
 //! count as absolute standard deviations. Intervals use Student's distribution. They hold for
 //! residuals without structure and a model that is nearly linear within them.
-//! Source: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5.
+//!
+//! With a loss `ρ` that limits outliers, the minimum has the slopes `ψ = ρ'(r²) r` of the residuals,
+//! and the covariance is `s² (JᵀJ)⁻¹ / m²`, `s² = Σ ψ² / (n - p)`, with the mean `m` of the
+//! derivatives `dψ/dr`. For squares, `ψ = r` and `m = 1`.
+//! Sources: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5; P. J. Huber,
+//! Robust Statistics (1981), section 7.6.
 
 use super::problem::{FitProblem, UsedRows};
 use super::search::{Fixed, Found, SearchSettings, minimize};
@@ -57,6 +62,17 @@ impl Loss {
                 }
             }
             Loss::Cauchy => 1.0 / (1.0 + z),
+        }
+    }
+
+    /// Returns the derivative of the slope `ρ'(r²) r`.
+    fn slope_derivative(self, r: f64) -> f64 {
+        let z = r * r;
+        match self {
+            Loss::Squares => 1.0,
+            Loss::SoftL1 => (1.0 + z).powf(-1.5),
+            Loss::Huber => f64::from(z <= 1.0),
+            Loss::Cauchy => (1.0 - z) / (1.0 + z).powi(2),
         }
     }
 }
@@ -112,7 +128,8 @@ pub(super) struct Statistics {
     covariance: DMatrix<f64>,
     /// Quantile of Student's distribution for a 95 % interval.
     pub quantile: f64,
-    /// Variance of the normalized residuals.
+    /// Variance of the normalized residuals; for a loss that limits outliers, that of the slopes
+    /// over the curvature.
     pub variance: f64,
     /// Number of residuals.
     pub count: usize,
@@ -168,15 +185,18 @@ impl Statistics {
         let n = residuals.len();
         let weights: Vec<f64> = residuals.iter().map(|r| loss.weight(*r)).collect();
         let sum: f64 = residuals.iter().zip(&weights).map(|(r, w)| w * r * r).sum();
+        let slopes: Vec<f64> = residuals.iter().zip(&weights).map(|(r, w)| w * r).collect();
         let freedom = n.saturating_sub(free.len());
+        let curvature = mean_curvature(loss, &residuals, &weights);
         // without a residual to spare, only the stated weights tell the size of the errors
-        let variance = if freedom > 0 { sum / freedom as f64 } else { 1.0 };
-        let normal = |members: &[usize]| NormalEquations::new(&jacobian, &weights, members);
+        let squares: f64 = slopes.iter().map(|slope| slope * slope).sum();
+        let variance = if freedom > 0 { squares / freedom as f64 / curvature } else { 1.0 };
+        let normal = |members: &[usize]| NormalEquations::new(&jacobian, curvature, members);
         let mut covariance: DMatrix<f64> = DMatrix::zeros(p, p);
         let mut squared_step = 0.0;
         let of_free = normal(&free);
-        let slopes = |k: usize| (0..n).map(|i| weights[i] * jacobian[(i, k)] * residuals[i]).sum::<f64>();
-        let gradient: Vec<f64> = free.iter().map(|k| slopes(*k)).collect();
+        let along = |k: usize| (0..n).map(|i| jacobian[(i, k)] * slopes[i]).sum::<f64>();
+        let gradient: Vec<f64> = free.iter().map(|k| along(*k)).collect();
         for Direction { value, change } in of_free.directions().filter(|direction| direction.value > SINGULAR) {
             for (a, k) in free.iter().enumerate() {
                 for (b, l) in free.iter().enumerate() {
@@ -424,10 +444,9 @@ struct Direction {
 }
 
 impl NormalEquations {
-    fn new(jacobian: &DMatrix<f64>, weights: &[f64], members: &[usize]) -> Self {
-        let column = |k: &usize| {
-            jacobian.column(*k).component_mul(&DVector::from_iterator(weights.len(), weights.iter().map(|w| w.sqrt())))
-        };
+    /// Creates the equations of some parameters. Each residual has the same curvature.
+    fn new(jacobian: &DMatrix<f64>, curvature: f64, members: &[usize]) -> Self {
+        let column = |k: &usize| jacobian.column(*k) * curvature.sqrt();
         let columns: Vec<DVector<f64>> = members.iter().map(column).collect();
         let lengths: Vec<f64> = columns.iter().map(|column| column.norm()).collect();
         let unit = |a: usize| if lengths[a] > 0.0 { lengths[a] } else { 1.0 };
@@ -450,6 +469,16 @@ impl NormalEquations {
             change: (0..self.lengths.len()).map(|a| change(index, a)).collect(),
         })
     }
+}
+
+/// Returns the mean of the second derivative of the loss by a residual.
+fn mean_curvature(loss: Loss, residuals: &[f64], weights: &[f64]) -> f64 {
+    let mean = |sum: f64| sum / residuals.len().max(1) as f64;
+    let curvature = mean(residuals.iter().map(|r| loss.slope_derivative(*r)).sum());
+    // If nearly all residuals exceed their standard deviation, positive and negative curvatures of a
+    // bounded loss cancel. It is then at least this fraction of the mean weight.
+    let least = 0.1 * mean(weights.iter().sum());
+    curvature.max(least).max(f64::MIN_POSITIVE)
 }
 
 /// Returns the directions that the data do not determine. Parameters at an end of their range
@@ -575,6 +604,9 @@ mod tests {
                 let h = 1e-5;
                 let slope = (loss.sum(&[r + h]) - loss.sum(&[r - h])) / (2.0 * h);
                 assert!((slope - loss.weight(r) * r).abs() < 1e-8, "{loss:?} {r}");
+                let slope = |r: f64| loss.weight(r) * r;
+                let derivative = (slope(r + h) - slope(r - h)) / (2.0 * h);
+                assert!((derivative - loss.slope_derivative(r)).abs() < 1e-8, "{loss:?} {r}");
             }
         }
     }
