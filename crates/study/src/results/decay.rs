@@ -7,10 +7,13 @@
 //!
 //! `δ = 2 ln((s + s')/(s' + s''))`, with the next swing `s''`.
 //!
-//! The formula is exact for a linear oscillator. The next swing of a motion that comes to rest is
-//! zero. If the record ends during the motion, the last cycle without a next swing is left out; a
-//! decay of two swings only compares these. `ζ = δ/√(4π² + δ²)` is
+//! The formula is exact for a linear oscillator. The amplitude of the cycle is the geometric mean
+//! of both sums, `√((s + s')(s' + s''))/2`, which is about the middle swing. `ζ = δ/√(4π² + δ²)` is
 //! the damping ratio of the linear oscillator with the same decrement.
+//!
+//! The next swing of a motion that comes to rest is zero. If the record ends during the motion, the
+//! last cycle without a next swing is left out; a decay of two swings only compares these. Ripples
+//! of a higher mode, swings much shorter than later ones, are no cycles.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +22,7 @@ use std::f64::consts::TAU;
 pub struct Cycle {
     /// Start time, s.
     pub time: f64,
-    /// Mean of its two swings, m.
+    /// Amplitude in its middle, to which the damping ratio belongs, m.
     pub amplitude: f64,
     /// Inverse of its duration, Hz.
     pub frequency: f64,
@@ -33,7 +36,10 @@ pub type PlaceMotionFn<'a> = dyn Fn(f64) -> [f64; 2] + 'a;
 /// The turning points of one place, detected as samples arrive.
 #[derive(Debug, Clone, Default)]
 pub struct Decay {
+    first: Option<[f64; 3]>,
     last: Option<[f64; 3]>,
+    /// Largest speed of a sample, m/s.
+    fastest: f64,
     turns: Vec<(f64, f64)>,
     /// Smallest and largest displacement of a sample, m.
     extent: Option<(f64, f64)>,
@@ -46,9 +52,9 @@ impl Decay {
     /// samples if `motion` is `None`. The cubic has an error where the acceleration jumps, as
     /// at the turning points of dry friction.
     pub fn add(&mut self, [time, displacement, velocity]: [f64; 3], motion: Option<&PlaceMotionFn<'_>>) {
+        self.first.get_or_insert([time, displacement, velocity]);
+        self.fastest = self.fastest.max(velocity.abs());
         match self.last {
-            // a motion that begins at rest begins with a turning point
-            None if velocity == 0.0 => self.turns.push((time, displacement)),
             Some([t, x, v]) if v != 0.0 && v * velocity <= 0.0 => {
                 let cubic = cubic([t, x, v], [time, displacement, velocity]);
                 self.turns.push(turning_point(motion.unwrap_or(&cubic), [t, time], v));
@@ -67,25 +73,39 @@ impl Decay {
 
     /// Returns the largest swing, m.
     pub fn largest(&self) -> f64 {
-        self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).fold(0.0, f64::max)
+        self.turns().windows(2).map(|pair| swing(pair[0], pair[1])).fold(0.0, f64::max)
+    }
+
+    /// Returns the turning points. A motion that begins at rest begins with one.
+    fn turns(&self) -> Vec<(f64, f64)> {
+        // the velocities and accelerations of static equilibrium are rounding
+        let rounding = 1e-9;
+        let first = self.first.filter(|[_, _, velocity]| velocity.abs() <= rounding * self.fastest);
+        let first = first.map(|[time, displacement, _]| (time, displacement));
+        let least = rounding * self.extent();
+        // a velocity of the other sign than the next one has a turning point beside the first one
+        let later = self.turns.iter().skip_while(|turn| first.is_some_and(|first| swing(first, **turn) <= least));
+        first.into_iter().chain(later.copied()).collect()
     }
 
     /// Returns the consecutive cycles until the motion rests.
     pub fn cycles(&self) -> Vec<Cycle> {
         // Swings below this share of the largest swing count as rest.
         let least = 1e-9 * self.largest();
-        let swings: Vec<f64> = self.turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
+        let turns = without_ripples(&self.turns(), least);
+        let swings: Vec<f64> = turns.windows(2).map(|pair| swing(pair[0], pair[1])).collect();
         let moves = swings.iter().position(|swing| *swing <= least).unwrap_or(swings.len());
-        let (swings, turns) = (&swings[..moves], &self.turns);
+        let swings = &swings[..moves];
         let rests = moves + 1 < turns.len() || self.last.is_some_and(|[_, _, velocity]| velocity == 0.0);
         let complete = if rests || moves == 2 { moves } else { moves.saturating_sub(1) };
         let cycles = (1..complete).step_by(2).map_while(|second| {
             let duration = turns[second + 1].0 - turns[second - 1].0;
             (duration > 0.0).then(|| {
-                let decrement = decrement(swings, second);
+                let [before, after] = means(swings, second);
+                let decrement = 2.0 * (before / after).ln();
                 Cycle {
                     time: turns[second - 1].0,
-                    amplitude: 0.5 * (swings[second - 1] + swings[second]),
+                    amplitude: (before * after).sqrt(),
                     frequency: 1.0 / duration,
                     damping_ratio: decrement / TAU.hypot(decrement),
                 }
@@ -95,13 +115,56 @@ impl Decay {
     }
 }
 
-/// Returns the logarithmic decrement of the cycle whose second swing has index `second`.
-fn decrement(swings: &[f64], second: usize) -> f64 {
-    let pair = |first: usize| swings[first] + swings.get(first + 1).copied().unwrap_or(0.0);
+/// Returns the means of two consecutive swings, half a cycle apart, of the cycle whose second swing
+/// has index `second`.
+fn means(swings: &[f64], second: usize) -> [f64; 2] {
+    let pair = |first: usize| 0.5 * (swings[first] + swings.get(first + 1).copied().unwrap_or(0.0));
     match swings.len() {
-        2 => 2.0 * (swings[0] / swings[1]).ln(),
-        _ => 2.0 * (pair(second - 1) / pair(second)).ln(),
+        2 => [swings[0], swings[1]],
+        _ => [pair(second - 1), pair(second)],
     }
+}
+
+/// Returns the turning points without those of ripples: swings that are not longer than both
+/// neighbouring ones, and much shorter than a later one. Swings up to `least` are rest.
+fn without_ripples(turns: &[(f64, f64)], least: f64) -> Vec<(f64, f64)> {
+    // A swing shorter than this share of a later one is a ripple: swings of a decay become shorter.
+    // A drift that lengthens every other swing needs 60 % of the amplitude in half a cycle to make
+    // this ratio.
+    let share = 0.25;
+    // the longest swing from each turning point on
+    let mut later = vec![0.0; turns.len()];
+    for i in (1..turns.len()).rev() {
+        later[i - 1] = swing(turns[i - 1], turns[i]).max(later[i]);
+    }
+    let mut kept: Vec<usize> = Vec::with_capacity(turns.len());
+    for next in 0..turns.len() {
+        kept.push(next);
+        while let [.., a, b, c, d] = kept[..] {
+            let [before, own, after] = [(a, b), (b, c), (c, d)].map(|(from, to)| swing(turns[from], turns[to]));
+            if own <= least || own > before.min(after) || own >= share * later[c] {
+                break;
+            }
+            kept.truncate(kept.len() - 3);
+            kept.push(d);
+        }
+    }
+    if kept.len() < turns.len() {
+        // ripples after the last long swing, and that swing, which may end at one of them
+        let is_ripple = |kept: &[usize]| match *kept {
+            [.., a, b, c] => {
+                let lasts = |from: usize, to: usize| turns[to].0 - turns[from].0;
+                let own = swing(turns[b], turns[c]);
+                own > least && own < share * swing(turns[a], turns[b]) && 2.0 * lasts(b, c) < lasts(a, b)
+            }
+            _ => false,
+        };
+        while is_ripple(&kept) {
+            kept.pop();
+        }
+        kept.pop();
+    }
+    kept.into_iter().map(|turn| turns[turn]).collect()
 }
 
 fn swing(a: (f64, f64), b: (f64, f64)) -> f64 {
@@ -166,6 +229,10 @@ mod tests {
             // samples are 1/100 of a period apart; the cubic has an error of 1e-7
             assert!((cycle.damping_ratio - zeta).abs() < 1e-5, "{cycle:?}");
             assert!((cycle.frequency - damped / TAU).abs() < 1e-4, "{cycle:?}");
+            // the envelope at the turning points, three half cycles from the first one to the last
+            let envelope = damped / omega * (-zeta * omega * (cycle.time + 1.5 * PI / damped)).exp();
+            let mean = (0.5 * zeta * omega * PI / damped).cosh().powi(2);
+            assert!((cycle.amplitude / (envelope * mean) - 1.0).abs() < 1e-5, "{cycle:?} {envelope}");
         }
     }
 
@@ -204,8 +271,10 @@ mod tests {
             (sign * (amplitude * phase.cos() + loss), -sign * amplitude * omega * phase.sin())
         };
         let swing = |i: usize| offset - loss * (2.0 * i as f64 + 1.0);
-        for duration in [0.41, 0.45, 0.49, 0.51, 0.55, 0.59] {
-            let cycles = decay(motion, duration, 1e-3);
+        // the velocity at the beginning is zero, or rounding
+        let begins = [0.0, 1e-14, -1e-14];
+        for (duration, velocity) in [0.41, 0.45, 0.49, 0.51, 0.55, 0.59].into_iter().zip(begins.into_iter().cycle()) {
+            let cycles = decay(|t| if t > 0.0 { motion(t) } else { (motion(t).0, velocity) }, duration, 1e-3);
             assert_eq!(cycles.len(), if duration < 0.5 { 1 } else { 2 });
             for (i, cycle) in cycles.iter().enumerate() {
                 let sum = |first: usize| swing(first) + swing(first + 1);
@@ -213,6 +282,24 @@ mod tests {
                 let expected = decrement / TAU.hypot(decrement);
                 assert!((cycle.damping_ratio - expected).abs() < 1e-4, "{duration}: {cycle:?}, not {expected}");
             }
+        }
+    }
+
+    /// A second mode of 2 % of the amplitude makes turning points of its own.
+    #[test]
+    fn ripples_of_a_higher_mode_are_no_cycles() {
+        let (zeta, omega) = (0.03f64, TAU * 10.0);
+        let motion = |t: f64| {
+            let (fall, ripple) = ((-zeta * omega * t).exp(), 0.02 * (-3.0 * t).exp());
+            let (fast, phase) = (31.0 * omega * t, omega * t);
+            let slow_rate = -fall * omega * (zeta * phase.cos() + phase.sin());
+            let fast_rate = ripple * (31.0 * omega * fast.cos() - 3.0 * fast.sin());
+            (fall * phase.cos() + ripple * fast.sin(), slow_rate + fast_rate)
+        };
+        let cycles = decay(motion, 1.0, 1e-4);
+        assert!((8..=10).contains(&cycles.len()), "{}", cycles.len());
+        for cycle in &cycles {
+            assert!((cycle.frequency - 10.0).abs() < 0.5 && (cycle.damping_ratio - zeta).abs() < 0.02, "{cycle:?}");
         }
     }
 

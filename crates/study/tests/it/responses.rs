@@ -965,7 +965,10 @@ time_step = "{step}"
             // swing begins
             let next = |turn: f64| shrinks * (turn - friction / k) - friction / k;
             let (second, third) = (next(turn), next(next(turn)));
-            let mean = 0.5 * (0.5 * (turn + second) + 0.5 * (second + third));
+            // the motion stops at the third turning point of the last cycle
+            let last = if next(third) > -third { 0.5 * (third + next(third)) } else { 0.0 };
+            let swings = [0.5 * (turn + second), 0.5 * (second + third), last];
+            let mean = 0.5 * ((swings[0] + swings[1]) * (swings[1] + swings[2])).sqrt();
             assert!((amplitude / mean - 1.0).abs() < 1e-9, "{step}: {amplitude} instead of {mean}");
             turn = third;
         }
