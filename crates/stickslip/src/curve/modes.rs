@@ -30,6 +30,7 @@ use crate::method::{MethodError, alternatives};
 use crate::model::System;
 use mode_curve::ModeCurve;
 use num_complex::Complex64;
+use std::fmt;
 use stickslip_numerics::tie_break::first_largest;
 
 /// A point of a nonlinear mode.
@@ -156,33 +157,69 @@ fn equations(system: &System, harmonics: usize, samples: usize) -> Result<ModeEq
 /// assert!((mode.points[0].omega / stuck - 1.0).abs() < 1e-6);
 /// ```
 pub fn nonlinear_mode(system: &System, request: ModeRequest) -> Result<Mode, MethodError> {
-    let mut equations = equations(system, request.harmonics, request.samples)?;
-    let (low, high) = request.range;
-    let last = request.points.max(2) - 1;
-    let followed = ModeBranches::new(&mut equations, request);
-    let larger = |a: &(f64, ModeState), b: &(f64, ModeState)| a.1.damping.total_cmp(&b.1.damping);
-    let largest =
-        followed.curves().filter_map(|curve| curve.largest_damping(&mut equations, (low, high))).max_by(larger);
-    let merges = followed.curves().flat_map(|curve| curve.merges(&equations)).filter(|a| (low..high).contains(a));
-    let turns = followed.curves().flat_map(ModeCurve::turns).filter(|turn| turn.amplitude < high);
-    let mut mode = Mode {
-        points: Vec::new(),
-        largest: largest.map(|(a, state)| point(&equations, a, &state)),
-        coalescences: merges.collect(),
-        turns: turns.collect(),
-        not_found: Vec::new(),
-        ended: followed.ended(high),
-        is_travelling_wave: followed.curves().any(ModeCurve::travels),
-    };
-    for i in 0..=last {
-        let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
-        match followed.curves().find_map(|curve| curve.state_at(&mut equations, amplitude)) {
-            Some(state) => mode.points.push(point(&equations, amplitude, &state)),
-            None if followed.passes(amplitude) => mode.not_found.push(amplitude),
-            None => {}
-        }
+    Ok(FollowedMode::new(system, request)?.mode())
+}
+
+/// A nonlinear mode whose curve is known, for points at any amplitudes.
+pub struct FollowedMode<'a> {
+    equations: ModeEquations<'a>,
+    request: ModeRequest,
+    branches: ModeBranches,
+}
+
+impl fmt::Debug for FollowedMode<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FollowedMode").field("request", &self.request).finish_non_exhaustive()
     }
-    Ok(mode)
+}
+
+impl<'a> FollowedMode<'a> {
+    /// Follows a mode through its range of amplitudes.
+    ///
+    /// # Errors
+    /// See [`nonlinear_mode`].
+    pub fn new(system: &'a System, request: ModeRequest) -> Result<Self, MethodError> {
+        let mut equations = equations(system, request.harmonics, request.samples)?;
+        let branches = ModeBranches::new(&mut equations, request);
+        Ok(FollowedMode { equations, request, branches })
+    }
+
+    /// Returns the mode with its requested points.
+    pub fn mode(&mut self) -> Mode {
+        let FollowedMode { equations, request, branches } = self;
+        let (low, high) = request.range;
+        let last = request.points.max(2) - 1;
+        let larger = |a: &(f64, ModeState), b: &(f64, ModeState)| a.1.damping.total_cmp(&b.1.damping);
+        let largest = branches.curves().filter_map(|curve| curve.largest_damping(equations, (low, high)));
+        let largest = largest.max_by(larger);
+        let merges = branches.curves().flat_map(|curve| curve.merges(equations)).filter(|a| (low..high).contains(a));
+        let turns = branches.curves().flat_map(ModeCurve::turns).filter(|turn| turn.amplitude < high);
+        let mut mode = Mode {
+            points: Vec::new(),
+            largest: largest.map(|(a, state)| point(equations, a, &state)),
+            coalescences: merges.collect(),
+            turns: turns.collect(),
+            not_found: Vec::new(),
+            ended: branches.ended(high),
+            is_travelling_wave: branches.curves().any(ModeCurve::travels),
+        };
+        for i in 0..=last {
+            let amplitude = if i == last { high } else { low * (high / low).powf(i as f64 / last as f64) };
+            match self.point(amplitude) {
+                Some(point) => mode.points.push(point),
+                None if self.branches.passes(amplitude) => mode.not_found.push(amplitude),
+                None => {}
+            }
+        }
+        mode
+    }
+
+    /// Returns the motion at a modal amplitude, m √kg; `None` if the curve has none there.
+    pub fn point(&mut self, amplitude: f64) -> Option<ModePoint> {
+        let FollowedMode { equations, branches, .. } = self;
+        let state = branches.curves().find_map(|curve| curve.state_at(equations, amplitude))?;
+        Some(point(equations, amplitude, &state))
+    }
 }
 
 /// The curve of a mode: a branch from large amplitudes downwards. A branch from small amplitudes

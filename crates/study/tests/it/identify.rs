@@ -396,6 +396,23 @@ fn a_column_of_another_quantity_is_named() {
 /// The velocity of one point does not determine the motion of its body: it is refused before the
 /// run, as in a transient.
 #[test]
+fn phases_in_degrees_need_their_unit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let targets = format!("{FIT}targets = [{{ data = \"test\", is = \"response\", at = \"m\" }}]");
+    let name = folder.path().join("study.toml").display().to_string();
+    for (title, is_refused) in [("phase", true), ("phase_deg", false)] {
+        let rows = format!("frequency_Hz,force_N,response_m,{title}\n10,1,1e-3,-4\n11,1,2e-3,-90\n12,1,1e-3,-176\n");
+        std::fs::write(folder.path().join("data.csv"), rows).expect("the data");
+        let error = read_study(&name, &oscillator(&targets, FORCE), &[]).err();
+        assert_eq!(error.is_some(), is_refused, "{error:?}");
+        if let Some(error) = error {
+            let said = format!("{error} {}", error.help_text().unwrap_or_default());
+            assert!(said.contains("reaches 176 without a unit") && said.contains("phase_deg"), "{said}");
+        }
+    }
+}
+
+#[test]
 fn a_place_has_no_start_velocity() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("data.csv"), "time_s,response_m\n0,1\n1,0.5\n2,0.2\n").expect("the data");
@@ -431,6 +448,33 @@ fn a_backbone_of_a_hardening_spring() {
     for (name, truth, tolerance) in [("k", k, 1e-5), ("b", b, 1e-2)] {
         let found = estimate(&dataset, name);
         assert!((found.value / truth - 1.0).abs() < tolerance, "{name}: {}", found.value);
+    }
+}
+
+/// Frequency and damping of a Jenkins element beside a stiff spring, by its describing function: the
+/// damping has a kink where the element begins to slip, between rows.
+#[test]
+fn a_backbone_across_the_onset_of_slip() {
+    let (m, k, kt, limit): (f64, f64, f64, f64) = (2.0, 2e4, 200.0, 0.02);
+    let rows = (0..24).map(|i| {
+        let a = limit / kt * 0.55 * 10f64.powf(f64::from(i) / 20.0);
+        let theta = if a > limit / kt { (1.0 - 2.0 * limit / (kt * a)).acos() } else { std::f64::consts::PI };
+        let stiffness = k + kt / std::f64::consts::PI * (theta - 0.5 * (2.0 * theta).sin());
+        let loss = (4.0 * limit * (a - limit / kt)).max(0.0);
+        vec![a, (stiffness / m).sqrt() / TAU, loss / (TAU * stiffness * a * a)]
+    });
+    let joint = "[[joint]]\nname = \"pad\"\nbetween = [\"m\", \"ground\"]\n\
+        law = { kind = \"jenkins\", stiffness = \"b\", limit = \"F\" }\n";
+    let targets = "fit.b = { from = \"10 N/m\", to = \"1e4 N/m\", scale = \"log\" }\n\
+        fit.F = { from = \"1 mN\", to = \"1 N\", scale = \"log\" }\n\
+        targets = [{ data = \"test\", is = \"backbone\", at = \"m\", weight = \"1 % of largest\" }]";
+    let study = oscillator(targets, joint)
+        .replace("x0 = \"1 mm\"", "b = \"1e3 N/m\"\nF = \"0.1 N\"")
+        .replace("k = \"1e3 N/m\"\nc = \"0.1 kg/s\"", &format!("k = {k}\nc = 0"));
+    let dataset = identify(&csv("amplitude_m,frequency_Hz,damping", rows), &study);
+    for (name, truth) in [("b", kt), ("F", limit)] {
+        let found = estimate(&dataset, name);
+        assert!((found.value / truth - 1.0).abs() < 2e-3, "{name}: {} {:?}", found.value, dataset.notes);
     }
 }
 

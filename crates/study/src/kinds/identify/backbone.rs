@@ -1,13 +1,14 @@
 //! Backbones: frequency, and damping ratio if it was measured, over the amplitude of a place.
 //!
-//! The nonlinear mode is computed at amplitudes with equal ratios, and interpolated at those of
-//! the rows by cubic Hermite polynomials over the logarithm of the amplitude.
+//! The nonlinear mode is computed at the amplitude of every row: friction gives it kinks where a
+//! joint begins to slip, at which an interpolation errs. A curve of few points only converts the
+//! amplitude of the place to that of the mode.
 
 use super::targets::{Fitted, MeasuredRows, Quantity, RowStates, Target, TargetInput};
 use crate::case::study::Case;
 use crate::case::values::hertz;
 use crate::data::ColumnError;
-use stickslip::curve::modes::{ModeRequest, nonlinear_mode, unit_amplitude};
+use stickslip::curve::modes::{FollowedMode, ModePoint, ModeRequest, unit_amplitude};
 use stickslip::dimension::Dimension;
 
 /// Points of the mode per decade of amplitude, and at least.
@@ -95,29 +96,27 @@ impl Target for Backbone {
             let decades = (range.1 / range.0).log10();
             let points = LEAST_POINTS.max((PER_DECADE * decades).ceil() as usize);
             let request = ModeRequest { mode: self.mode, range, points, harmonics: HARMONICS, samples: SAMPLES };
-            let mode = nonlinear_mode(&system, request).map_err(|error| error.to_string())?;
+            let mut followed = FollowedMode::new(&system, request).map_err(|error| error.to_string())?;
+            let mode = followed.mode();
             if let Some(end) = mode.ended {
                 return Err(format!("the nonlinear mode ends: {}", end.reason));
             }
-            let mut curve: Vec<[f64; 3]> = mode
-                .points
-                .iter()
-                .map(|point| {
-                    let size = point.places[place].norm() * point.omega.powi(self.quantity.derivatives);
-                    [size.ln(), hertz(point.omega), point.damping]
-                })
-                .collect();
+            let size = |point: &ModePoint| point.places[place].norm() * point.omega.powi(self.quantity.derivatives);
+            let mut curve: Vec<[f64; 2]> =
+                mode.points.iter().map(|point| [size(point).ln(), point.amplitude.ln()]).collect();
             curve.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            let (Some(first), Some(last)) = (curve.first(), curve.last()) else { break };
+            let [first, .., last] = &curve[..] else { break };
             let (least, most) =
                 self.amplitudes.iter().fold((f64::INFINITY, 0.0f64), |(a, b), x| (a.min(*x), b.max(*x)));
             if first[0] <= least.ln() && last[0] >= most.ln() {
-                let of = |amplitude: f64, which: usize| hermite(&curve, amplitude.ln(), which);
-                let values = self.amplitudes.iter().flat_map(|amplitude| {
-                    let damping = self.has_damping.then(|| of(*amplitude, 2));
-                    std::iter::once(of(*amplitude, 1)).chain(damping)
-                });
-                return Ok(Fitted { values: values.collect(), states: Vec::new() });
+                let mut values = Vec::with_capacity(2 * self.amplitudes.len());
+                for (row, &amplitude) in self.amplitudes.iter().enumerate() {
+                    let point = point_of_size(&mut followed, &curve, amplitude, &size);
+                    let point = point.ok_or_else(|| format!("row {}: no motion of the mode was found", row + 1))?;
+                    values.push(hertz(point.omega));
+                    values.extend(self.has_damping.then_some(point.damping));
+                }
+                return Ok(Fitted { values, states: Vec::new() });
             }
             // the place moves less than the largest one: widen the range by their ratio
             let reach = |ratio: f64| if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
@@ -134,33 +133,28 @@ impl Target for Backbone {
 const HARMONICS: usize = 9;
 const SAMPLES: usize = 512;
 
-/// Interpolates a curve over its first coordinate.
-fn hermite(curve: &[[f64; 3]], x: f64, which: usize) -> f64 {
-    let above = curve.partition_point(|point| point[0] < x).clamp(1, curve.len() - 1);
-    let (a, b) = (&curve[above - 1], &curve[above]);
-    let h = b[0] - a[0];
-    if h <= 0.0 {
-        return a[which];
+/// Returns the motion of a mode in which a place has this amplitude; `curve` has logarithms of the
+/// amplitudes of the place and of the mode.
+fn point_of_size(
+    mode: &mut FollowedMode<'_>,
+    curve: &[[f64; 2]],
+    amplitude: f64,
+    size: &impl Fn(&ModePoint) -> f64,
+) -> Option<ModePoint> {
+    let target = amplitude.ln();
+    let above = curve.partition_point(|point| point[0] < target).clamp(1, curve.len() - 1);
+    let [[from, low], [to, high]] = [curve[above - 1], curve[above]];
+    let slope = if to > from { (high - low) / (to - from) } else { 1.0 };
+    let mut modal = low + slope * (target - from);
+    let mut point = mode.point(modal.exp())?;
+    // Both amplitudes are nearly proportional: each correction reduces the error about tenfold.
+    for _ in 0..8 {
+        let error = target - size(&point).ln();
+        if error.abs() < 1e-9 {
+            break;
+        }
+        modal += slope * error;
+        point = mode.point(modal.exp())?;
     }
-    let slope = |at: usize| {
-        let (from, to) = (&curve[at.saturating_sub(1)], &curve[(at + 1).min(curve.len() - 1)]);
-        let run = to[0] - from[0];
-        if run > 0.0 { (to[which] - from[which]) / run } else { 0.0 }
-    };
-    let t = (x - a[0]) / h;
-    let (from, to) = (h * slope(above - 1), h * slope(above));
-    let rise = b[which] - a[which];
-    a[which] + t * (from + t * (3.0 * rise - 2.0 * from - to + t * (from + to - 2.0 * rise)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_parabola_is_interpolated_exactly_between_inner_points() {
-        let curve: Vec<[f64; 3]> = (0..6).map(f64::from).map(|x| [x, x * x, 1.0 - x]).collect();
-        assert!((hermite(&curve, 2.3, 1) - 2.3 * 2.3).abs() < 1e-12);
-        assert!((hermite(&curve, 2.3, 2) + 1.3).abs() < 1e-12);
-    }
+    Some(point)
 }

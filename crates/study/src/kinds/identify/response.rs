@@ -10,6 +10,7 @@ use crate::case::study::Case;
 use crate::case::values::hertz;
 use crate::data::ColumnError;
 use num_complex::Complex64;
+use std::f64::consts::TAU;
 use stickslip::dimension::Dimension;
 
 /// Rows of a frequency response.
@@ -77,6 +78,17 @@ fn complex_values(input: &TargetInput<'_>, dimension: Dimension) -> Result<Respo
     let Some(phases) = input.optional_column("phase", Dimension::ANGLE)? else {
         return Ok(ResponseValues { magnitudes, complex: Vec::new(), is_complex: false });
     };
+    // Four turns: phases in rad over many resonances stay below, those in degrees do not.
+    let most_turns = 4.0;
+    let largest = phases.iter().fold(0.0f64, |most, phase| most.max(phase.abs()));
+    if !input.data.has_unit("phase") && largest > most_turns * TAU {
+        let message = format!(
+            "the column of `phase` of `{}` reaches {largest:.0} without a unit, so it is in degrees rather than rad",
+            input.data.name
+        );
+        let help = "state its unit: the title `phase_deg`, or columns = { phase = \"NAME [deg]\" }".to_owned();
+        return Err(ColumnError { message, help });
+    }
     // Q = (jω)^q X and P = (jω)^p X: the phase of Q leads that of P by (q - p) 90°
     let turns = input.quantity.derivatives - input.phase_of.derivatives;
     let lead = Complex64::new(0.0, 1.0).powi(turns);
