@@ -220,6 +220,18 @@ def test_modes_begin_stuck_and_end_free():
     np.testing.assert_allclose(known["stuck_Hz"], [alone, stuck], rtol=1e-12)
 
 
+def test_modes_have_the_notes_of_the_study():
+    with pytest.raises(stickslip.ModelError, match="mode 3: the structure has no such mode"):
+        couple().modes((1e-6, 1.0), mode=3)
+    # sliding of a rigid joint exceeds critical damping at small amplitudes
+    model = stickslip.Model()
+    model.mass("b", 1.0)
+    model.spring("b", "ground", stiffness=1e4)
+    model.joint("j", "b", "ground", stickslip.law("coulomb", limit=1.0))
+    notes = model.modes((1e-5, 1e-1), points=9).notes
+    assert any("the damping ratio exceeds 1" in note for note in notes), notes
+
+
 def test_laws_take_quantities_and_say_what_they_miss():
     law = stickslip.law("jenkins", stiffness="10 N/mm", limit=2)
     assert law.parameters == {"stiffness": 1e4, "limit": 2.0} and law.directions == 1

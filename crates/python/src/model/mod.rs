@@ -33,9 +33,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use stickslip::curve::modes::{ModeRequest, nonlinear_mode};
+use stickslip::curve::modes::{ModeRequest, nonlinear_mode, unit_amplitude};
 use stickslip::dimension::Dimension;
-use stickslip::method::{self, Method, Options, Seed, Solver, solver_with_alternatives};
+use stickslip::method::{self, Method, MethodError, Options, Seed, Solver, solver_with_alternatives};
 use stickslip::model::{
     Body, Disk, Force, Joint, Mass, Model, ModelError, Motion, SectorDistribution, Spring, Substructure,
     SubstructureDamping, System, View, inertia_matrix, with_rotations,
@@ -43,7 +43,8 @@ use stickslip::model::{
 use stickslip::structure::Reduction;
 use stickslip_study::dataset::{Column, Dataset, Failure, Figure, Record, Table};
 use stickslip_study::hertz;
-use stickslip_study::run::{CONVERGED, NOT_REACHED};
+use stickslip_study::kinds::modes;
+use stickslip_study::run::NOT_REACHED;
 
 /// A structure with joints and its excitation, built by method calls.
 ///
@@ -85,7 +86,7 @@ struct CachedSolver {
 }
 
 /// Creates the solver of a system that is stored together with the solver.
-fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, method::MethodError> {
+fn owned_solver(method: &dyn Method, system: &Arc<System>) -> Result<Box<dyn Solver + Send>, MethodError> {
     let solver = solver_with_alternatives(method, system)?;
     // SAFETY: the system is on the heap and does not move; `CachedSolver` drops the solver before
     // its own reference to the system, and never gives the solver away
@@ -813,14 +814,18 @@ impl PyModel {
         let request = ModeRequest { mode: mode - 1, range: (low, high), points, harmonics, samples };
         let system = Arc::new(system);
         let moved = system.clone();
-        let outcome = run_on_new_thread(py, move || nonlinear_mode(&moved, request))?;
-        let found = outcome.map_err(|cause| error::method(py, cause))?;
+        let outcome = run_on_new_thread(py, move || {
+            let unit = unit_amplitude(&moved, request.mode)?;
+            unit.map(|unit| Ok((unit, nonlinear_mode(&moved, request)?))).transpose()
+        })?;
+        let found = outcome.map_err(|cause: MethodError| error::method(py, cause))?;
+        let (unit, found) = found.ok_or_else(|| error::model(py, format!("mode {mode}: {}", modes::NO_SUCH_MODE)))?;
         let (table, figure) = figures::mode(&found, &system);
         let mut record = RunRecord::of(&[], &|_| String::new(), Vec::new(), 1, start);
-        record.points.insert(CONVERGED.to_owned(), found.points.len() as u64);
-        record
-            .notes
-            .extend(found.ended.map(|lost| format!("The mode ends at {:.3e} m √kg: {}.", lost.at, lost.reason)));
+        let (status, reason) = modes::mode_status(unit, &found);
+        record.points.insert(status.to_owned(), found.points.len() as u64);
+        record.notes.extend(reason.map(|reason| format!("{status}: {reason}")));
+        record.notes.extend(modes::remarks(unit, &found));
         Ok(self.result("modes", "Nonlinear mode", vec![table], figure, record))
     }
 

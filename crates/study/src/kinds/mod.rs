@@ -16,7 +16,7 @@ pub mod identify;
 pub(crate) mod info;
 pub(crate) mod kind;
 mod map;
-mod modes;
+pub mod modes;
 mod nodal_diameter;
 mod orbit;
 pub mod performance;

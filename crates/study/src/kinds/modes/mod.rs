@@ -201,7 +201,7 @@ fn number(prepared: &PreparedCase) -> usize {
 }
 
 /// Error text for a mode without a displacement at any place.
-const NO_SUCH_MODE: &str = "the structure has no such mode, or no place moves in it; choose another mode, or add a \
+pub const NO_SUCH_MODE: &str = "the structure has no such mode, or no place moves in it; choose another mode, or add a \
     [[place]] that moves in this mode";
 
 /// Computes the mode.
@@ -236,8 +236,9 @@ fn amplitude(unit: f64, modal: f64) -> String {
     format_with_prefix(modal / unit, "m")
 }
 
-/// Returns the status of a mode, and the reason if it is incomplete or uncertain.
-fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
+/// Returns the status of a mode, and the reason if it is incomplete or uncertain. `unit` is its
+/// modal amplitude (m √kg) per unit displacement of the place that moves most.
+pub fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     let words = |modal: f64| amplitude(unit, modal);
     if let Some(lost) = mode.ended {
         let from = if lost.at.is_finite() { format!("stopped at {}: ", words(lost.at)) } else { String::new() };
@@ -260,8 +261,8 @@ fn mode_status(unit: f64, mode: &Mode) -> (&'static str, Option<String>) {
     (CONVERGED, None)
 }
 
-/// Returns the notes about a computed mode.
-fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
+/// Returns the notes about a computed mode, with the `unit` of [`mode_status`].
+pub fn remarks(unit: f64, mode: &Mode) -> Vec<String> {
     let mut remarks: Vec<String> = mode
         .turns
         .iter()
