@@ -36,7 +36,7 @@ pub(super) struct DeclaredPlace {
     pub name: String,
     pub of: PlaceSource,
     pub moved: bool,
-    /// Radius of gyration for an angle, m.
+    /// Radius for an angle, m: that of gyration of a body, or that of the structure.
     pub radius: Option<f64>,
 }
 
@@ -96,10 +96,32 @@ impl Model {
         !self.bodies.is_empty() && self.motions.iter().any(|motion| self.is_of_body(&motion.on))
     }
 
-    /// Returns whether a place is a rotation of a body, an angle in rad.
+    /// Returns whether a place is a rotation, an angle in rad: of a body, or an observed one of the
+    /// structure.
     pub fn is_rotation(&self, place: &str) -> bool {
         let of_body = |node: &str| self.bodies.iter().any(|body| body.name == node);
         place.split_once('.').is_some_and(|(node, along)| ROTATIONS.contains(&along) && of_body(node))
+            || self.observed_rotation(place).is_some()
+    }
+
+    /// Returns the radius (m) of a place that is a rotation of the structure, if no joint, spring,
+    /// force or motion acts on it. Those on rotations are stated like those on displacements.
+    fn observed_rotation(&self, place: &str) -> Option<f64> {
+        let component = &self.substructure.as_ref()?.component;
+        let radius = component.rotation_radius()?;
+        let stated = self.places.iter().filter(|stated| stated.view_of.is_none() && stated.frame.is_none());
+        let row = stated.into_iter().find_map(|stated| {
+            let direction = stated.places().iter().position(|name| name == place)?;
+            stated.rows.get(direction)
+        })?;
+        let node = place.split_once('.').map_or(place, |(node, _)| node);
+        let joints = self.joints.iter().flat_map(|joint| &joint.between);
+        let springs = self.springs.iter().flat_map(|spring| &spring.between);
+        let forces = self.forces.iter().map(|force| &force.on);
+        let motions = self.motions.iter().map(|motion| &motion.on);
+        let is_loaded = joints.chain(springs).chain(forces).chain(motions).any(|name| name == place || name == node);
+        let is_rotation = !row.is_empty() && row.iter().all(|(at, _)| component.is_rotation(*at));
+        (is_rotation && !is_loaded).then_some(radius)
     }
 }
 
@@ -134,6 +156,9 @@ impl Places {
             if place.view_of.is_none() {
                 collected.node(element, &place.name, &place.directions, |along| PlaceSource::Component(i, along))?;
             }
+        }
+        for place in &mut collected.places.stated {
+            place.radius = model.observed_rotation(&place.name);
         }
         for (i, mass) in model.masses.iter().enumerate() {
             collected.node(Element::Mass(i), &mass.name, &mass.directions, |_| PlaceSource::Own(mass.mass))?;

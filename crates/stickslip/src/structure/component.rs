@@ -50,9 +50,14 @@ use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, mult
 #[derive(Clone)]
 pub struct Component(Arc<ComponentData>);
 
+/// Ends of the names of rows that are rotations.
+const ROTATIONS: [&str; 3] = [".rx", ".ry", ".rz"];
+
 struct ComponentData {
     rows: Vec<String>,
     index: OnceLock<HashMap<String, usize>>,
+    /// The result of [`Component::rotation_radius`].
+    rotation_radius: OnceLock<Option<f64>>,
     whole: FullStructure,
     /// True if the mass matrix is positive definite.
     definite_mass: bool,
@@ -218,6 +223,7 @@ impl Component {
         Ok(Component(Arc::new(ComponentData {
             rows,
             index,
+            rotation_radius: OnceLock::new(),
             whole,
             definite_mass,
             kept: OnceLock::new(),
@@ -278,6 +284,27 @@ impl Component {
     /// Returns the names of the rows; unnamed rows have an empty name.
     pub fn rows(&self) -> &[String] {
         &self.0.rows
+    }
+
+    /// Returns whether a row is a rotation: its name ends with `.rx`, `.ry` or `.rz`.
+    pub(crate) fn is_rotation(&self, row: usize) -> bool {
+        ROTATIONS.iter().any(|along| self.0.rows[row].ends_with(along))
+    }
+
+    /// Returns the radius (m) at which a rotation of the structure counts as a displacement, from the
+    /// stiffnesses of rotations and displacements; `None` if it has only one of both.
+    pub(crate) fn rotation_radius(&self) -> Option<f64> {
+        *self.0.rotation_radius.get_or_init(|| {
+            if !(0..self.rows().len()).any(|row| self.is_rotation(row)) {
+                return None;
+            }
+            let largest = |rotations: bool| {
+                let rows = (0..self.rows().len()).filter(|row| self.is_rotation(*row) == rotations);
+                rows.map(|row| self.0.whole.stiffness.get(row, row)).fold(0.0, f64::max)
+            };
+            let radius = (largest(true) / largest(false)).sqrt();
+            (radius.is_finite() && radius > 0.0).then_some(radius)
+        })
     }
 
     /// Returns the row with a name.

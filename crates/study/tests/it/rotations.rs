@@ -121,3 +121,42 @@ fn mixed_units_are_refused() {
         assert!(said.contains(words), "{to}: {said}");
     }
 }
+
+/// A cantilever of 1 mm length by matrices: its rotation in rad is 1500 times its deflection in m,
+/// `1.5/L`. The amplitude of a mode is that of the deflection.
+#[test]
+fn an_observed_rotation_of_a_structure_is_an_angle() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (length, bending) = (1e-3f64, 1e-6);
+    let unit = bending / length.powi(3);
+    let stiffness = [(1, 1, 12.0 * unit), (2, 1, -6.0 * length * unit), (2, 2, 4.0 * length * length * unit)];
+    let mass = [(1, 1, 1e-3), (2, 2, 1e-12)];
+    let write = |name: &str, entries: &[(usize, usize, f64)]| {
+        let rows: String = entries.iter().map(|(row, column, value)| format!("{row} {column} {value:e}\n")).collect();
+        let text = format!("%%MatrixMarket matrix coordinate real symmetric\n2 2 {}\n{rows}", entries.len());
+        std::fs::write(folder.path().join(name), text).expect("a matrix");
+    };
+    write("k.mtx", &stiffness);
+    write("m.mtx", &mass);
+    std::fs::write(folder.path().join("rows.csv"), "row,name\n1,1.z\n2,1.ry\n").expect("the rows");
+    let head = "schema = 1\n[structure]\nstiffness = \"k.mtx\"\nmass = \"m.mtx\"\ndofs = \"rows.csv\"\nunits = \"m-kg-s\"\n\
+        reduce = false\nrayleigh = { stiffness = \"1e-6 s\" }\n\
+        [[place]]\nname = \"w\"\ndof = \"1.z\"\n[[place]]\nname = \"t\"\ndof = \"1.ry\"\n\
+        [[joint]]\nname = \"pad\"\nbetween = [\"w\", \"ground\"]\nlaw = { kind = \"jenkins\", stiffness = 10.0, limit = \"1 N\" }\n";
+    let run = |study: &str| {
+        let path = folder.path().join("study.toml");
+        std::fs::write(&path, format!("{head}{study}")).expect("the study");
+        let study = stickslip_study::read_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+        run(&study, &Context::without_progress(1)).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let response = run(
+        "[[force]]\non = \"w\"\namplitude = \"1 mN\"\n[study]\nkind = \"response\"\nfrequency = [\"0.01 Hz\", \"0.02 Hz\"]\n",
+    );
+    let first = |column: &str| response.tables[0].numbers(column).unwrap_or_else(|| panic!("{column}"))[0];
+    let deflection = 1e-3 / (3.0 * unit + 10.0);
+    assert!((first("w_amplitude_m") / deflection - 1.0).abs() < 1e-6);
+    assert!((first("t_amplitude_rad") / (1.5 / length * deflection) - 1.0).abs() < 1e-6);
+    let modes = run("[study]\nkind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\n");
+    let amplitudes = modes.tables[0].numbers("w_amplitude_m").expect("the deflection");
+    assert!((amplitudes[2] / 1e-3 - 1.0).abs() < 0.01, "{amplitudes:?}");
+}
