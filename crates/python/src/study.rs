@@ -87,7 +87,7 @@ impl PyStudy {
         Ok(PyStudy { study, file, overrides, method, data: Arc::default(), checked: Arc::default() })
     }
 
-    /// Reads a study from its text, beside contents of files of data.
+    /// Reads a study from its text; `data` has contents of files of data.
     fn from_parts(
         py: Python<'_>,
         (file, text): (String, String),

@@ -76,9 +76,9 @@ impl BulkCard<'_> {
     }
 }
 
-/// What applies to all cards of a deck.
+/// Sets, coordinate systems and defaults of a deck, for all of its cards.
 #[derive(Default)]
-struct Deck {
+struct BulkDeck {
     sets: Vec<StatedSet>,
     systems: CoordinateSystems,
     /// Systems of coordinates and of displacements of grid points that state none.
@@ -87,7 +87,7 @@ struct Deck {
 
 fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
     // grid points may precede their system
-    let mut deck = Deck::default();
+    let mut deck = BulkDeck::default();
     read_deck(file, 0, &mut deck, &mut |deck, card| add_system(deck, card))?;
     let defining: BTreeSet<i64> = deck.systems.defining_points().collect();
     if !defining.is_empty() {
@@ -105,8 +105,8 @@ fn read(file: &MeshFile<'_>, builder: &mut MeshBuilder) -> Result<(), Error> {
 fn read_deck(
     file: &MeshFile<'_>,
     depth: usize,
-    deck: &mut Deck,
-    each: &mut dyn FnMut(&mut Deck, &BulkCard) -> Result<(), Error>,
+    deck: &mut BulkDeck,
+    each: &mut dyn FnMut(&mut BulkDeck, &BulkCard) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let mut card: Option<BulkCard> = None;
     let bytes = without_tabs(file.bytes);
@@ -167,7 +167,7 @@ fn included_name(line: &Line, lines: &mut Lines) -> String {
 }
 
 /// Adds the coordinate systems that a card states.
-fn add_system(deck: &mut Deck, card: &BulkCard) -> Result<(), Error> {
+fn add_system(deck: &mut BulkDeck, card: &BulkCard) -> Result<(), Error> {
     if card.name == "GRDSET" {
         deck.default_systems = [card.integer_or(1, 0)?, card.integer_or(5, 0)?];
         return Ok(());
@@ -189,7 +189,7 @@ fn add_system(deck: &mut Deck, card: &BulkCard) -> Result<(), Error> {
 }
 
 /// Adds a grid point that defines a coordinate system.
-fn add_defining_point(deck: &mut Deck, card: &BulkCard, defining: &BTreeSet<i64>) -> Result<(), Error> {
+fn add_defining_point(deck: &mut BulkDeck, card: &BulkCard, defining: &BTreeSet<i64>) -> Result<(), Error> {
     if card.name == "GRID" && defining.contains(&card.integer(0)?) {
         let at = Coordinates { system: card.integer_or(1, deck.default_systems[0])?, values: card.coordinates(2)? };
         deck.systems.add_point(card.integer(0)?, at);
@@ -198,7 +198,7 @@ fn add_defining_point(deck: &mut Deck, card: &BulkCard, defining: &BTreeSet<i64>
 }
 
 /// Adds what a card states.
-fn add(deck: &mut Deck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
+fn add(deck: &mut BulkDeck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
     let solids = ["CTETRA", "CPYRAM", "CPENTA", "CHEXA"];
     let faces = ["CTRIA3", "CTRIA6", "CTRIAR", "CQUAD4", "CQUAD8", "CQUADR"];
     match card.name.as_str() {
@@ -219,7 +219,7 @@ fn add(deck: &mut Deck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<()
     Ok(())
 }
 
-fn grid(deck: &mut Deck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
+fn grid(deck: &mut BulkDeck, card: &BulkCard, builder: &mut MeshBuilder) -> Result<(), Error> {
     let number = card.integer(0)?;
     let [system, along] = [(1, 0), (5, 1)].map(|(at, which)| card.integer_or(at, deck.default_systems[which]));
     let unknown = |what: &str, reason: String| {

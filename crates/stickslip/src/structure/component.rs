@@ -291,8 +291,8 @@ impl Component {
         ROTATIONS.iter().any(|along| self.0.rows[row].ends_with(along))
     }
 
-    /// Returns the radius (m) at which a rotation of the structure counts as a displacement, from the
-    /// stiffnesses of rotations and displacements; `None` if it has only one of both.
+    /// Returns the radius (m) at which a rotation of the structure counts as a displacement, from
+    /// the stiffnesses of rotations and displacements; `None` if it has only one of both.
     pub(crate) fn rotation_radius(&self) -> Option<f64> {
         *self.0.rotation_radius.get_or_init(|| {
             if !(0..self.rows().len()).any(|row| self.is_rotation(row)) {

@@ -83,7 +83,7 @@ impl Decay {
         let first = self.first.filter(|[_, _, velocity]| velocity.abs() <= rounding * self.fastest);
         let first = first.map(|[time, displacement, _]| (time, displacement));
         let least = rounding * self.extent();
-        // a velocity of the other sign than the next one has a turning point beside the first one
+        // a first velocity of the other sign than the next one makes a second turning point there
         let later = self.turns.iter().skip_while(|turn| first.is_some_and(|first| swing(first, **turn) <= least));
         first.into_iter().chain(later.copied()).collect()
     }
@@ -285,7 +285,7 @@ mod tests {
         }
     }
 
-    /// A second mode of 2 % of the amplitude makes turning points of its own.
+    /// A higher mode of 2 % of the amplitude adds turning points.
     #[test]
     fn ripples_of_a_higher_mode_are_no_cycles() {
         let (zeta, omega) = (0.03f64, TAU * 10.0);

@@ -250,9 +250,9 @@ impl fmt::Display for ModelSummary {
         let Self { size, cases, .. } = self;
         let rows = format!("{} row{}", size.rows, if size.rows == 1 { "" } else { "s" });
         let cases = format!("{cases} case{}", plural_suffix(*cases));
-        let beside = if self.structure.is_some() { " beside the matrices" } else { "" };
+        let without = if self.structure.is_some() { " without the matrices" } else { "" };
         let results = format!(
-            "{cases}, {rows}, {} of tables, {} of memory{beside}",
+            "{cases}, {rows}, {} of tables, {} of memory{without}",
             format_bytes(size.results),
             format_bytes(size.memory)
         );

@@ -7,8 +7,8 @@
 //! count as absolute standard deviations. Intervals use Student's distribution. They hold for
 //! residuals without structure and a model that is nearly linear within them.
 //!
-//! With a loss `ρ` that limits outliers, the minimum has the slopes `ψ = ρ'(r²) r` of the residuals,
-//! and the covariance is `s² (JᵀJ)⁻¹ / m²`, `s² = Σ ψ² / (n - p)`, with the mean `m` of the
+//! With a loss `ρ` that limits outliers, the residuals have the slopes `ψ = ρ'(r²) r`, and the
+//! covariance is `s² (JᵀJ)⁻¹ / m²`, `s² = Σ ψ² / (n - p)`, with the mean `m` of the
 //! derivatives `dψ/dr`. For squares, `ψ = r` and `m = 1`.
 //! Sources: G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), chapters 2 and 5; P. J. Huber,
 //! Robust Statistics (1981), section 7.6.
@@ -475,8 +475,8 @@ impl NormalEquations {
 fn mean_curvature(loss: Loss, residuals: &[f64], weights: &[f64]) -> f64 {
     let mean = |sum: f64| sum / residuals.len().max(1) as f64;
     let curvature = mean(residuals.iter().map(|r| loss.slope_derivative(*r)).sum());
-    // If nearly all residuals exceed their standard deviation, positive and negative curvatures of a
-    // bounded loss cancel. It is then at least this fraction of the mean weight.
+    // If nearly all residuals exceed their standard deviation, positive and negative curvatures of
+    // a bounded loss cancel. The mean is then at least this fraction of the mean weight.
     let least = 0.1 * mean(weights.iter().sum());
     curvature.max(least).max(f64::MIN_POSITIVE)
 }
