@@ -396,6 +396,18 @@ fn a_column_of_another_quantity_is_named() {
 /// The velocity of one point does not determine the motion of its body: it is refused before the
 /// run, as in a transient.
 #[test]
+fn the_most_unequal_step_of_a_ring_down_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let targets =
+        format!("{FIT}start = {{ m = \"x0\" }}\ntargets = [{{ data = \"test\", is = \"ring-down\", at = \"m\" }}]");
+    let name = folder.path().join("study.toml").display().to_string();
+    let rows = "time_s,response_m\n0,1\n0.001,0.5\n0.002,0.2\n0.009,-0.1\n0.01,-0.2\n";
+    std::fs::write(folder.path().join("data.csv"), rows).expect("the data");
+    let error = read_study(&name, &oscillator(&targets, ""), &[]).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("equal steps: 7 ms from row 3 to row 4, usually 1 ms"), "{error}");
+}
+
+#[test]
 fn phases_in_degrees_need_their_unit() {
     let folder = tempfile::tempdir().expect("a folder");
     let targets = format!("{FIT}targets = [{{ data = \"test\", is = \"response\", at = \"m\" }}]");

@@ -7,10 +7,12 @@ use super::targets::{Fitted, MeasuredRows, Quantity, RowStates, Target, TargetIn
 use crate::case::initial_state::{Start, StartKeys};
 use crate::case::study::Case;
 use crate::data::ColumnError;
+use crate::syntax::format::format_with_prefix;
 use stickslip::dimension::Dimension;
 use stickslip::method::WIDTH;
 use stickslip::method::time_history::{Excitation, TimeHistory};
 use stickslip_formats::data::Column;
+use stickslip_numerics::tie_break::first_largest;
 
 /// Rows of a free decay.
 #[derive(Debug)]
@@ -29,7 +31,7 @@ impl RingDown {
         let time = input.column("time", Dimension::TIME)?;
         let response = input.column("response", quantity.dimension())?;
         let sampling = Column { values: time.clone(), ..Column::default() }.sampling().ok_or_else(|| ColumnError {
-            message: format!("the times of `{}` do not increase in equal steps", input.data.name),
+            message: format!("the times of `{}` do not increase in equal steps{}", input.data.name, uneven(&time)),
             help: "resample a record with a gap; several records need a column `group` and a target each, with \
                    `groups = 1` and `groups = 2`"
                 .to_owned(),
@@ -52,6 +54,17 @@ impl RingDown {
             measured: input.measured_rows(measured),
         })
     }
+}
+
+/// Returns the most unequal step in words; nothing if there are not two steps.
+fn uneven(times: &[f64]) -> String {
+    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let Some(usual) = sorted.get(sorted.len() / 2).filter(|_| steps.len() > 1) else { return String::new() };
+    let Some(row) = first_largest(steps.iter().map(|step| (step - usual).abs())) else { return String::new() };
+    let words = |step: f64| format_with_prefix(step, "s");
+    format!(": {} from row {} to row {}, usually {}", words(steps[row]), row + 1, row + 2, words(*usual))
 }
 
 impl Target for RingDown {
