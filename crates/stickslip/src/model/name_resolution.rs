@@ -109,12 +109,17 @@ impl Model {
     fn observed_rotation(&self, place: &str) -> Option<f64> {
         let component = &self.substructure.as_ref()?.component;
         let radius = component.rotation_radius()?;
-        let stated = self.places.iter().filter(|stated| stated.view_of.is_none() && stated.frame.is_none());
-        let row = stated.into_iter().find_map(|stated| {
-            let direction = stated.places().iter().position(|name| name == place)?;
-            stated.rows.get(direction)
-        })?;
-        let node = place.split_once('.').map_or(place, |(node, _)| node);
+        let (node, along) = place.split_once('.').map_or((place, None), |(node, along)| (node, Some(along)));
+        let stated = self.places.iter().find(|stated| stated.name == node)?;
+        if stated.view_of.is_some() || stated.frame.is_some() {
+            return None;
+        }
+        let direction = match along {
+            Some(along) => stated.directions.iter().position(|name| name == along)?,
+            None if stated.directions.is_empty() => 0,
+            None => return None,
+        };
+        let row = stated.rows.get(direction)?;
         let joints = self.joints.iter().flat_map(|joint| &joint.between);
         let springs = self.springs.iter().flat_map(|spring| &spring.between);
         let forces = self.forces.iter().map(|force| &force.on);
