@@ -460,7 +460,7 @@ class Campaign:
             "name": study.name,
             "kind": study.kind,
             "units": study.units,
-            "study": list(study.__reduce__()[1]),
+            "study": list(study.__reduce__()[1][:4]),  # without data in memory, which only `identify` has
             "files": study._files,
         }
         head = json.loads(json.dumps(head))
