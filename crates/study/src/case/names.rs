@@ -16,6 +16,8 @@ const MAX_LISTED: usize = 12;
 #[derive(Debug, Default)]
 pub(crate) struct ModelNames {
     known: Vec<(String, Vec<String>)>,
+    /// Rotations, which the key does not take.
+    rotations: Vec<String>,
 }
 
 /// Returns one entry per label. If no label equals `name`, adds `name` as an entry for all of
@@ -32,6 +34,10 @@ fn body_places(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.bodies.iter().flat_map(|body| entries(&body.name, body.places()))
 }
 
+fn rotations(model: &Model) -> Vec<String> {
+    model.place_names().into_iter().filter(|place| model.is_rotation(place)).collect()
+}
+
 fn mass_places(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places()))
 }
@@ -40,7 +46,8 @@ impl ModelNames {
     /// The places of the structure, of masses and of bodies, and their nodes.
     pub fn places(model: &Model) -> ModelNames {
         let places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
-        let mut names = ModelNames { known: places.chain(mass_places(model)).chain(body_places(model)).collect() };
+        let known = places.chain(mass_places(model)).chain(body_places(model)).collect();
+        let mut names = ModelNames { known, rotations: Vec::new() };
         names.add_sector_names(model, model.masses.iter().map(|mass| (mass.name.as_str(), mass.places())).collect());
         names.add_sector_names(model, model.bodies.iter().map(|body| (body.name.as_str(), body.places())).collect());
         names.add_sector_names(model, model.places.iter().map(|place| (place.name.as_str(), place.places())).collect());
@@ -71,6 +78,7 @@ impl ModelNames {
         let mut names = ModelNames::places(model);
         names.known.iter_mut().for_each(|(_, places)| places.retain(|place| !model.is_rotation(place)));
         names.known.retain(|(_, places)| !places.is_empty());
+        names.rotations = rotations(model);
         names
     }
 
@@ -82,7 +90,7 @@ impl ModelNames {
             (name, places)
         });
         let named = displacements.filter(|(_, places)| !places.is_empty());
-        let mut names = ModelNames { known: mass_places(model).chain(named).collect() };
+        let mut names = ModelNames { known: mass_places(model).chain(named).collect(), rotations: rotations(model) };
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
@@ -157,6 +165,9 @@ impl ModelNames {
 
     /// Returns the message that a name is unknown.
     pub fn unknown_name(&self, what: &str, name: &str) -> String {
+        if self.rotations.iter().any(|rotation| rotation == name) {
+            return format!("`{}` is a rotation, but this key needs a displacement", excerpt(name));
+        }
         let none = format!("there is no {what} `{}`", excerpt(name));
         match name.split_once('.').filter(|_| self.directions_of(name).is_some()) {
             Some((node, direction)) => format!("{none}: `{node}` has no direction {}", excerpt(direction)),

@@ -156,6 +156,12 @@ fn an_observed_rotation_of_a_structure_is_an_angle() {
     let deflection = 1e-3 / (3.0 * unit + 10.0);
     assert!((first("w_amplitude_m") / deflection - 1.0).abs() < 1e-6);
     assert!((first("t_amplitude_rad") / (1.5 / length * deflection) - 1.0).abs() < 1e-6);
+    let peak = "[[force]]\non = \"w\"\namplitude = \"1 mN\"\n[study]\nkind = \"response\"\nfrequency = [\"0.01 Hz\", \"0.02 Hz\"]\n\
+        peak_of = \"t\"\n";
+    let path = folder.path().join("peak.toml");
+    std::fs::write(&path, format!("{head}{peak}")).expect("the study");
+    let error = stickslip_study::read_file(&path, &[]).map(drop).unwrap_err().to_string();
+    assert!(error.contains("`t` is a rotation, but this key needs a displacement"), "{error}");
     let modes = run("[study]\nkind = \"modes\"\namplitude = { from = \"1 um\", to = \"1 mm\", points = 3 }\n");
     let amplitudes = modes.tables[0].numbers("w_amplitude_m").expect("the deflection");
     assert!((amplitudes[2] / 1e-3 - 1.0).abs() < 0.01, "{amplitudes:?}");
