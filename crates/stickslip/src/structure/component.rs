@@ -9,7 +9,7 @@ use super::reduction::{
     RubinBasis, STEPS, SectorBasis, SectorReduction, StructureDamping,
 };
 use super::reduction_store::{KeptReductions, ReductionStore};
-use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector};
+use super::sector_boundary::{Blade, BladeError, Boundary, CyclicSector, DIRECTIONS};
 use super::{ModalDamping, StructureError, free_vibrations, symmetric};
 use nalgebra::DMatrix;
 use serde::de::DeserializeOwned;
@@ -49,9 +49,6 @@ use stickslip_numerics::sparse::{ModeSelection, NaturalModes, SparseMatrix, mult
 /// ```
 #[derive(Clone)]
 pub struct Component(Arc<ComponentData>);
-
-/// Ends of the names of rows that are rotations.
-const ROTATIONS: [&str; 3] = [".rx", ".ry", ".rz"];
 
 struct ComponentData {
     rows: Vec<String>,
@@ -288,7 +285,8 @@ impl Component {
 
     /// Returns whether a row is a rotation: its name ends with `.rx`, `.ry` or `.rz`.
     pub(crate) fn is_rotation(&self, row: usize) -> bool {
-        ROTATIONS.iter().any(|along| self.0.rows[row].ends_with(along))
+        let [_, rotations] = &DIRECTIONS;
+        self.0.rows[row].rsplit_once('.').is_some_and(|(_, along)| rotations.contains(&along))
     }
 
     /// Returns the radius (m) at which a rotation of the structure counts as a displacement, from

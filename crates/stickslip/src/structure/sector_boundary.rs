@@ -97,7 +97,7 @@ pub enum BoundaryError {
 }
 
 /// Names of directions that rotate together.
-const DIRECTIONS: [[&str; 3]; 2] = [["x", "y", "z"], ["rx", "ry", "rz"]];
+pub(super) const DIRECTIONS: [[&str; 3]; 2] = [["x", "y", "z"], ["rx", "ry", "rz"]];
 
 impl std::fmt::Display for CoordinateAxis {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -34,10 +34,6 @@ fn body_places(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.bodies.iter().flat_map(|body| entries(&body.name, body.places()))
 }
 
-fn rotations(model: &Model) -> Vec<String> {
-    model.place_names().into_iter().filter(|place| model.is_rotation(place)).collect()
-}
-
 fn mass_places(model: &Model) -> impl Iterator<Item = (String, Vec<String>)> {
     model.masses.iter().flat_map(|mass| entries(&mass.name, mass.places()))
 }
@@ -75,22 +71,25 @@ impl ModelNames {
 
     /// The places that are displacements, not rotations: their amplitudes can be compared.
     pub fn displacements(model: &Model) -> ModelNames {
-        let mut names = ModelNames::places(model);
-        names.known.iter_mut().for_each(|(_, places)| places.retain(|place| !model.is_rotation(place)));
-        names.known.retain(|(_, places)| !places.is_empty());
-        names.rotations = rotations(model);
-        names
+        ModelNames::places(model).without_rotations(model)
+    }
+
+    fn without_rotations(mut self, model: &Model) -> ModelNames {
+        for (_, places) in &mut self.known {
+            let (rotations, displacements): (Vec<String>, _) =
+                std::mem::take(places).into_iter().partition(|place| model.is_rotation(place));
+            self.rotations.extend(rotations);
+            *places = displacements;
+        }
+        self.known.retain(|(_, places)| !places.is_empty());
+        self
     }
 
     /// The displacements of masses, bodies and places whose motion is not imposed.
     pub fn free_displacements(model: &Model) -> ModelNames {
         let of_places = model.places.iter().flat_map(|place| entries(&place.name, place.places()));
-        let displacements = body_places(model).chain(of_places).map(|(name, mut places)| {
-            places.retain(|place| !model.is_rotation(place));
-            (name, places)
-        });
-        let named = displacements.filter(|(_, places)| !places.is_empty());
-        let mut names = ModelNames { known: mass_places(model).chain(named).collect(), rotations: rotations(model) };
+        let known = mass_places(model).chain(body_places(model)).chain(of_places).collect();
+        let mut names = ModelNames { known, rotations: Vec::new() }.without_rotations(model);
         let moved: BTreeSet<&str> = model.motions.iter().map(|motion| motion.on.as_str()).collect();
         names.known.retain(|(_, places)| !places.iter().any(|place| moved.contains(place.as_str())));
         names
