@@ -251,7 +251,7 @@ fn converted(matrix: &Matrix, out: &[usize]) -> Option<sparse::SparseMatrix> {
 fn definite(matrix: &sparse::SparseMatrix) -> &'static str {
     match sparse_definite(matrix) {
         Some(true) => "positive definite",
-        Some(false) => "positive semidefinite: it is zero for some motion",
+        Some(false) => "positive semidefinite: some motion has no energy",
         None => "not positive semidefinite",
     }
 }

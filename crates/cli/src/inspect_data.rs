@@ -37,11 +37,13 @@ pub fn inspect_data(file: &Path, text: &mut String, accepts: fn(&DataFile) -> bo
         let _ = writeln!(text, "  {}", line(column, width));
     }
     more(text, found.columns.len(), "columns");
-    for (title, list) in [("note", &found.notes), ("not read", &found.skipped)] {
+    for (title, many, list) in
+        [("note", "notes", &found.notes), ("not read", "parts that were not read", &found.skipped)]
+    {
         for entry in list.iter().take(LISTED) {
             let _ = writeln!(text, "  {title}: {entry}");
         }
-        more(text, list.len(), title);
+        more(text, list.len(), many);
     }
     for column in drawn(&found) {
         let _ = writeln!(text, "\n  {}{}", column.name, unit(column));
@@ -55,7 +57,7 @@ pub fn inspect_data(file: &Path, text: &mut String, accepts: fn(&DataFile) -> bo
 
 fn more(text: &mut String, count: usize, what: &str) {
     if count > LISTED {
-        let _ = writeln!(text, "  … and {} more: {what}", count - LISTED);
+        let _ = writeln!(text, "  … and {} more {what}", count - LISTED);
     }
 }
 

@@ -127,7 +127,7 @@ async function follow() {
     status.textContent = "";
     if (event.event === "error") { fail(event.message); return; }
     const summary = table(event, "orbits");
-    if (!summary || !table(event, "orbit")) { fail(event.failures[0]?.reason ?? "There is no orbit at this frequency."); return; }
+    if (!summary || !table(event, "orbit")) { fail(event.failures[0]?.reason ?? "No orbit was found at this frequency."); return; }
     orbit = read(event);
     empty.hidden = true;
     grid.hidden = false;
@@ -147,7 +147,7 @@ function fail(reason) {
   empty.hidden = false;
   grid.hidden = true;
   status.textContent = "";
-  empty.textContent = `No orbit: ${reason}`;
+  empty.textContent = `No orbit was found: ${reason}`;
   tell("orbit", null);
 }
 
@@ -322,7 +322,7 @@ function words() {
   const stable = get("stable");
   list.push(stable === true ? "The orbit is stable: no small disturbance grows." : stable === false ? "The orbit is unstable: a real structure leaves it." : "Its stability is not known.");
   list.push(`The energy balance closes to ${evidence(get("energy_gap"))} of the work put in.`);
-  list.push(`The motion returns to its start to ${evidence(get("return_defect") ?? get("residual"))}.`);
+  list.push(`After one period the motion deviates from its start by ${evidence(get("return_defect") ?? get("residual"))} (relative).`);
   if (get("truncation") !== null) { list.push(`Estimated error of the series: ${evidence(get("truncation"))}.`); }
   if (get("reduction_error") !== null) { list.push(`Error of the reduced model: ${evidence(get("reduction_error"))}.`); }
   list.push(...jointWords(get));

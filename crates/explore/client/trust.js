@@ -12,7 +12,7 @@ export function start() {
   // the strip keeps the last result and says that it is not that of the present values
   on("failed", () => {
     const strip = byId("trust");
-    if (strip.childElementCount > 0 && !strip.querySelector(".old")) { strip.prepend(make("span", { class: "bad old", text: "the present values have no result; before:" })); }
+    if (strip.childElementCount > 0 && !strip.querySelector(".old")) { strip.prepend(make("span", { class: "bad old", text: "no result for the present values; last result:" })); }
   });
 }
 
@@ -27,11 +27,11 @@ function show(result) {
   const warnings = result.notes.filter((/** @type {string} */ note) => note.startsWith("warning"));
   strip.replaceChildren(...[
     make("span", { class: converged === all ? "good" : "bad", text: converged === all ? (all === 1 ? "✓ converged" : `✓ all ${all} points converged`) : `${converged} of ${all} points converged; ${others.join(", ")}` }),
-    result.energy_gap === null ? null : make("span", { text: `energy gap ≤ ${evidence(result.energy_gap)}` }), result.residual === null ? null : make("span", { text: `return defect ≤ ${evidence(result.residual)}` }),
+    result.energy_gap === null ? null : make("span", { text: `energy gap ≤ ${evidence(result.energy_gap)}` }), result.residual === null ? null : make("span", { text: `residual ≤ ${evidence(result.residual)}` }),
     result.methods.length > 0 ? make("span", { text: `method: ${result.methods.join("; ")}` }) : null, found ? make("span", { text: `found by: ${found}` }) : null,
     make("span", { text: `computed in ${duration(result.seconds)}${result.reduced ? ", fewer points while moving" : ""}` }),
   ].filter((part) => part !== null));
-  const lines = [...result.notes, ...result.failures.map((/** @type {any} */ one) => `No orbit at ${one.at || "this point"}: ${one.reason}`)];
+  const lines = [...result.notes, ...result.failures.map((/** @type {any} */ one) => `No orbit was found at ${one.at || "this point"}: ${one.reason}`)];
   if (result.failed > result.failures.length) { lines.push(`and ${result.failed - result.failures.length} more points without an orbit`); }
   if (lines.length > 0) {
     const text = warnings.length > 0 ? `${warnings.length} warning${warnings.length > 1 ? "s" : ""}, ${lines.length} note${lines.length > 1 ? "s" : ""} in all` : `${lines.length} note${lines.length > 1 ? "s" : ""}`;

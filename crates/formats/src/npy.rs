@@ -61,7 +61,7 @@ impl<'a> NpyArray<'a> {
         let longest_header: usize = 4096;
         let mut data = ByteCursor::new(bytes, ByteOrder::Little);
         if data.take(MAGIC.len())? != MAGIC {
-            return Err(data.malformed("the magic of NumPy", "something else"));
+            return Err(data.malformed("the signature of NumPy", "something else"));
         }
         let major = data.u8()?;
         data.skip(1);

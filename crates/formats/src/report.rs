@@ -92,15 +92,15 @@ impl MatrixReport {
 impl fmt::Display for MatrixReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rows, columns, entries, zeros, largest, smallest, asymmetry, .. } = self;
-        write!(f, "{rows} x {columns}, {entries} entries")?;
+        write!(f, "{rows} x {columns}, {entries} {}", if *entries == 1 { "entry" } else { "entries" })?;
         if *zeros > 0 {
-            write!(f, " and {zeros} explicit zeros")?;
+            write!(f, " and {zeros} explicit zero{}", if *zeros == 1 { "" } else { "s" })?;
         }
         if !self.origin.is_empty() {
             write!(f, ", from {}", self.origin)?;
         }
         if *entries > 0 {
-            write!(f, "\nvalues from {smallest:.3e} to {largest:.3e}")?;
+            write!(f, "\nmagnitudes from {smallest:.3e} to {largest:.3e}")?;
         }
         match *asymmetry {
             0.0 => write!(f, "\nsymmetric")?,
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(report.empty_rows, [3]);
         assert_eq!(report.asymmetry, 1e-36);
         assert_eq!((report.smallest, report.zeros), (2.0, 1));
-        let text = "4 x 4, 4 entries and 1 explicit zeros\nvalues from 2.000e0 to 1.000e36\nnot symmetric: the triangles \
+        let text = "4 x 4, 4 entries and 1 explicit zero\nmagnitudes from 2.000e0 to 1.000e36\nnot symmetric: the triangles \
                     differ by 1.0e-36 of the largest value\n2 rows with a zero diagonal: 3, 4\n1 row with a negative \
                     diagonal: 2\n1 row with no entry: 4\n1 row with 1e36 on the diagonal (constrained): 1\nrows are \
                     named 1.x, 2.x, 3.x, 4.x";

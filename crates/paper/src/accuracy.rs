@@ -103,7 +103,7 @@ pub fn error_measures(results: &Results) -> ReportPart {
         ],
         tables: vec![PageTable {
             caption: "Evidence".to_owned(),
-            header: words(&["figure", "points", "failed", "residual of periodicity", "gap of energy", "time (s)"]),
+            header: words(&["figure", "points", "failed", "residual", "energy gap", "time (s)"]),
             rows: rows.collect(),
         }],
         ..Section::default()

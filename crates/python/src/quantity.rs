@@ -24,10 +24,10 @@ pub fn to_si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyRe
     }
     let number = number(value)?.ok_or_else(|| {
         let unit =
-            dimension.name_and_unit().map_or_else(|| dimension.to_string(), |(name, unit)| format!("{name} ({unit})"));
+            dimension.name_and_unit().map_or_else(|| dimension.to_string(), |(name, unit)| format!("{name} in {unit}"));
         error::model(
             py,
-            format!("{what} must be a {unit}: a number in SI units or a string with a unit, found {}", kind(value)),
+            format!("{what} ({unit}) must be a number in SI units or a string with a unit, found {}", kind(value)),
         )
     })?;
     if !number.is_finite() {

@@ -127,7 +127,7 @@ pub fn read_bytes(bytes: &[u8]) -> Result<DataFile, Error> {
         None => {
             let names: Vec<&str> = TABLE.iter().map(|format| format.name).collect();
             refuse(
-                "the content has no format of data",
+                "the content matches no known data format",
                 &format!("export the data in one of the formats {}", names.join(", ")),
             )
         }
@@ -164,7 +164,7 @@ mod tests {
             (&b""[..], "empty"),
             (b"\x1f\x8b\x08", "gunzip"),
             (b"PAR1\x00\x00", "not complete"),
-            (b"\x00\x01\x02\x03\xff\xfe", "no format of data"),
+            (b"\x00\x01\x02\x03\xff\xfe", "no known data format"),
             (b"hello\nworld\n", "no number"),
         ] {
             let error = read_bytes(bytes).expect_err("no table").to_string();

@@ -369,7 +369,7 @@ fn unsupported(what: String) -> Error {
     Error::new(
         ErrorKind::Unsupported,
         Location::File,
-        format!("{what} is not read"),
+        format!("{what} is not supported"),
         "save the table with Snappy, or as CSV",
     )
 }

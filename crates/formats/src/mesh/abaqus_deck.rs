@@ -346,7 +346,7 @@ mod tests {
             [
                 "set PAIR: 1 of 7 nodes are not in the file or not read",
                 "set LINE: 1 of 7 nodes are not in the file or not read",
-                "2 elements of type B31 are left out"
+                "elements of type B31 are left out: 2"
             ]
         );
         let top = mesh.sets().iter().find(|set| set.name == "TOP").unwrap();

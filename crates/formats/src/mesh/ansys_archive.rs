@@ -325,7 +325,7 @@ mod tests {
             mesh.nodes_of(name).unwrap().iter().map(|node| mesh.nodes()[*node].number).collect()
         };
         assert_eq!((numbers("PADS"), numbers("UPPER")), (vec![5, 6, 7, 8, 10], vec![5, 8, 9, 6, 7, 10]));
-        assert_eq!(mesh.notes(), ["1 elements of type 188 with 3 nodes are left out"]);
+        assert_eq!(mesh.notes(), ["elements of type 188 with 3 nodes are left out: 1"]);
         // the wedge and the brick share a side
         assert_eq!(mesh.outer_faces().len(), 6 + 5 - 2);
     }

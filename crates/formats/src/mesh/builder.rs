@@ -203,7 +203,7 @@ impl MeshBuilder {
             sets.push(MeshSet { name, members });
         }
         for (kind, count) in self.left_out {
-            self.notes.push(format!("{count} elements of type {kind} are left out"));
+            self.notes.push(format!("elements of type {kind} are left out: {count}"));
         }
         if self.incomplete > 0 {
             let count = self.incomplete;
@@ -213,7 +213,7 @@ impl MeshBuilder {
         if let Some((node, system)) = self.displacement_systems.first_key_value() {
             let count = self.displacement_systems.len();
             let first = format!("node {node}: coordinate system {system}");
-            self.notes.push(format!("{count} nodes have displacements along other axes than x, y and z ({first})"));
+            self.notes.push(format!("nodes with displacements along other axes than x, y and z: {count} ({first})"));
         }
         let MeshBuilder { nodes, by_number, elements, displacement_systems, notes, .. } = self;
         Ok(Mesh { nodes, by_number, elements, connectivity, sets, displacement_systems, notes, ..Mesh::default() })

@@ -105,7 +105,7 @@ impl Gmsh<'_, '_> {
             Err(Error::new(ErrorKind::Unsupported, line.location(), problem.to_owned(), remedy))
         };
         if line.integer(binary)? != 0 {
-            return refuse("the mesh is binary, which is not read");
+            return refuse("the mesh is binary, which is not supported");
         }
         match version {
             b"4.1" => Ok(true),
@@ -281,7 +281,7 @@ mod tests {
             );
             let patch = mesh.patch("PAD one").unwrap();
             assert!((patch.area() - 3.0).abs() < 1e-14 && patch.nodes()[0].normal == [0.0, 0.0, -1.0]);
-            assert_eq!(mesh.notes(), ["1 elements of type 92 of Gmsh are left out"]);
+            assert_eq!(mesh.notes(), ["elements of type 92 of Gmsh are left out: 1"]);
         }
     }
 

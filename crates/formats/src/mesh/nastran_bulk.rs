@@ -369,7 +369,7 @@ mod tests {
                 (patch.area() - 1.0).abs() < 1e-14 && patch.nodes().iter().all(|node| node.normal == [0.0, 0.0, 1.0])
             );
         }
-        assert_eq!(mesh.notes(), ["1 elements of type CBAR are left out"]);
+        assert_eq!(mesh.notes(), ["elements of type CBAR are left out: 1"]);
     }
 
     /// The middle nodes of a brick lie in the middle of their edges.

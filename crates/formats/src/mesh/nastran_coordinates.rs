@@ -236,7 +236,7 @@ mod tests {
         let stated: Vec<(i64, i64)> =
             mesh.displacement_systems().iter().map(|(node, system)| (*node, *system)).collect();
         assert_eq!(stated, [(3, 2), (4, 1), (11, 4), (12, 4)]);
-        let note = "4 nodes have displacements along other axes than x, y and z (node 3: coordinate system 2)";
+        let note = "nodes with displacements along other axes than x, y and z: 4 (node 3: coordinate system 2)";
         assert_eq!(mesh.notes(), [note]);
     }
 

@@ -139,7 +139,8 @@ impl Encoding<'_> {
             "ascii" => {
                 let words = tag.text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
                 let number = |word: &[u8]| {
-                    real(word).ok_or_else(|| tag.malformed(format!("`{}` is no number", String::from_utf8_lossy(word))))
+                    real(word)
+                        .ok_or_else(|| tag.malformed(format!("`{}` is not a number", String::from_utf8_lossy(word))))
                 };
                 return Ok(DataArray { values: words.map(number).collect::<Result<_, _>>()?, is_integer });
             }

@@ -17,7 +17,8 @@ use std::sync::Arc;
 /// Error: the matrix is singular to rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the matrix is singular: row {row} (counted from 0) depends on the others; support the part that it belongs to, or shift the matrix"
+    "the matrix is singular: row {} (the first is 1) depends on the others; support the part that it belongs to",
+    row + 1
 )]
 pub struct Singular {
     /// A row with a free motion, from 0.

@@ -612,7 +612,11 @@ impl PyModel {
         if structure.dofs() > stickslip::structure::MAX_FULL_DOFS {
             return Err(error::model(
                 py,
-                format!("the full matrices of {} degrees of freedom are too large", structure.dofs()),
+                format!(
+                    "the full matrices of {} degrees of freedom are too large; they are available up to {}",
+                    structure.dofs(),
+                    stickslip::structure::MAX_FULL_DOFS
+                ),
             ));
         }
         let out = PyDict::new(py);
@@ -795,13 +799,14 @@ impl PyModel {
         let [low, high] = quantity::numbers(amplitude, "`amplitude`")?[..] else {
             return Err(error::model(py, "`amplitude` must be two numbers, the smallest and the largest"));
         };
-        if !(low.is_finite() && high.is_finite() && 0.0 < low && low < high)
-            || mode == 0
-            || points < 2
-            || harmonics == 0
-        {
-            let message = "modes need amplitudes 0 < from < to, mode and harmonics from 1, and at least two points";
+        if !(low.is_finite() && high.is_finite() && 0.0 < low && low < high) {
+            let message = format!("`amplitude` must be two numbers 0 < smallest < largest, found {low} and {high}");
             return Err(error::model(py, message));
+        }
+        for (name, value, least) in [("mode", mode, 1), ("harmonics", harmonics, 1), ("points", points, 2)] {
+            if value < least {
+                return Err(error::model(py, format!("`{name}` must be at least {least}, found {value}")));
+            }
         }
         // The minimum number of samples avoids aliasing of harmonics.
         if samples < 4 * harmonics + 4 {

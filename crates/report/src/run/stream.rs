@@ -238,7 +238,7 @@ pub enum MergeError {
         total: usize,
     },
     /// Two shards contain the same unit.
-    #[error("{} and {} both contain unit of work {unit}: give each part once", a.display(), b.display())]
+    #[error("{} and {} both contain unit of work {unit}: give each shard once", a.display(), b.display())]
     Overlap {
         /// Folder of the first shard.
         a: PathBuf,
@@ -248,7 +248,7 @@ pub enum MergeError {
         unit: usize,
     },
     /// Some units are in no shard.
-    #[error("units of work {} to {to} of {units} are missing in the given parts{after}: run the shard that contains \
+    #[error("units of work {} to {to} of {units} are missing in the given shards{after}: run the shard that contains \
              them, or add its folder", from + 1)]
     Missing {
         /// First missing unit, from 0.

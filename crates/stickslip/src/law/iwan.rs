@@ -42,7 +42,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             "chi",
             Dimension::NONE,
             Range::Within(-1.0, 0.0),
-            "exponent of the distribution, above -1; a cycle dissipates an energy proportional to u^(chi+3)",
+            "exponent of the distribution, not -1 itself; a cycle dissipates an energy proportional to u^(chi+3)",
         ),
         Parameter::new(
             "beta",

@@ -38,7 +38,7 @@ pub(super) static INFO: LawInfo = LawInfo {
             "kappa",
             Dimension::NONE,
             Range::Within(0.0, 1.0),
-            "sharpness of the transition to slip, below 1; near 1 there is no micro-slip",
+            "sharpness of the transition to slip, not 1 itself; near 1 there is no micro-slip",
         ),
     ],
     sample: &[10_000.0, 1000.0, 5000.0, 0.6],

@@ -22,7 +22,7 @@ pub(super) const PERIOD: MethodOption = MethodOption {
     key: "period",
     dimension: Dimension::NONE,
     count: true,
-    doc: "excitation periods after which the orbit repeats; the method also finds orbits that repeat earlier; default 1",
+    doc: "number of excitation periods after which the orbit repeats; the method also finds orbits that repeat earlier; default 1",
 };
 
 /// Reads the option [`PERIOD`] of a method.

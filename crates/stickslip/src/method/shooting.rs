@@ -112,7 +112,7 @@ impl Default for ShootingSettings {
 /// The row of this method in [`super::TABLE`].
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "smooth laws, and laws defined from one state to the next: Newton's method on the return map of an implicit integration, with exact sensitivities",
+    summary: "smooth laws, and laws given by a rule for one time step: Newton's method on the return map of an implicit integration, with exact sensitivities",
     options: &[
         MethodOption {
             key: "tolerance",

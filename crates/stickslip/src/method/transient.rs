@@ -30,14 +30,14 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             key: "tolerance",
             dimension: Dimension::NONE,
             count: false,
-            doc: "estimated relative distance to the orbit at which the motion counts as settled; default 1e-7; for kind \
-                  `transient`, relative error of the integration",
+            doc: "the motion counts as settled if its estimated relative distance to the orbit is smaller; default 1e-7; \
+                  for kind `transient`, relative error of the integration",
         },
         MethodOption {
             key: "periods",
             dimension: Dimension::NONE,
             count: true,
-            doc: "most periods of the search, which ends earlier if the decay is too slow; default 50000",
+            doc: "largest number of excitation periods; the search ends earlier if the decay is too slow; default 50000",
         },
         MethodOption {
             key: WIDTH,

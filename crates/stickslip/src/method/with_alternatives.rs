@@ -105,8 +105,8 @@ fn creeping_advice(directions: &[FrictionDirection], omega: f64) -> String {
     let more = directions.len().saturating_sub(max_named);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     format!(
-        "; friction alone holds {}{more}, where a body may creep without end: hold it as the real part is held, or by a \
-         soft spring ({:.1e} {} on `{}` is soft against its inertia)",
+        "; friction alone holds {}{more}, where a body may drift: support it as the real part is supported, or by a soft \
+         spring ({:.1e} {} on `{}` is a tenth of its inertia)",
         names.join(", "),
         first.spring(omega),
         first.spring_unit(),

@@ -85,7 +85,7 @@ pub enum IntegrationError {
     /// Integration with equal steps does not reach the tolerance, however short the steps.
     #[error(
         "the estimated error with {steps} steps is {estimate:.1e}, above the tolerance {tolerance:.1e}; raise \
-         `tolerance` of method `transient`, or reduce stiffnesses that are far above the others"
+         the `tolerance` of the method, or reduce stiffnesses that are far above the others"
     )]
     Unresolved {
         /// Number of steps of the finest attempt.
@@ -214,8 +214,8 @@ pub enum OrbitError {
     },
     /// The motion does not settle.
     #[error(
-        "{method} at {}: the motion has not settled after {returns} periods; it still changes by a \
-         fraction of {change:.1e} per period{}",
+        "{method} at {}: the motion has not settled after {returns} periods of the orbit; its relative change \
+         per period is still {change:.1e}{}",
         hertz(*omega), settling_advice(*.repeats, *.needed, .advice)
     )]
     Unsettled {
@@ -374,7 +374,7 @@ pub enum ObservedMotion {
         speed: f64,
         /// The constant force along its direction, N.
         load: f64,
-        /// Stiffness of a spring that holds it and is soft against its inertia, N/m.
+        /// Stiffness of a spring that holds it with a tenth of its inertia, N/m.
         spring: f64,
         /// The joint that is separated for the largest fraction of the last period.
         joint: Box<str>,
@@ -435,8 +435,8 @@ impl std::fmt::Display for ObservedMotion {
                 }
                 write!(
                     f,
-                    "{}; hold it by a soft spring along this direction ({spring:.1e} {of_spring} is soft against its \
-                     inertia), increase the normal loads, or add damping",
+                    "{}; hold it by a soft spring along this direction ({spring:.1e} {of_spring} is a tenth of its inertia), \
+                     increase the normal loads, or add damping",
                     apart(joint, *open_fraction)
                 )
             }
@@ -465,7 +465,9 @@ fn settling_advice(repeats: Option<usize>, needed: Option<f64>, advice: &str) ->
         }
         None => match needed {
             Some(needed) => {
-                format!("; from its decay, it would settle after about {needed:.0} periods: raise `periods`{by_newton}")
+                format!(
+                    "; from its decay, it would settle after about {needed:.0} periods of the orbit: raise `periods`{by_newton}"
+                )
             }
             None => {
                 format!("; it does not decay: add damping, or examine it with kind = \"transient\"{by_newton}")

@@ -20,7 +20,7 @@ pub enum FacesError {
     /// The nodes of a pair do not coincide after rotation.
     #[error(
         "node `{low}` of the low side, rotated by 360°/{sectors} about {axis}, is {apart:.3e} away from node \
-         `{high}` (radius of the sector: {radius:.3e}){}",
+         `{high}` (radius of the sector: {radius:.3e}), in the unit of the coordinates{}",
         hint.as_ref().map_or_else(String::new, |hint| format!("; {hint}"))
     )]
     Apart {

@@ -281,7 +281,8 @@ fn no_slip_warning(cases: &[SurveyedCase]) -> Option<String> {
         return Some("no joint slips in this mode at any amplitude: its motion does not load the joints".to_owned());
     }
     Some(format!(
-        "no joint slips in this mode: the amplitudes end at {}, and the first slip is at about {}",
+        "no joint slips in this mode: the amplitudes end at {}, and the first slip is at about {}; raise `to` of \
+         `amplitude`",
         format_with_prefix(asked, "m"),
         format_with_prefix(needed, "m")
     ))

@@ -20,9 +20,9 @@ pub(crate) const WARNING: &str = "warning: ";
 const MAX_STUCK_CASES: usize = 4;
 
 /// Says which orbit of a continuum is reported.
-const REPORTED_ORBIT: &str = "Reported: the orbit that begins at static equilibrium, after the constant loads grew together from \
-    zero, and at `found_by = growing-vibration` the vibration after them. A permanently stuck rigid joint has the \
-    position that the search found; method `transient` reports the orbit that its run reached.";
+const REPORTED_ORBIT: &str = "Reported: the orbit reached from static equilibrium under the constant loads; where `found_by` is \
+    `growing-vibration`, the excitation was then raised in steps. A permanently stuck rigid joint stays where the \
+    solver found it; method `transient` reports the orbit in which its run ended.";
 
 /// A note.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -340,7 +340,7 @@ impl Note {
             }
             Note::HistorySpread(count, largest) => Some(format!(
                 "{WARNING}at {} the amplitudes depend on the history of a stuck joint: they change by up to {} % if the \
-                 joint begins without the friction force of static equilibrium, or with the opposite one.",
+                 joint starts with zero or reversed friction force instead of that of static equilibrium.",
                 points(*count),
                 format_significant(100.0 * largest, 2)
             )),
@@ -436,7 +436,7 @@ impl Note {
             }
             Note::Slipping(slipping) => Some(slipping.text(WARNING)),
             Note::StuckInOtherCases(count) => Some(format!(
-                "In other cases a joint sticks permanently at {}; its offset is not unique there either.",
+                "At {} of the other cases a joint sticks permanently; its offset is not unique there either.",
                 points(*count)
             )),
             Note::Stuck { points: 0, .. } => None,
@@ -593,7 +593,7 @@ mod tests {
         };
         let one_by_one = joined(1);
         assert!(one_by_one.len() <= MAX_STUCK_CASES + 7, "{}", one_by_one.len());
-        assert!(one_by_one.iter().any(|text| text.starts_with("In other cases")), "{one_by_one:?}");
+        assert!(one_by_one.iter().any(|text| text.contains("of the other cases")), "{one_by_one:?}");
         for size in [2, 3, 7, 50, 1000, all.len()] {
             assert_eq!(joined(size), one_by_one, "{size}");
         }

@@ -125,8 +125,8 @@ pub(crate) const TABLE: &[OutputColumns] = &[
     },
     OutputColumns {
         name: "sets",
-        doc: "for every contact between meshes the dissipation of all its joints and the means of slip and separation \
-            over its area, and for every place on a set the largest distance of a node from rest",
+        doc: "for every contact between meshes: the dissipation of all its joints, and the means of slip and separation \
+            over its area; for every place on a set: the largest distance of a node from rest",
         columns: |case, _| set_columns::columns(case),
         values: set_columns::values,
     },

@@ -484,7 +484,7 @@ fn errors_name_file_or_key() {
     let held = "reduce = { modes = 3, orders = 2, kind = \"craig-bampton\" }";
     told(DAMPED, &format!("{DAMPED}\n{held}"), &["no residual vectors", "kind = \"rubin\""]);
     told(DAMPED, &format!("{DAMPED}\nmodal_damping = 0.01"), &["one damping"]);
-    told(DAMPED, "damping = \"2 %\"", &["`2 %` is no file", "modal_damping = \"2 %\""]);
+    told(DAMPED, "damping = \"2 %\"", &["`2 %` is not a file", "modal_damping = \"2 %\""]);
     told(DAMPED, "reduce = { modes = 3, up_to = \"1 kHz\" }", &["remove one of them"]);
     told("dofs = [", "normal = [0, 0, 0]\ndofs = [", &["normal"]);
     told(&format!("\"{node}.z\"]"), &format!("\"{node}.x\"]"), &["is named twice", "sum = {"]);

@@ -35,6 +35,11 @@ pub struct ModesCost {
     pub vectors: usize,
 }
 
+/// Returns the frequency of an eigenvalue in rad²/s², Hz.
+fn hertz(eigenvalue: f64) -> f64 {
+    eigenvalue.max(0.0).sqrt() / std::f64::consts::TAU
+}
+
 /// The reason why the search for modes failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModesError {
@@ -57,7 +62,7 @@ pub enum ModesError {
     #[error("the mass matrix gives some motion a negative mass; it must be positive semidefinite")]
     NegativeMass,
     /// More modes lie below the bound than allowed.
-    #[error("{count} modes lie below {below:.3e} rad²/s², but at most {most} are allowed; lower the upper bound")]
+    #[error("{count} modes lie below {:.6e} Hz, but at most {most} are allowed; lower the upper frequency", hertz(*below))]
     TooMany {
         /// Number of modes.
         count: usize,
@@ -68,8 +73,9 @@ pub enum ModesError {
     },
     /// The factor is not accurate enough.
     #[error(
-        "the mode at {value:.6e} rad²/s² has a residual of {residual:.1e}: stiffness and mass cover too many orders \
-         of magnitude, so rounding dominates; replace nearly rigid parts by constraints, or use longer elements"
+        "the mode at {:.6e} Hz has a residual of {residual:.1e}: stiffness and mass cover too many orders of magnitude, \
+         so rounding dominates; replace nearly rigid parts by constraints, or use longer elements",
+        hertz(*value)
     )]
     Inaccurate {
         /// λ, rad²/s².
@@ -82,8 +88,9 @@ pub enum ModesError {
     OutOfRange,
     /// The number of modes found differs from the count, or the search finds no further mode.
     #[error(
-        "the search found {found} modes below {below:.3e} rad²/s², but the negative pivots count {counted}; choose \
-         units that give the matrix entries similar magnitudes"
+        "the search found {found} modes below {:.6e} Hz, but the negative pivots count {counted}; choose units that \
+         give the matrix entries similar magnitudes",
+        hertz(*below)
     )]
     NotConverged {
         /// Modes found below the bound.

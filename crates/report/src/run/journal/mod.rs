@@ -64,12 +64,12 @@ impl RunHeader {
     /// Returns `None` if both belong to the same results.
     pub fn difference(&self, other: &RunHeader) -> Option<String> {
         let (ours, theirs) = (&self.outline.record, &other.outline.record);
-        let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs}, not {ours}"));
+        let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs}, now {ours}"));
         if ours.version != theirs.version {
-            return differs("it was written by version", &ours.version, &theirs.version);
+            return differs("its version is", &ours.version, &theirs.version);
         }
         if self.outline.name != other.outline.name {
-            return differs("it belongs to the study", &self.outline.name, &other.outline.name);
+            return differs("its study is", &self.outline.name, &other.outline.name);
         }
         let of = |record: &Value, key: &str| record[key].clone();
         let (text, its_text) = (of(&ours.study, "file"), of(&theirs.study, "file"));
@@ -79,7 +79,7 @@ impl RunHeader {
             let at = |text: &str| {
                 text.lines().nth(line - 1).map_or("the end of the file".to_owned(), |line| format!("`{}`", line.trim()))
             };
-            return Some(format!("its study file is different: line {line} is {}, not {}", at(its_text), at(text)));
+            return Some(format!("line {line} of its study file is {}, now {}", at(its_text), at(text)));
         }
         if of(&ours.study, "set") != of(&theirs.study, "set") {
             let words = |record: &Value| {
@@ -87,11 +87,11 @@ impl RunHeader {
                 let set: Vec<String> = set.iter().map(|(name, value)| format!("--set {name}={value}")).collect();
                 if set.is_empty() { "without --set".to_owned() } else { format!("with {}", set.join(" ")) }
             };
-            return differs("it belongs to a run", &words(&ours.study), &words(&theirs.study));
+            return differs("it ran", &words(&ours.study), &words(&theirs.study));
         }
         let method = |record: &Value| record["cases"][0]["method"]["kind"].as_str().unwrap_or("none").to_owned();
         if method(&ours.study) != method(&theirs.study) {
-            return differs("it belongs to a run with the method", &method(&ours.study), &method(&theirs.study));
+            return differs("its method is", &method(&ours.study), &method(&theirs.study));
         }
         if of(&ours.study, "matrices") != of(&theirs.study, "matrices") {
             return Some(
@@ -630,11 +630,11 @@ mod tests {
         let mut changed = own.clone();
         changed.outline.record.study["cases"][1] = Value::Null;
         for (other, words) in [
-            (head("pair.toml", text, &[], "auto"), "it belongs to the study pair, not couple"),
-            (head("couple.toml", &text.replace("= 241", "= 242"), &[], "auto"), "points = 242 }`, not `frequency"),
-            (head("couple.toml", text, &[("kt", "9 N/mm")], "auto"), "with --set kt=9 N/mm, not without --set"),
-            (head("couple.toml", text, &[], "harmonic-balance"), "with the method harmonic-balance, not auto"),
-            (old, "by version 0.0.9, not"),
+            (head("pair.toml", text, &[], "auto"), "its study is pair, now couple"),
+            (head("couple.toml", &text.replace("= 241", "= 242"), &[], "auto"), "points = 242 }`, now `frequency"),
+            (head("couple.toml", text, &[("kt", "9 N/mm")], "auto"), "it ran with --set kt=9 N/mm, now without --set"),
+            (head("couple.toml", text, &[], "harmonic-balance"), "its method is harmonic-balance, now auto"),
+            (old, "its version is 0.0.9, now"),
             (changed, "a file that the study reads has changed"),
         ] {
             let difference = own.difference(&other).unwrap();

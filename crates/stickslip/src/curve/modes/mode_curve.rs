@@ -33,17 +33,19 @@ pub enum ModeEndCause {
     NoStart,
     /// The curve turned and returned to amplitudes at which friction is negligible.
     #[error(
-        "its curve turns there and returns to large amplitudes: it merges with another mode and does not exist at smaller amplitudes"
+        "the curve of this mode turns there and returns to large amplitudes: it merges with another mode and does not exist at smaller amplitudes"
     )]
     Merged,
     /// The curve turned and did not return to smaller amplitudes.
-    #[error("its curve turns there and has not returned to smaller amplitudes after 1000 steps; try fewer harmonics")]
+    #[error(
+        "the curve of this mode turns there and has not returned to smaller amplitudes after 1000 steps; try fewer harmonics"
+    )]
     Turned,
     /// The corrector fails even at the smallest step size.
     #[error("the continuation found no neighbouring motion; try more harmonics")]
     Stalled,
     /// The damping ratio exceeds ten over many steps.
-    #[error("its damping ratio exceeds ten there (overdamped), and the continuation stops; choose larger amplitudes")]
+    #[error("the damping ratio exceeds ten there (overdamped), and the continuation stops; choose larger amplitudes")]
     Overdamped,
     /// Laws with internal states exceeded their work limit.
     #[error(
@@ -59,8 +61,8 @@ pub enum ModeEndCause {
     /// The curve from small amplitudes is another motion where it should meet the one from large
     /// amplitudes.
     #[error(
-        "the curve from large amplitudes ends there; the rows below follow the stuck mode of the most similar shape, \
-         which is another motion where they meet; see also the neighbouring modes"
+        "the curve from large amplitudes ends there; the rows at smaller amplitudes follow the stuck mode of the most \
+         similar shape, and the two curves do not join; compare the neighbouring modes"
     )]
     Apart,
     /// The maximum number of steps is reached.

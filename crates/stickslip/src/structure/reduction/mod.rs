@@ -206,7 +206,7 @@ pub enum ReductionError {
     #[error(transparent)]
     Modes(#[from] ModesError),
     /// A dynamic stiffness is singular.
-    #[error("at {omega:.6e} rad/s {singular}")]
+    #[error("at {:.6} Hz {singular}", omega / std::f64::consts::TAU)]
     Singular {
         /// Frequency, rad/s.
         omega: f64,
@@ -215,8 +215,8 @@ pub enum ReductionError {
     },
     /// The structure with fixed ports has free motions.
     #[error(
-        "with all ports fixed, the structure still has {count} free motion{}, so that its static response does not \
-         exist; use free modes instead of Craig-Bampton",
+        "with all places fixed, the structure still has {count} rigid-body mode{}, so that its static response does \
+         not exist; use free-interface modes instead of Craig-Bampton",
         if *count == 1 { "" } else { "s" }
     )]
     FreeInterfaceMotion {

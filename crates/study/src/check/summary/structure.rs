@@ -99,7 +99,7 @@ impl StructureSummary {
         let own = if own.is_empty() { "none computed".to_owned() } else { format!("{} Hz", own.join(", ")) };
         let free = match reduced.rigid_body_modes {
             None | Some(0) => String::new(),
-            Some(free) => format!(", {free} rigid-body motion{}", plural_suffix(free)),
+            Some(free) => format!(", {free} rigid-body mode{}", plural_suffix(free)),
         };
         lines.push(("frequencies", own + &free));
         let ReducedSummary { coordinates, kind, error, up_to, .. } = reduced;

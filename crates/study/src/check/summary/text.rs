@@ -40,11 +40,11 @@ impl ModelSummary {
                 true => damping[0].clone(),
                 false => damping.join(", "),
             };
-            parts.push(format!("{} Hz, damping {damping} %", list(&|m| format_significant(m.omega / TAU, 5))));
+            parts.push(format!("{} Hz, damping ratio {damping} %", list(&|m| format_significant(m.omega / TAU, 5))));
         }
         let mut text = parts.join(" ");
         if modes.rigid > 0 {
-            text += &format!("; {} rigid-body motion{}", modes.rigid, plural_suffix(modes.rigid));
+            text += &format!("; {} rigid-body mode{}", modes.rigid, plural_suffix(modes.rigid));
         }
         if modes.unresolved > 0 {
             text += &format!(
@@ -62,11 +62,11 @@ impl ModelSummary {
         let names: Vec<String> = self.held_by_friction.iter().map(|one| one.place.clone()).collect();
         let spring = self.range.map_or_else(String::new, |(_, highest)| {
             let stiffness = format_with_prefix(first.spring(highest), first.spring_unit());
-            format!(" ({stiffness} on `{}` is soft against its inertia)", first.place)
+            format!(" ({stiffness} on `{}` is a tenth of its inertia)", first.place)
         });
         Some(format!(
-            "alone holds {}: a vibration may move a body along such a direction without end; if no orbit is found, hold \
-             the body as the real part is held, or by a soft spring{spring}",
+            "alone holds {}, so that the body may drift; if no orbit is found, support it as the real part is supported, \
+             or by a soft spring{spring}",
             list_names(&names)
         ))
     }
@@ -129,10 +129,10 @@ impl ModelSummary {
                 true => {
                     format!("; {slip} at {ranges}; any excitation makes it slip at its undamped resonance{at}")
                 }
-                false => format!("; {slip} at {ranges}; begins at {factor} times the excitation{at}"),
+                false => format!("; {slip} at {ranges}; {factor} times the excitation is enough{at}"),
             };
         } else {
-            text += &format!("; {slip} occurs; begins at {factor} times the excitation");
+            text += &format!("; {slip} occurs; {factor} times the excitation is enough");
         }
         text
     }
@@ -232,10 +232,12 @@ impl fmt::Display for ModelSummary {
             line(&joint.name, &self.joint(joint))?;
         }
         if let Some(more @ 1..) = lines.checked_sub(MAX_LISTED) {
-            line("", &format!("and {more} more joint{}", plural_suffix(more)))?;
+            line("", &format!("and {more} more"))?;
         }
         match &self.orbits {
-            Some(OrbitCount::One) => line("orbits", "one at each frequency, except for the offsets of stuck contacts")?,
+            Some(OrbitCount::One) => {
+                line("orbits", "one at each point; only the offset of a permanently stuck contact is not unique")?
+            }
             Some(OrbitCount::Several { reasons, reverse_sweep }) => {
                 let what = "the table states the stability of each orbit if it is known; kind `branch` follows \
                     connected orbits if it supports the laws";

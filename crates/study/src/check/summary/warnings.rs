@@ -257,7 +257,8 @@ fn structure(case: &SurveyedCase) -> Vec<String> {
     let beyond = crate::check::survey::frequency_range(&case.case).filter(|(_, high)| *high > reduction.up_to);
     if let Some((_, high)) = beyond {
         found.push(format!(
-            "the excitation frequency reaches {}, but the error of the reduced model is known only up to {}",
+            "the excitation frequency reaches {}, but the error of the reduced model is known only up to {}; \
+             state a higher `up_to` in `reduce`",
             hertz(high),
             hertz(reduction.up_to)
         ));

@@ -190,7 +190,7 @@ pub(crate) fn expand(contact: &CompiledTable, inputs: ContactInputs<'_>) -> Resu
                 "state a larger `distance`, or the sides that touch each other",
             ),
             false => (
-                format!("no face of {} points towards a node of {} that points towards it", sets[1], sets[0]),
+                format!("no face of {} and node of {} face each other", sets[1], sets[0]),
                 "state the sides that touch each other; `stickslip inspect` with `--picture` draws the sets",
             ),
         };

@@ -110,7 +110,7 @@ impl NodalPreload {
                 error(format!("row {} of `{name}` {what}", row + 1), help)
             };
             if node.fract() != 0.0 || !node.is_finite() {
-                return Err(wrong(format!("has the node {node}, which is no whole number")));
+                return Err(wrong(format!("has the node {node}, which is not a whole number")));
             }
             if !(value.is_finite() && value >= 0.0) {
                 return Err(wrong(format!("has the {role} {value} at node {node}")));

@@ -118,7 +118,7 @@ fn read(stated: &CompiledTable, folder: &Path) -> Result<ReadStructure, Problem>
         let Some(file) = file(stated, key) else { return Ok(None) };
         let path = folder.join(&file.path);
         if key == "damping" && file.path.to_string_lossy().ends_with('%') && !path.exists() {
-            let message = format!("`{}` is no file; `damping` names the file of a matrix", file.path.display());
+            let message = format!("`{}` is not a file; `damping` names the file of a matrix", file.path.display());
             let help = format!("write the damping ratio of all modes as modal_damping = \"{}\"", file.path.display());
             return Err(problem(key, message).help(help));
         }

@@ -210,8 +210,8 @@ fn compute(work: &UnitTask<'_>) -> Computed {
     };
     if let Some(reason) = reason {
         let kept = format!(
-            "{reason}; the tables contain the points up to there ({}), and kind = \"response\" solves each point \
-             separately",
+            "{reason}; the tables contain the points up to there ({}). Try other `harmonics`, more `steps`, or kind = \
+             \"response\", which solves each point separately",
             branch.points.len()
         );
         part.count(label, "stalled", Some(kept));

@@ -168,7 +168,7 @@ pub(super) const KIND: Kind = Kind {
                 "profile",
                 ValueType::Flag,
                 "false",
-                "true: profile likelihood, the smallest weighted sum of squares over each parameter while the others are fitted again",
+                "true: profile likelihood: the smallest weighted sum of squares at fixed values of each parameter, with the others fitted again",
                 "true",
             ),
             optional(

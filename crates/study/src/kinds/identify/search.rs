@@ -115,7 +115,9 @@ pub(super) fn search(problem: &FitProblem, settings: &SearchSettings) -> Result<
     }
     let Some(best) = minima.iter().min_by(|a, b| a.0.total_cmp(&b.0)).cloned() else {
         let reason = problem.failure().unwrap_or_else(|| "no minimization converged".to_owned());
-        return Err(format!("no parameters explain the data: {reason}"));
+        return Err(format!(
+            "the search for the parameters failed: {reason}; check units and ranges, or increase `starts`"
+        ));
     };
     let agreeing = minima.iter().filter(|(cost, _)| cost - best.0 <= SAME_COST * best.0 + 1e-12).count();
     Ok(Found { x: best.1, cost: best.0, searches, agreeing })

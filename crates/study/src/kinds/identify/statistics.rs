@@ -347,7 +347,7 @@ impl Statistics {
         let reached = self.rms <= EXACT || self.distance <= LARGEST_STEP;
         if !reached && self.distance.is_nan() {
             let reason = problem.failure().unwrap_or_else(|| "a derivative is not a number".to_owned());
-            return Some(format!("the model has no derivatives where the search ended: {reason}"));
+            return Some(format!("the model has no derivatives where the search ended: {reason}; use narrower ranges"));
         }
         (!reached).then(|| {
             format!(

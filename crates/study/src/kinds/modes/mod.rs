@@ -42,9 +42,9 @@ pub(super) const KIND: Kind = Kind {
             required(
                 "amplitude",
                 ValueType::Table(AMPLITUDE),
-                "size of the motion, as the amplitude of the place that moves most in the mode of the structure without \
-                 joints with the same `φᵀ M φ`; the amplitudes of the places are in the table. Under constant forces the \
-                 mode of small motions about equilibrium replaces that without joints",
+                "range of amplitudes of the place that moves most in the linear mode without joints; the nonlinear mode has \
+                 the same modal mass norm `φᵀ M φ`, and the table contains the amplitudes of the places. Under constant \
+                 forces, the mode of small motions about equilibrium is used instead",
                 "{ from = \"1 um\", to = \"10 mm\" }",
             ),
             default("mode", ValueType::Count(1, 1000), "1", "number of the mode, by ascending frequency", "2"),

@@ -56,12 +56,12 @@ pub(super) const KIND: Kind = Kind {
                 "peaks",
                 ValueType::Flag,
                 "true",
-                "refines every peak of every mass between the points of the curve; with `peak_of`, the peaks of the \
+                "refines every peak of every place between the points of the curve; with `peak_of`, the peaks of the \
                  largest amplitude",
                 "false",
             ),
             Key {
-                doc: "the masses whose largest amplitude has its peaks in peaks.csv, or \"all\"; default: every mass \
+                doc: "the places whose largest amplitude has its peaks in peaks.csv, or \"all\"; default: every place \
                     separately",
                 ..PEAK_OF
             },

@@ -62,7 +62,8 @@ pub(in crate::kinds) const FREQUENCY: Key = required(
 pub(in crate::kinds) const OUTPUT: Key = optional(
     "output",
     ValueType::Names,
-    "additional columns: joint_force, joint_mean, joint_motion, contact, velocity, acceleration, harmonics, receptance",
+    "additional columns: joint_force, joint_mean, joint_motion, contact, velocity, acceleration, harmonics, receptance, \
+     sets",
     "[\"joint_force\", \"harmonics\"]",
 );
 

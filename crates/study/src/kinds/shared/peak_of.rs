@@ -18,7 +18,7 @@ const ALL: &str = "all";
 pub(in crate::kinds) const PEAK_OF: Key = optional(
     "peak_of",
     ValueType::Names,
-    "the masses whose peak is used, or \"all\"; of several masses the largest amplitude; default: the first mass \
+    "the places whose peak is used, or \"all\"; of several places the largest amplitude; default: the first place \
      with a force",
     "[\"blade1\", \"blade3\"]",
 );
