@@ -5,6 +5,7 @@
 //! (2003), Ch. 6.
 
 use crate::dense;
+use crate::newton::{AcceptedStep, DampedNewton, NewtonEnd, NewtonEquations};
 
 /// Equations with a parameter.
 ///
@@ -279,54 +280,84 @@ impl Corrector {
         }
     }
 
-    /// Corrects by Newton's method on the plane orthogonal to `across`, or with the parameter
-    /// fixed. Returns the number of iterations, or `None` if it fails.
+    /// Corrects by Newton's method in the plane orthogonal to a tangent through a predicted point,
+    /// or with the parameter fixed. Returns the number of iterations, or `None` if it fails.
     fn correct<E: ParametricEquations>(
         &mut self,
         equations: &mut E,
         x: &mut [f64],
         p: &mut f64,
         unit: f64,
-        across: Option<(&[f64], &Predicted)>,
+        plane: Option<(&[f64], &Predicted)>,
     ) -> Option<usize> {
-        // Maximum number of corrector iterations. At kinks, Newton's method first has to find
-        // the right side of each kink. It then takes more than the usual three iterations
-        // without a risk of failure.
-        let most: usize = 20;
-        let n = self.n;
-        let mut fixed_parameter_row = vec![0.0; n + 1];
-        fixed_parameter_row[n] = 1.0;
-        for iteration in 0..=most {
-            if !equations.evaluate(x, *p, &mut self.f, &mut self.by_x, &mut self.by_p) {
-                return None;
+        let newton = DampedNewton {
+            tolerance: equations.tolerance(),
+            // At kinks, Newton's method first has to find the right side of each kink. It then
+            // takes more than the usual three iterations without a risk of failure.
+            iterations: 20,
+            halvings: 0,
+            largest_growth: f64::INFINITY,
+            ..DampedNewton::default()
+        };
+        let start = (x.to_vec(), *p);
+        let mut correction = Correction { corrector: self, equations, unit, plane, start, at: (x.to_vec(), *p) };
+        correction.corrector.right.fill(0.0);
+        let first = correction.move_by(0.0);
+        let result = newton.run(&mut correction, first);
+        let (found, parameter) = correction.at;
+        x.copy_from_slice(&found);
+        *p = parameter;
+        (result.end == NewtonEnd::Converged).then_some(result.iterations)
+    }
+}
+
+/// The iteration of one correction.
+struct Correction<'a, E> {
+    corrector: &'a mut Corrector,
+    equations: &'a mut E,
+    unit: f64,
+    plane: Option<(&'a [f64], &'a Predicted)>,
+    /// Start of the step.
+    start: Predicted,
+    /// Current point.
+    at: Predicted,
+}
+
+impl<E: ParametricEquations> NewtonEquations for Correction<'_, E> {
+    fn solve_step(&mut self, _residual: f64) -> bool {
+        let Correction { corrector, unit, plane, start, at, .. } = self;
+        let n = corrector.n;
+        start.clone_from(at);
+        corrector.right[..n].copy_from_slice(&corrector.f);
+        match *plane {
+            Some((tangent, (from, parameter))) => {
+                corrector.border(*unit, tangent);
+                let along: f64 = at.0.iter().zip(from).zip(tangent).map(|((x, f), t)| (x - f) * t).sum();
+                corrector.right[n] = along + (at.1 - parameter) / *unit * tangent[n];
             }
-            let size = self.f.iter().map(|f| f * f).sum::<f64>().sqrt();
-            if size <= equations.tolerance() {
-                return Some(iteration);
+            None => {
+                let mut fixed_parameter = vec![0.0; n + 1];
+                fixed_parameter[n] = 1.0;
+                corrector.border(*unit, &fixed_parameter);
+                corrector.right[n] = 0.0;
             }
-            if !size.is_finite() || iteration == most {
-                return None;
-            }
-            self.right[..n].copy_from_slice(&self.f);
-            match across {
-                Some((tangent, (from, start))) => {
-                    self.border(unit, tangent);
-                    let along: f64 = x.iter().zip(from).zip(tangent).map(|((x, f), t)| (x - f) * t).sum();
-                    self.right[n] = along + (*p - start) / unit * tangent[n];
-                }
-                None => {
-                    self.border(unit, &fixed_parameter_row);
-                    self.right[n] = 0.0;
-                }
-            }
-            if !dense::solve(&mut self.bordered, n + 1, &mut self.right) {
-                return None;
-            }
-            for (x, d) in x.iter_mut().zip(&self.right) {
-                *x -= d;
-            }
-            *p -= self.right[n] * unit;
         }
+        dense::solve(&mut corrector.bordered, n + 1, &mut corrector.right)
+    }
+
+    fn move_by(&mut self, fraction: f64) -> f64 {
+        let Corrector { f, by_x, by_p, right, n, .. } = &mut *self.corrector;
+        for ((x, start), d) in self.at.0.iter_mut().zip(&self.start.0).zip(right.iter()) {
+            *x = start - fraction * d;
+        }
+        self.at.1 = self.start.1 - fraction * right[*n] * self.unit;
+        if !self.equations.evaluate(&self.at.0, self.at.1, f, by_x, by_p) {
+            return f64::INFINITY;
+        }
+        f.iter().map(|f| f * f).sum::<f64>().sqrt()
+    }
+
+    fn accept(&mut self, _step: AcceptedStep) -> Option<f64> {
         None
     }
 }

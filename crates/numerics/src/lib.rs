@@ -13,6 +13,7 @@ pub mod gmres;
 pub mod golden_section;
 pub mod interrupt;
 pub mod min_norm;
+pub mod newton;
 mod null_space;
 pub mod parallel;
 pub mod quadratic_modes;

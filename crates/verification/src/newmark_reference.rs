@@ -63,7 +63,7 @@ impl<'a> Reference<'a> {
                 // below that of the motion
                 // Velocity over which a law with only a resolvent is smoothed: a fraction of the
                 // velocity of the motion, times the steps per period. The steps can resolve it.
-                law = law.regularised(0.5 / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
+                law = law.smooth_counterpart(0.5 / steps as f64 * omega * travel(system, omega)).unwrap_or(law);
             }
             let pieces = if law.step().is_none() && law.rate().is_none() { law.ideal_elements() } else { None };
             let states = law.step().map(|s| s.states()).or(law.rate().map(|r| r.states()));

@@ -168,7 +168,7 @@ fn parts_joined_are_the_whole() {
     assert!(said.contains("both contain unit"), "{said}");
     done(folder.path(), &["run", "couple.toml", "--out", "other", "--shard", "2/3", "--set", "kt=9 N/mm"]);
     let said = refused(folder.path(), &["merge", &part(1), "other/couple.shard-2-of-3", &part(3), "--out", "no"]);
-    assert!(said.contains("with --set kt=9 N/mm, not without --set"), "{said}");
+    assert!(said.contains("with --set kt=9 N/mm instead of without --set"), "{said}");
     let said = refused(folder.path(), &["merge", "whole", "--out", "no"]);
     assert!(said.contains("no part of a study in whole"), "{said}");
     // An unfinished shard.
@@ -204,9 +204,9 @@ fn a_run_is_not_gone_on_with_as_another_one() {
     let folder = couple(100_000);
     assert!(unfinished(folder.path()).join("journal").is_file());
     let said = refused(folder.path(), &["run", "couple.toml", "--resume", "--set", "Ft=3 N"]);
-    assert!(said.contains("it ran without --set, now with --set Ft=3 N"), "{said}");
+    assert!(said.contains("it ran without --set instead of with --set Ft=3 N"), "{said}");
     let said = refused(folder.path(), &["run", "couple.toml", "--resume", "--method", "transient"]);
-    assert!(said.contains("its method is auto, now transient"), "{said}");
+    assert!(said.contains("its method is auto instead of transient"), "{said}");
     let text = fs::read_to_string(folder.path().join("couple.toml")).unwrap();
     fs::write(folder.path().join("couple.toml"), text.replace("\"0.2 kg/s\" ", "\"0.3 kg/s\" ")).unwrap();
     let said = refused(folder.path(), &["run", "couple.toml", "--resume"]);

@@ -30,7 +30,7 @@ pub struct PythonLaw {
     info: &'static LawInfo,
     /// Distinguishes laws with the same name and the same parameters.
     number: u64,
-    /// A `_rate._Kernel`. Its `value` and `linearise` take `u, v, z`, all two-dimensional (row,
+    /// A `_rate._Kernel`. Its `value` and `linearize` take `u, v, z`, all two-dimensional (row,
     /// point), and the values of the parameters.
     pub kernel: Py<PyAny>,
     pub directions: usize,
@@ -186,7 +186,7 @@ impl PythonLawInstance {
         let v = array(directions, &|row, i| motions[i].velocity[row])?;
         let z = array(states, &|row, i| z[i * states + row])?;
         let values = PyTuple::new(py, &self.values)?;
-        let name = if linear { "linearise" } else { "value" };
+        let name = if linear { "linearize" } else { "value" };
         let answer = self.written.kernel.bind(py).call_method1(name, (u, v, z, values))?;
         let read = |array: Bound<'_, PyAny>, length: usize, what: &str| {
             let array = array.cast_into::<PyArray2<f64>>().map_err(PyErr::from)?.readonly();

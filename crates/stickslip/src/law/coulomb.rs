@@ -55,7 +55,7 @@ impl Law for Coulomb {
     fn sliding(&self) -> Option<&dyn SlidingView> {
         Some(self)
     }
-    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+    fn smooth_counterpart(&self, width: f64) -> Option<SharedLaw> {
         Some(Arc::new(CoulombArctan { limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {

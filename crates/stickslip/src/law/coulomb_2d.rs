@@ -52,7 +52,7 @@ impl Law for Coulomb2d {
     fn prox(&self) -> Option<&dyn ProxView> {
         Some(self)
     }
-    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+    fn smooth_counterpart(&self, width: f64) -> Option<SharedLaw> {
         Some(Arc::new(Coulomb2dArctan { limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {

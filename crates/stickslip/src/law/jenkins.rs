@@ -55,7 +55,7 @@ impl Law for Jenkins {
     fn ideal_elements(&self) -> Option<Vec<IdealElement>> {
         Some(vec![IdealElement::slider(Some(self.stiffness), self.limit)]) // Eq. (1)
     }
-    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+    fn smooth_counterpart(&self, width: f64) -> Option<SharedLaw> {
         Some(Arc::new(JenkinsArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {

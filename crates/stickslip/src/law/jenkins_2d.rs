@@ -70,7 +70,7 @@ impl Law for Jenkins2d {
     fn step(&self) -> Option<&dyn StepView> {
         Some(self)
     }
-    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+    fn smooth_counterpart(&self, width: f64) -> Option<SharedLaw> {
         Some(Arc::new(Jenkins2dArctan { stiffness: self.stiffness, limit: self.limit, alpha: 1.0 / width }))
     }
     fn is_incrementally_passive(&self) -> bool {

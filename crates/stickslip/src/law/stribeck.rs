@@ -108,7 +108,7 @@ impl Law for Stribeck {
     }
     /// Available if `velocity` is positive or the limits are equal. Otherwise no smooth law with
     /// a single width has both limits.
-    fn regularised(&self, width: f64) -> Option<SharedLaw> {
+    fn smooth_counterpart(&self, width: f64) -> Option<SharedLaw> {
         let Stribeck { limit, static_limit, velocity } = *self;
         if self.is_constant() {
             Some(Arc::new(CoulombArctan { limit, alpha: 1.0 / width }))
@@ -223,8 +223,12 @@ mod tests {
         let law = Stribeck { velocity: 0.0, ..LAW };
         let slider = Slider { stiffness: None, limit: 2.0, static_limit: 2.5 };
         assert_eq!(law.ideal_elements(), Some(vec![IdealElement::Slider(slider)]));
-        assert!(law.prox().is_none() && law.regularised(1e-5).is_none());
+        assert!(law.prox().is_none() && law.smooth_counterpart(1e-5).is_none());
         let coulomb = Stribeck { static_limit: 2.0, ..law };
-        assert!(coulomb.prox().is_some() && coulomb.regularised(1e-5).is_some() && coulomb.is_incrementally_passive());
+        assert!(
+            coulomb.prox().is_some()
+                && coulomb.smooth_counterpart(1e-5).is_some()
+                && coulomb.is_incrementally_passive()
+        );
     }
 }

@@ -184,7 +184,8 @@ impl<'a> SizeInputs<'a> {
         let memory = MemoryModel::default();
         // the option `width` makes exact laws smooth
         let width = case.method.options.get("width");
-        let followed = |law: &SharedLaw| width.and_then(|width| law.regularised(*width)).unwrap_or_else(|| law.clone());
+        let followed =
+            |law: &SharedLaw| width.and_then(|width| law.smooth_counterpart(*width)).unwrap_or_else(|| law.clone());
         let laws: Vec<SharedLaw> = system.joints().iter().map(|joint| followed(joint.law())).collect();
         let given = case.frequencies.as_ref().map_or(1, |f| f.len()) as f64;
         let series = finds_series(case, system);

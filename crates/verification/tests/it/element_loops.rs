@@ -199,7 +199,7 @@ fn theory_3_1_arctan_dashpot_under_harmonic_motion() {
         let digits = 1e-9 + 1e-15 / (z * z); // `(√(1 + z²) - 1)/z` cancels for small z
         close("loss", orbit.joints[0].dissipation, PI * a * first, digits);
         let law = CoulombArctan { limit, alpha }.describing_function(a, omega);
-        close("linearised", law.im * a, first, digits);
+        close("linearized", law.im * a, first, digits);
         // smaller intervals towards the reversals, where the arctangent is steep
         let mut breaks = vec![FRAC_PI_2, PI, 3.0 * FRAC_PI_2];
         for k in 1..14 {

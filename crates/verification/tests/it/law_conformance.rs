@@ -418,7 +418,7 @@ fn resolvents_solve_their_equation_and_have_its_slope() {
 fn oddness_and_passivity_hold() {
     for row in TABLE {
         let sample = row.sample();
-        for law in [Some(sample.clone()), sample.regularised(1e-4)].into_iter().flatten() {
+        for law in [Some(sample.clone()), sample.smooth_counterpart(1e-4)].into_iter().flatten() {
             let (mut least, mut most, mut oddest) = (0.0f64, 0.0f64, 0.0f64);
             for view in views(&*law) {
                 for seed in 0..5 {
@@ -469,7 +469,7 @@ fn oddness_and_passivity_hold() {
 fn smooth_neighbours_tend_to_the_law() {
     for row in TABLE {
         let law = row.sample();
-        if law.regularised(1.0).is_none() {
+        if law.smooth_counterpart(1.0).is_none() {
             continue;
         }
         let motion = random_motion(3, law.directions(), 1.0);
@@ -478,7 +478,7 @@ fn smooth_neighbours_tend_to_the_law() {
         let errors: Vec<f64> = [1e-3, 1e-4, 1e-5]
             .iter()
             .map(|&width| {
-                let smooth = law.regularised(width).unwrap();
+                let smooth = law.smooth_counterpart(width).unwrap();
                 let found = forces(&*smooth, View::Rate, &motion, &times);
                 let differences = reference.iter().zip(&found).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
                 differences.sum::<f64>() / reference.len() as f64 / law.force_scale()

@@ -64,7 +64,7 @@ impl RunHeader {
     /// Returns `None` if both belong to the same results.
     pub fn difference(&self, other: &RunHeader) -> Option<String> {
         let (ours, theirs) = (&self.outline.record, &other.outline.record);
-        let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs}, now {ours}"));
+        let differs = |what: &str, ours: &str, theirs: &str| Some(format!("{what} {theirs} instead of {ours}"));
         if ours.version != theirs.version {
             return differs("its version is", &ours.version, &theirs.version);
         }
@@ -79,7 +79,7 @@ impl RunHeader {
             let at = |text: &str| {
                 text.lines().nth(line - 1).map_or("the end of the file".to_owned(), |line| format!("`{}`", line.trim()))
             };
-            return Some(format!("line {line} of its study file is {}, now {}", at(its_text), at(text)));
+            return Some(format!("line {line} of its study file is {} instead of {}", at(its_text), at(text)));
         }
         if of(&ours.study, "set") != of(&theirs.study, "set") {
             let words = |record: &Value| {
@@ -630,11 +630,17 @@ mod tests {
         let mut changed = own.clone();
         changed.outline.record.study["cases"][1] = Value::Null;
         for (other, words) in [
-            (head("pair.toml", text, &[], "auto"), "its study is pair, now couple"),
-            (head("couple.toml", &text.replace("= 241", "= 242"), &[], "auto"), "points = 242 }`, now `frequency"),
-            (head("couple.toml", text, &[("kt", "9 N/mm")], "auto"), "it ran with --set kt=9 N/mm, now without --set"),
-            (head("couple.toml", text, &[], "harmonic-balance"), "its method is harmonic-balance, now auto"),
-            (old, "its version is 0.0.9, now"),
+            (head("pair.toml", text, &[], "auto"), "its study is pair instead of couple"),
+            (
+                head("couple.toml", &text.replace("= 241", "= 242"), &[], "auto"),
+                "points = 242 }` instead of `frequency",
+            ),
+            (
+                head("couple.toml", text, &[("kt", "9 N/mm")], "auto"),
+                "it ran with --set kt=9 N/mm instead of without --set",
+            ),
+            (head("couple.toml", text, &[], "harmonic-balance"), "its method is harmonic-balance instead of auto"),
+            (old, "its version is 0.0.9 instead of"),
             (changed, "a file that the study reads has changed"),
         ] {
             let difference = own.difference(&other).unwrap();

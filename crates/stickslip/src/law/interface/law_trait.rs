@@ -174,7 +174,7 @@ pub trait Law: Debug + Send + Sync {
     }
     /// Returns the smooth law that converges to this one as `width` (m/s) goes to zero. `width`
     /// is the velocity over which friction changes its sign.
-    fn regularised(&self, _width: f64) -> Option<SharedLaw> {
+    fn smooth_counterpart(&self, _width: f64) -> Option<SharedLaw> {
         None
     }
     /// Checks that the parameters are consistent with each other.

@@ -59,7 +59,7 @@ impl IntegratorKind {
     /// integrated between switches; all other systems in equal steps.
     pub fn of(system: &System, width: Option<f64>) -> IntegratorKind {
         // a width that smooths no law has no effect
-        let smooths = |width| system.joints().iter().any(|joint| joint.law().regularised(width).is_some());
+        let smooths = |width| system.joints().iter().any(|joint| joint.law().smooth_counterpart(width).is_some());
         if !width.is_some_and(smooths) && system.joints().iter().all(|joint| supports(joint.law().as_ref())) {
             return IntegratorKind::Exact;
         }
@@ -70,7 +70,7 @@ impl IntegratorKind {
     /// sliders without a width.
     pub fn stepping(system: &System, width: Option<f64>) -> IntegratorKind {
         let all = |has: &dyn Fn(&SharedLaw) -> bool| system.joints().iter().all(|joint| has(joint.law()));
-        let regular = |law: &SharedLaw| width.and_then(|width| law.regularised(width));
+        let regular = |law: &SharedLaw| width.and_then(|width| law.smooth_counterpart(width));
         // a law that carries no force counts as smooth even without a rate
         let smooth = |law: &SharedLaw| regular(law).as_ref().unwrap_or(law).rate().is_some() || carries_nothing(law);
         if all(&smooth) {

@@ -1,12 +1,14 @@
-//! Multiplications of a Newton step and of an orbit, counted before anything is computed, for
-//! method `auto`; and the memory of factors.
+//! Multiplications: of a Newton step and of an orbit, counted before anything is computed, for
+//! method `auto`; and those of a search, relative to its work limit. Also the memory of factors.
 
-use super::aft::Ports;
-
+use super::aft::{Port, Ports};
+use super::budget::WorkShare;
 use super::dynamics::banded::BandedForm;
+use super::equations::Discretization;
 use super::equations::harmonic_set::HarmonicSet;
-use super::linear_solve::newton_krylov::{krylov_step_work, uses_krylov};
+use super::linear_solve::newton_krylov::{krylov_step_work, product_work, uses_krylov};
 use super::options::FIRST_HARMONICS;
+use super::settings::WorkSettings;
 use crate::law::IdealElement;
 use crate::model::System;
 use num_complex::Complex64;
@@ -82,6 +84,56 @@ pub fn orbit_work(system: &System) -> f64 {
     }
     let searched = if rigid { STEPS_PER_LENGTH * doubling_work(system, USUAL_HARMONICS) } else { 0.0 };
     PER_DOF * system.dofs() as f64 + PER_PIECE * count + searched
+}
+
+impl Discretization {
+    /// Returns the work of the present search relative to the limits of [`WorkSettings`].
+    pub(super) fn work_used(&self, ports: &Ports) -> WorkShare {
+        let settings = WorkSettings::default();
+        let (size, harmonics) = (self.workspace.residual.len() as f64, self.harmonics().len());
+        let of_port = |port: &Port| {
+            let falls = port.least_penalty > 0.0;
+            port.axes as f64 * if falls { settings.falling_evaluation } else { settings.evaluation }
+        };
+        let evaluated = (self.all_samples() * self.work.evaluations) as f64 * ports.iter().map(of_port).sum::<f64>();
+        let (taken, least) = match &self.banded {
+            Some(banded) => {
+                let one = banded.work(harmonics);
+                (self.work.eliminations as f64 * one + evaluated, settings.eliminations * one)
+            }
+            // GMRES counts its products; the line search takes none
+            None if self.newton_krylov.is_some() => {
+                let one = product_work(ports, harmonics);
+                (self.work.products as f64 * one, settings.eliminations * settings.products_per_step * one)
+            }
+            None => {
+                let one = size.powi(3) / 3.0;
+                (self.work.eliminations as f64 * one + evaluated, settings.eliminations * one)
+            }
+        };
+        let most = if self.work.extends_shorter && ports.has_forces() {
+            settings.multiplications
+        } else {
+            settings.multiplications.max(least)
+        };
+        // four periods of at most 1024 samples in one evaluation
+        let stepped = settings.evaluations * 4 * self.all_samples().min(1024) * ports.len();
+        WorkShare {
+            multiplications: taken / most,
+            time_steps: self.aft.law_steps as f64 / settings.time_steps.max(stepped) as f64,
+        }
+    }
+
+    /// Returns the work of all searches of the point on these equations.
+    pub(super) fn point_work_used(&self, ports: &Ports) -> WorkShare {
+        self.work.before.and(self.work_used(ports))
+    }
+
+    /// Returns true if the search has used its work limit or that of its point.
+    pub(super) fn is_budget_used(&self, ports: &Ports) -> bool {
+        self.work_used(ports).exceeds(WorkShare { multiplications: 1.0, time_steps: 1.0 })
+            || self.work.elsewhere.and(self.point_work_used(ports)).exceeds(self.work.limit)
+    }
 }
 
 #[cfg(test)]

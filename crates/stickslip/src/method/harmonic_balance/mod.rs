@@ -1,5 +1,5 @@
-//! Harmonic balance: the orbit as a Fourier series, with joint forces by alternating
-//! frequency-time (AFT).
+//! Harmonic balance: the orbit as a Fourier series, with joint forces in closed form between turning
+//! points or by alternating frequency-time (AFT).
 //!
 //! The equations are written along the joints. Per harmonic, `u = u_lin - R f` relates the
 //! relative motions `u` of the joints, their forces `f` and the receptance `R` of the linear
@@ -20,14 +20,15 @@
 //! - `subharmonic`: orbits of several periods of the excitation;
 //! - `static_equilibrium`: the equilibrium under the constant loads, by harmonic 0 alone;
 //! - `budget`, `cost_model`, `memory_estimate`: work limits, operation counts, estimates of
-//!   memory.
+//!   memory;
+//! - `found_by`: the search that found a solution.
 //!
 //! The equations and their solution:
 //! - `equations/`: residual and Jacobian along the joints, set of harmonics, scaling;
 //! - `aft/`: harmonics of joint forces from harmonics of joint motions, with exact derivatives;
 //! - `dynamics/`: receptances of the linear part;
 //! - `linear_solve/`: the linear system of a Newton step;
-//! - `newton`, `line_search`: Newton's method with line search;
+//! - `newton`: Newton's method for the equations of a search;
 //! - `globalization/`: the fallbacks if Newton's method fails, in one table.
 //!
 //! Results:
@@ -41,8 +42,8 @@ mod budget;
 mod cost_model;
 mod dynamics;
 mod equations;
+mod found_by;
 mod globalization;
-mod line_search;
 mod linear_solve;
 mod memory_estimate;
 mod modes;
@@ -70,7 +71,7 @@ pub use subharmonic::Subharmonic;
 /// Entry of this method in `super::list::LIST`.
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: NAME,
-    summary: "Fourier series of the joint motions, friction sampled over the period, with an error estimate",
+    summary: "Fourier series of the joint motions, with an error estimate",
     options: &[
         MethodOption {
             key: "harmonics",
@@ -82,10 +83,10 @@ pub(super) const INFO: MethodInfo = MethodInfo {
             key: "samples",
             dimension: Dimension::NONE,
             count: true,
-            doc: "samples per period: even, at least 4 (harmonics + 1), and without `harmonics` at least 16 per \
-                  harmonic; default: 16 per harmonic and at least 1024, 128 per harmonic for steep laws and for \
-                  friction in a plane, and fewer for laws with steps (such as contacts that separate) if `tolerance` \
-                  is above 0.001",
+            doc: "samples per period, an even number of at least 4 (harmonics + 1), without `harmonics` at least 16 per \
+                  harmonic; default: at least 1024 and 16 per harmonic; steep laws and friction in a plane have 128 \
+                  per harmonic, and laws with steps (such as contacts that separate) have fewer if `tolerance` is \
+                  above 0.001",
         },
         MethodOption {
             key: "tolerance",

@@ -1,34 +1,23 @@
-//! Newton's method with a line search.
+//! Newton's method for the equations of a search, by [`DampedNewton`].
 //!
 //! Systems with many contacts iterate on coarse samples first. The searches that follow if it
 //! fails stand in `globalization`.
 
-use super::aft::{Port, Ports};
-use super::budget::WorkShare;
+use super::aft::Ports;
 use super::dynamics::banded::StepParameters;
+use super::equations::homotopy::{RESIDUAL_TOLERANCE, SearchContext};
 use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use super::globalization::SearchSettings;
-use super::globalization::homotopy::{RESIDUAL_TOLERANCE, SearchContext};
-use super::line_search::LineSearch;
-use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart, product_work};
-use super::settings::{NewtonSettings, WorkSettings};
+use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart};
+use super::settings::NewtonSettings;
 use num_complex::Complex64;
-use stickslip_numerics::{dense, interrupt};
+use stickslip_numerics::dense;
+use stickslip_numerics::newton::{AcceptedStep, DampedNewton, NewtonEnd, NewtonEquations};
 
-/// Number of last residuals in the non-monotone line search on coarse samples. A step is
-/// accepted if its residual is below the largest of them.
-///
-/// At the onset of slip and of opening, residuals rise before the solution is reached, and
-/// monotone steps become short and many. Four residuals save a third of the steps at the onset
-/// of slip of 16 to 300 nodes.
-///
-/// Source: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search technique for
-/// Newton's method".
-const NONMONOTONE_MEMORY: usize = 4;
 /// Residual at which a search ends.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum StopCriterion {
-    /// The tolerance [`RESIDUAL_TOLERANCE`].
+    /// The tolerance [`RESIDUAL_TOLERANCE`], or rounding.
     Solved,
     /// This residual, on coarse samples.
     Rough(f64),
@@ -69,59 +58,68 @@ impl SolveError {
     }
 }
 
-/// Course of the residual in one search.
-struct Convergence {
-    residual: f64,
-    /// Least residual, infinite before the first step.
-    least: f64,
-    /// Residual that must be halved, and the number of steps since it was set.
-    to_halve: f64,
-    stagnating: usize,
-    /// The last residuals, for the non-monotone line search.
-    recent: [f64; NONMONOTONE_MEMORY],
+/// Newton's method on the equations of a search.
+struct SearchIteration<'a> {
+    equations: &'a mut Discretization,
+    context: SearchContext<'a>,
+    motion: &'a mut HarmonicSolution,
+    /// Unit of motions, m.
+    length: f64,
+    /// True if the residual is that of coarse samples.
+    on_coarse_samples: bool,
+    /// True while the Jacobian on coarse samples reduces the residual on all samples enough.
+    may_use_coarse_jacobian: bool,
+    /// True if the Jacobian of the last step is that of coarse samples.
+    has_coarse_jacobian: bool,
+    /// True if the next step keeps the Jacobian of the last one.
+    keeps_jacobian: bool,
 }
 
-impl Convergence {
-    fn new(residual: f64) -> Self {
-        let recent = [residual; NONMONOTONE_MEMORY];
-        Convergence { residual, least: f64::INFINITY, to_halve: residual, stagnating: 0, recent }
-    }
-
-    /// Adds the residual after a step. Returns true if it is the least one.
-    fn add(&mut self, residual: f64, iteration: usize) -> bool {
-        self.residual = residual;
-        self.recent[iteration % NONMONOTONE_MEMORY] = residual;
-        let is_least = residual < self.least;
-        self.least = self.least.min(residual);
-        if self.least < 0.5 * self.to_halve {
-            (self.to_halve, self.stagnating) = (self.least, 0);
-        } else {
-            self.stagnating += 1;
+impl NewtonEquations for SearchIteration<'_> {
+    fn solve_step(&mut self, residual: f64) -> bool {
+        if !self.keeps_jacobian {
+            self.has_coarse_jacobian =
+                self.equations.complete_derivatives(self.context, self.motion, self.may_use_coarse_jacobian);
         }
-        is_least
+        let start = StepStart {
+            length: self.length,
+            residual,
+            coarse: self.has_coarse_jacobian || self.on_coarse_samples,
+            same_derivatives: self.keeps_jacobian,
+        };
+        self.equations.workspace.previous.copy_from(self.motion);
+        let solved = self.equations.regularized_step(self.context, self.motion, start);
+        self.motion.iterations += usize::from(solved);
+        solved
     }
 
-    /// Continues with the residual in other units.
-    fn rescale(&mut self, residual: f64) {
-        (self.residual, self.least, self.recent) = (residual, f64::INFINITY, [residual; NONMONOTONE_MEMORY]);
+    fn move_by(&mut self, fraction: f64) -> f64 {
+        self.equations.apply_step(self.context.ports, self.motion, fraction, self.length);
+        self.equations.evaluate(self.context, self.motion, self.length, DerivativeScope::Cheap)
     }
 
-    fn largest_recent(&self) -> f64 {
-        self.recent.iter().fold(self.residual, |most, r| most.max(*r))
+    fn accept(&mut self, step: AcceptedStep) -> Option<f64> {
+        let reduced = step.after < NewtonSettings::default().coarse.reduction * step.before;
+        self.may_use_coarse_jacobian &= reduced;
+        self.keeps_jacobian = self.has_coarse_jacobian && reduced && self.equations.search.linearized;
+        if step.is_least {
+            self.equations.workspace.best.copy_from(self.motion);
+        }
+        let now = self.equations.motion_scale(self.motion);
+        if now >= 0.5 * self.length && now <= 2.0 * self.length {
+            return None;
+        }
+        // the motion was far from its initial guess; rescale with its own size
+        self.length = now;
+        Some(self.equations.evaluate(self.context, self.motion, now, DerivativeScope::Cheap))
     }
 
-    fn is_solved(&self, tolerance: f64) -> bool {
-        self.residual <= tolerance || self.is_rounding(self.least)
+    fn has_exact_jacobian(&self) -> bool {
+        !self.has_coarse_jacobian
     }
 
-    /// Returns true if the search stagnates at a residual that is rounding.
-    fn is_rounding(&self, residual: f64) -> bool {
-        let settings = NewtonSettings::default();
-        self.stagnating > settings.stagnation_iterations && residual <= settings.stagnation_tolerance
-    }
-
-    fn stagnates_beyond(&self, patience: usize) -> bool {
-        self.stagnating > patience && self.least < f64::INFINITY
+    fn is_budget_used(&self) -> bool {
+        self.equations.is_budget_used(self.context.ports)
     }
 }
 
@@ -138,12 +136,12 @@ impl Discretization {
     ) -> Result<(), SolveError> {
         let ports = context.ports;
         if !self.search.uses_coarse || self.coarse.is_none() {
-            return self.search(context, motion, settings);
+            return self.newton_on_these_samples(context, motion, settings);
         }
         let start = motion.clone();
         let taken = (self.work.evaluations, self.work.eliminations, self.work.products);
         self.exchange_samples();
-        let rough = self.search(
+        let rough = self.newton_on_these_samples(
             context,
             motion,
             SearchSettings { goal: StopCriterion::Rough(self.coarse_tolerance()), ..settings },
@@ -154,7 +152,7 @@ impl Discretization {
             self.search.keeps_tangents = true;
         }
         self.exchange_samples();
-        if rough.is_ok() && self.search(context, motion, settings).is_ok() {
+        if rough.is_ok() && self.newton_on_these_samples(context, motion, settings).is_ok() {
             return Ok(());
         }
         // this retry happens once per search and gets the full work limit again
@@ -163,7 +161,7 @@ impl Discretization {
         self.work.before.multiplications += before - self.work_used(ports).multiplications;
         self.search.uses_coarse = false;
         *motion = HarmonicSolution { iterations: motion.iterations, ..start };
-        self.search(context, motion, settings)
+        self.newton_on_these_samples(context, motion, settings)
     }
 
     /// Returns the residual at which a search on coarse samples ends, see
@@ -175,96 +173,65 @@ impl Discretization {
 
     /// Newton's method with a line search, to a given residual.
     ///
-    /// The line search halves the step until the residual decreases. If no fraction decreases
-    /// it, the whole step is taken, which may break a cycle of slipping samples. On coarse
-    /// samples the line search is non-monotone, see [`NONMONOTONE_MEMORY`].
-    fn search(
+    /// On coarse samples the line search is non-monotone: at the onset of slip and of opening,
+    /// residuals rise before the solution is reached. This saves a third of the steps at the onset
+    /// of slip of 16 to 300 nodes.
+    fn newton_on_these_samples(
         &mut self,
         context: SearchContext<'_>,
         motion: &mut HarmonicSolution,
         settings: SearchSettings,
     ) -> Result<(), SolveError> {
-        let (ports, newton) = (context.ports, NewtonSettings::default());
-        let rough = matches!(settings.goal, StopCriterion::Rough(_));
-        let mut length = self.motion_scale(motion);
+        let defaults = NewtonSettings::default();
+        let on_coarse_samples = matches!(settings.goal, StopCriterion::Rough(_));
+        let length = self.motion_scale(motion);
         self.search.reuses_states = self.search.uses_coarse;
         let first = self.evaluate(context, motion, length, DerivativeScope::Cheap);
-        let solved = match settings.goal {
-            StopCriterion::Solved => RESIDUAL_TOLERANCE,
-            StopCriterion::Rough(solved) => solved,
-            StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
+        let newton = DampedNewton {
+            tolerance: match settings.goal {
+                StopCriterion::Solved => RESIDUAL_TOLERANCE,
+                StopCriterion::Rough(solved) => solved,
+                StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
+            },
+            rounding: defaults.rounding,
+            iterations: settings.iterations,
+            // forces that do not settle are soon left to the proximal point method
+            patience: if context.ports.has_forces() { defaults.stagnation_iterations } else { settings.patience },
+            memory: if on_coarse_samples { defaults.coarse.memory } else { 1 },
+            ..DampedNewton::default()
         };
-        let mut coarse = self.search.uses_coarse && !rough;
-        let mut same_derivatives = self.search.keeps_tangents && coarse;
-        let mut coarse_derivatives = same_derivatives;
-        let mut convergence = Convergence::new(first);
-        // the proximal point method finds forces that do not settle
-        let patience = if ports.has_forces() { newton.stagnation_iterations } else { settings.patience };
-        for _ in 0..settings.iterations {
-            interrupt::check();
-            if convergence.is_solved(solved) || self.is_budget_used(ports) || convergence.stagnates_beyond(patience) {
-                break;
-            }
-            if !same_derivatives {
-                coarse_derivatives = self.complete_derivatives(context, motion, coarse);
-            }
-            let residual = convergence.residual;
-            let near = StepStart { length, residual, coarse: coarse_derivatives || rough, same_derivatives };
-            self.workspace.previous.copy_from(motion);
-            if !self.regularized_step(context, motion, near) {
-                break;
-            }
-            motion.iterations += 1;
-            let reference = if rough { convergence.largest_recent() } else { residual };
-            let after = self.line_search(context, motion, length, reference);
-            if !after.is_finite() || after > newton.divergence * residual {
-                break;
-            }
-            let reduced = after < newton.coarse.reduction * residual;
-            coarse &= reduced;
-            same_derivatives = coarse_derivatives && reduced && self.search.linearised;
-            if convergence.add(after, motion.iterations) {
-                self.workspace.best.copy_from(motion);
-            }
-            let now = self.motion_scale(motion);
-            if now < 0.5 * length || now > 2.0 * length {
-                // the motion was far from its initial guess; rescale with its own size
-                length = now;
-                convergence.rescale(self.evaluate(context, motion, length, DerivativeScope::Cheap));
-            }
-        }
-        if convergence.residual > solved && convergence.least < f64::INFINITY {
+        let may_use_coarse_jacobian = self.search.uses_coarse && !on_coarse_samples;
+        let keeps_jacobian = self.search.keeps_tangents && may_use_coarse_jacobian;
+        let mut iteration = SearchIteration {
+            equations: self,
+            context,
+            motion,
+            length,
+            on_coarse_samples,
+            may_use_coarse_jacobian,
+            has_coarse_jacobian: keeps_jacobian,
+            keeps_jacobian,
+        };
+        let result = newton.run(&mut iteration, first);
+        let (length, mut residual) = (iteration.length, result.residual);
+        let solved = matches!(result.end, NewtonEnd::Converged | NewtonEnd::Rounding);
+        if !solved && result.least < f64::INFINITY {
             motion.c.clone_from(&self.workspace.best.c);
             motion.force.clone_from(&self.workspace.best.force);
-            convergence.residual = self.evaluate(context, motion, length, DerivativeScope::None);
+            residual = self.evaluate(context, motion, length, DerivativeScope::None);
         }
+        let is_rounding = result.end == NewtonEnd::Stagnated && residual <= newton.rounding;
         self.search.reuses_states = false;
         self.search.keeps_tangents = false;
-        motion.residual = convergence.residual;
-        if convergence.residual <= solved || convergence.is_rounding(convergence.residual) {
+        motion.residual = residual;
+        if solved || is_rounding {
             Ok(())
         } else {
             Err(SolveError {
                 left_contacts: self.left_contacts(motion),
-                ..SolveError::not_converged(motion.iterations, convergence.residual)
+                ..SolveError::not_converged(motion.iterations, residual)
             })
         }
-    }
-
-    /// Moves to the fraction of the step that reduces the residual below `reference`, or to the
-    /// whole step if none does. Returns the residual there.
-    fn line_search(
-        &mut self,
-        context: SearchContext<'_>,
-        motion: &mut HarmonicSolution,
-        length: f64,
-        reference: f64,
-    ) -> f64 {
-        let mut trial = |fraction: f64| {
-            self.apply_step(context.ports, motion, fraction, length);
-            self.evaluate(context, motion, length, DerivativeScope::Cheap)
-        };
-        LineSearch::default().run(reference, &mut trial).unwrap_or_else(|| trial(1.0))
     }
 
     /// Solves for the Newton step from the previous solution into the workspace. Returns false if
@@ -311,7 +278,7 @@ impl Discretization {
         for (p, port) in ports.iter().enumerate() {
             self.add_springs(p, port, -held);
         }
-        self.search.linearised = false;
+        self.search.linearized = false;
         motion.copy_from(&self.workspace.previous);
         self.workspace.step.clone_from(&best.1);
         best.0.is_finite()
@@ -343,61 +310,13 @@ impl Discretization {
         self.is_held_by_contacts() && mean > NewtonSettings::default().mean.left_contacts * self.extent(motion)
     }
 
-    /// Returns the work of the present search relative to the limits of [`WorkSettings`].
-    pub(super) fn work_used(&self, ports: &Ports) -> WorkShare {
-        let settings = WorkSettings::default();
-        let (size, harmonics) = (self.workspace.residual.len() as f64, self.harmonics().len());
-        let of_port = |port: &Port| {
-            let falls = port.least_penalty > 0.0;
-            port.axes as f64 * if falls { settings.falling_evaluation } else { settings.evaluation }
-        };
-        let evaluated = (self.all_samples() * self.work.evaluations) as f64 * ports.iter().map(of_port).sum::<f64>();
-        let (taken, least) = match &self.banded {
-            Some(banded) => {
-                let one = banded.work(harmonics);
-                (self.work.eliminations as f64 * one + evaluated, settings.eliminations * one)
-            }
-            // GMRES counts its products; the line search takes none
-            None if self.newton_krylov.is_some() => {
-                let one = product_work(ports, harmonics);
-                (self.work.products as f64 * one, settings.eliminations * settings.products_per_step * one)
-            }
-            None => {
-                let one = size.powi(3) / 3.0;
-                (self.work.eliminations as f64 * one + evaluated, settings.eliminations * one)
-            }
-        };
-        let most = if self.work.extends_shorter && ports.has_forces() {
-            settings.multiplications
-        } else {
-            settings.multiplications.max(least)
-        };
-        // four periods of at most 1024 samples in one evaluation
-        let stepped = settings.evaluations * 4 * self.all_samples().min(1024) * ports.len();
-        WorkShare {
-            multiplications: taken / most,
-            time_steps: self.aft.law_steps as f64 / settings.time_steps.max(stepped) as f64,
-        }
-    }
-
-    /// Returns the work of all searches of the point on these equations.
-    pub(super) fn point_work_used(&self, ports: &Ports) -> WorkShare {
-        self.work.before.and(self.work_used(ports))
-    }
-
-    /// Returns true if the search has used its work limit or that of its point.
-    pub(super) fn is_budget_used(&self, ports: &Ports) -> bool {
-        self.work_used(ports).exceeds(WorkShare { multiplications: 1.0, time_steps: 1.0 })
-            || self.work.elsewhere.and(self.point_work_used(ports)).exceeds(self.work.limit)
-    }
-
     /// Solves for the Newton step into `self.workspace.step`, in units of the unknowns.
     pub(super) fn newton_step(&mut self, context: SearchContext<'_>, near: StepStart) -> bool {
         let SearchContext { ports, homotopy, .. } = context;
         self.work.eliminations += 1;
         if let Some(banded) = &mut self.banded {
             let along = StepParameters { penalty: &self.linear.penalty, homotopy };
-            if !banded.linearise(ports, &along, &self.workspace.tangents) {
+            if !banded.linearize(ports, &along, &self.workspace.tangents) {
                 return false;
             }
         }
@@ -460,7 +379,7 @@ impl Discretization {
         self.begin_search(ports);
         let mut motion = HarmonicSolution { iterations: 0, ..start.clone() };
         self.exchange_samples();
-        let found = self.search(
+        let found = self.newton_on_these_samples(
             SearchContext::given(ports, omega),
             &mut motion,
             SearchSettings { goal: StopCriterion::Rough(self.coarse_tolerance()), ..SearchSettings::default() },

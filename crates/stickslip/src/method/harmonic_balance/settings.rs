@@ -1,4 +1,5 @@
-//! Settings of the searches of harmonic balance: every knob with its default and its reason.
+//! Settings of Newton's method, of the work limits and of the fallbacks: every knob with its
+//! default and its reason. Other settings stand in the files that use them.
 //!
 //! The options that users set are in `options`.
 
@@ -9,14 +10,13 @@ use super::budget::WorkShare;
 pub(super) struct NewtonSettings {
     /// Largest number of iterations. Default 60; 3 to 15 are usual.
     pub iterations: usize,
-    /// Iterations without a halved least residual after which a search stagnates. Default 8.
+    /// Iterations without a halved least residual after which a search with unknown forces
+    /// stagnates. Default 8.
     pub stagnation_iterations: usize,
-    /// Residual at which a stagnating search counts as converged. Default 1e-8: forces are
-    /// differentiable functions of the harmonics, so the remainder is the rounding of structures
-    /// whose stiffnesses differ widely.
-    pub stagnation_tolerance: f64,
-    /// Growth of the residual in one step beyond which the search has diverged. Default 100.
-    pub divergence: f64,
+    /// Largest residual that counts as rounding if a step with the exact Jacobian does not reduce
+    /// it. Default 1e-8: forces are differentiable functions of the harmonics, so the remainder is
+    /// the rounding of structures whose stiffnesses differ widely.
+    pub rounding: f64,
     /// Newton's method on coarse samples, for many contacts.
     pub coarse: CoarseSettings,
     /// Steps of a body that contacts alone support.
@@ -28,8 +28,7 @@ impl Default for NewtonSettings {
         NewtonSettings {
             iterations: 60,
             stagnation_iterations: 8,
-            stagnation_tolerance: 1e-8,
-            divergence: 100.0,
+            rounding: 1e-8,
             coarse: CoarseSettings::default(),
             mean: MeanSettings::default(),
         }
@@ -47,11 +46,13 @@ pub(super) struct CoarseSettings {
     /// ends the use of coarse Jacobians. A smaller one keeps the Jacobian for the next step,
     /// because a new one would have the same sampling error. Default 0.1.
     pub reduction: f64,
+    /// Number of last residuals, the largest of which a step must reduce. Default 4.
+    pub memory: usize,
 }
 
 impl Default for CoarseSettings {
     fn default() -> Self {
-        CoarseSettings { tolerance: 8e-4, reduction: 0.1 }
+        CoarseSettings { tolerance: 8e-4, reduction: 0.1, memory: 4 }
     }
 }
 

@@ -351,8 +351,8 @@ impl HarmonicBalanceSolver {
         Ok(Orbit { omega: self.excitation_frequency, periods: self.periods, ..orbit })
     }
 
-    /// Finds the solution near another one, without an error estimate and without the
-    /// slip-limit homotopy of [`Discretization::solve`].
+    /// Finds the solution near another one, without an error estimate and without the fallbacks
+    /// that ignore the initial guess.
     ///
     /// Searches between orbits use it. They can do without a failed point.
     pub(super) fn solve_nearby(

@@ -86,7 +86,7 @@ impl AverageAccelerationFlow {
     pub fn new(system: &System, width: Option<f64>, method: &'static str) -> Result<Self, MethodError> {
         let settings = EqualStepSettings::default();
         let assembly = Assembly::new(system, method, |joint| {
-            let regular = width.and_then(|width| joint.regularised(width));
+            let regular = width.and_then(|width| joint.smooth_counterpart(width));
             let chosen = regular.unwrap_or_else(|| joint.clone());
             match law_step::states(&chosen) {
                 Some((states, scale)) => Ok((chosen, states, scale)),

@@ -19,7 +19,7 @@ use crate::model::System;
 /// A joint whose law has no rate view and is not regularized, or a place without mass.
 pub(crate) fn assembly(system: &System, width: Option<f64>, method: &'static str) -> Result<Assembly, MethodError> {
     Assembly::new(system, method, |law| {
-        let law = width.and_then(|width| law.regularised(width)).unwrap_or_else(|| law.clone());
+        let law = width.and_then(|width| law.smooth_counterpart(width)).unwrap_or_else(|| law.clone());
         let (states, scale) = law
             .rate()
             .map(|rate| (rate.states(), rate.state_scale()))

@@ -279,7 +279,7 @@ impl RadauStep {
         for iteration in 0..12 {
             interrupt::check();
             self.evaluate(assembly, eliminated, loads);
-            self.linearise(assembly, eliminated, state);
+            self.linearize(assembly, eliminated, state);
             if !self.lu.factor() {
                 return false;
             }
@@ -307,7 +307,7 @@ impl RadauStep {
             if size <= 1e-9 {
                 self.evaluate(assembly, eliminated, loads);
                 if derivatives {
-                    self.linearise(assembly, eliminated, state);
+                    self.linearize(assembly, eliminated, state);
                     return self.lu.factor();
                 }
                 return true;
@@ -384,7 +384,7 @@ impl RadauStep {
     }
 
     /// Computes residual and Jacobian from the laws at the present unknowns.
-    fn linearise(&mut self, assembly: &Assembly, eliminated: &RadauElimination, state: &[f64]) {
+    fn linearize(&mut self, assembly: &Assembly, eliminated: &RadauElimination, state: &[f64]) {
         // constant sizes for the compiler: one axis, without states
         match (assembly.axes.len(), self.unknown.len()) {
             (1, STAGES) => self.differentiate(assembly, eliminated, state, (1, STAGES)),

@@ -4,8 +4,8 @@
 //! the sample spacing.
 
 use crate::method::harmonic_balance::aft::{FrequencyTime, InitialState, Port, Ports};
+use crate::method::harmonic_balance::equations::homotopy::{GIVEN_EQUATIONS, RESIDUAL_TOLERANCE, SearchContext};
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::globalization::homotopy::{GIVEN_EQUATIONS, RESIDUAL_TOLERANCE, SearchContext};
 use crate::method::harmonic_balance::linear_solve::newton_krylov::StepStart;
 
 /// Settings of the Newton steps on finer samples.
@@ -86,7 +86,7 @@ impl Discretization {
         }
         let mut motion = near.clone();
         let length = self.motion_scale(&motion);
-        if !self.search.linearised {
+        if !self.search.linearized {
             self.compute_jacobians(ports, omega, &mut motion, length);
         }
         let near = |residual, kept| StepStart { length, residual, coarse: true, same_derivatives: kept };

@@ -3,8 +3,8 @@
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
 use crate::method::harmonic_balance::equations::harmonic_set::HarmonicSet;
+use crate::method::harmonic_balance::equations::homotopy::RESIDUAL_TOLERANCE;
 use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
-use crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE;
 use crate::model::Axis;
 use nalgebra::DVector;
 use num_complex::Complex64;

@@ -86,9 +86,9 @@ impl InteriorPort {
         self.gap(0.0) * self.unit / (self.limit * self.limit)
     }
 
-    /// Linearises the conditions at the argument with the harmonics `y`. Writes the derivative
+    /// Linearizes the conditions at the argument with the harmonics `y`. Writes the derivative
     /// of the harmonics of `f` by those of the argument into `tangent`.
-    pub fn linearise(&mut self, aft: &mut FrequencyTime, y: &[Complex64], tangent: &mut [f64]) {
+    pub fn linearize(&mut self, aft: &mut FrequencyTime, y: &[Complex64], tangent: &mut [f64]) {
         aft.synthesise(y, |_| Complex64::new(1.0, 0.0));
         aft.reserve_slopes(1);
         for (i, s) in self.samples.iter_mut().enumerate() {
@@ -166,7 +166,7 @@ mod tests {
             let mut barrier = InteriorPort::new(limit, &mut aft, &argument);
             while barrier.remaining_gap() > 1e-10 {
                 let gap = barrier.gap(0.0);
-                barrier.linearise(&mut aft, &argument, &mut tangent);
+                barrier.linearize(&mut aft, &argument, &mut tangent);
                 barrier.set_targets(0.1 * gap, false, &mut aft, &mut image);
                 let share = barrier.step(&mut aft, &argument);
                 assert!(share > 0.0 && share <= 1.0);

@@ -8,8 +8,8 @@
 //! `(1 - T) δλ + ε T D Wᵀ y = r`, with the time derivative `D`.
 
 use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::equations::homotopy::Homotopy;
 use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
-use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
 use crate::model::System;
 use num_complex::Complex64;
 use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
@@ -18,7 +18,7 @@ use stickslip_numerics::banded::{BandedMatrix, cuthill_mckee};
 /// functions would solve the whole structure with dense matrices.
 pub(crate) const DESCRIBING_DOFS: usize = 40;
 
-/// Parameters of the linearised equations, in addition to the tangents.
+/// Parameters of the linearized equations, in addition to the tangents.
 pub(crate) struct StepParameters<'a> {
     /// Penalty ε per port, N s/m.
     pub penalty: &'a [f64],
@@ -254,7 +254,7 @@ impl BandedForm {
 
     /// Factors the equations of the Newton step. `tangents` contains K or T, one block per
     /// port. Returns false if they are singular.
-    pub fn linearise(&mut self, ports: &Ports, along: &StepParameters, tangents: &[f64]) -> bool {
+    pub fn linearize(&mut self, ports: &Ports, along: &StepParameters, tangents: &[f64]) -> bool {
         let nh = self.harmonics.len();
         let size = 2 * nh;
         let (blocks, _) = crate::method::harmonic_balance::aft::tangent_ranges(ports, nh);

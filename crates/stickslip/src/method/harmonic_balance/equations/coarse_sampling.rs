@@ -2,7 +2,7 @@
 
 use super::{CLOSED_CONTACT_SIGN, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::aft::{FrequencyTime, PERIODICITY_TOLERANCE, tangent_range};
-use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
+use crate::method::harmonic_balance::equations::homotopy::SearchContext;
 
 /// The coarse sampling has at least `1/MOST_REDUCTION` of all samples, at least
 /// `SAMPLES_PER_WAVE` samples per wave of the highest harmonic, and at most half of all samples.
@@ -70,7 +70,7 @@ impl Discretization {
             self.search.states[p].forgetting_inverse.clone_from(&aft.forgetting_inverse);
             self.add_springs(p, port, CLOSED_CONTACT_SIGN + self.proximal_stiffness());
         }
-        self.search.linearised = true;
+        self.search.linearized = true;
         any
     }
 

@@ -25,6 +25,7 @@
 //!
 //! - `excitation`: the equations at one frequency, and the initial guess
 //! - `harmonic_set`: the harmonics in the series of a motion
+//! - `homotopy`: parameters between easier equations and the given ones, and the tolerance
 //! - `scaling`: units of motions and residuals
 //! - `scaled_unknowns`: the equations as a function of unknowns of order one
 //! - `coarse_sampling`: fewer samples for derivatives of many contacts
@@ -35,6 +36,7 @@ mod coarse_sampling;
 pub(super) mod contact_parameter;
 mod excitation;
 pub(super) mod harmonic_set;
+pub(super) mod homotopy;
 pub(super) mod regularization;
 mod scaled_unknowns;
 mod scaling;
@@ -44,12 +46,12 @@ use super::budget::WorkCounter;
 use super::dynamics::banded::BandedForm;
 use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
 use super::equations::harmonic_set::velocity_weight;
-use super::globalization::found_by::FoundBy;
-use super::globalization::homotopy::{Homotopy, SearchContext};
+use super::found_by::FoundBy;
 use super::linear_solve::linearization::LinearizedEquations;
 use super::linear_solve::newton_krylov::{NewtonKrylov, StepStart, uses_krylov};
 use crate::model::CyclicSymmetry;
 use crate::orbit::JointSeries;
+use homotopy::{Homotopy, SearchContext};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use stickslip_numerics::vector::dot;
@@ -153,7 +155,7 @@ pub(super) struct SearchState {
     /// True if the search uses the coarse sampling.
     pub uses_coarse: bool,
     /// True if the tangents are those of the present search, without added springs.
-    pub linearised: bool,
+    pub linearized: bool,
     /// True if the tangents are those of the initial guess of the next search, by coarse sampling.
     pub keeps_tangents: bool,
 }
@@ -276,7 +278,7 @@ impl Discretization {
                 states: vec![InitialState::default(); ports.len()],
                 reuses_states: false,
                 uses_coarse: false,
-                linearised: false,
+                linearized: false,
                 keeps_tangents: false,
             },
             work: WorkCounter::default(),
@@ -462,7 +464,7 @@ impl Discretization {
                 *force -= Complex64::new(dot(re, step), dot(im, step)) * unit;
             }
         }
-        self.search.linearised = false;
+        self.search.linearized = false;
     }
 
     /// Begins a point. All searches of the point share one work limit.
@@ -476,7 +478,7 @@ impl Discretization {
         self.work.begin_search(self.point_work_used(ports));
         self.aft.law_steps = 0;
         let search = &mut self.search;
-        (search.reuses_states, search.linearised, search.keeps_tangents) = (false, false, false);
+        (search.reuses_states, search.linearized, search.keeps_tangents) = (false, false, false);
         search.uses_coarse = self.coarse.is_some();
         search.states.iter_mut().for_each(|known| *known = InitialState::default());
     }
@@ -571,7 +573,7 @@ impl Discretization {
     pub fn sample(&mut self, ports: &Ports, p: usize, omega: f64, motion: &HarmonicSolution) {
         let nh = self.harmonics().len();
         let port = &ports[p];
-        if self.search.linearised && port.has_memory_steps() {
+        if self.search.linearized && port.has_memory_steps() {
             self.aft.known_state = self.search.states[p].if_forgotten();
         }
         self.aft.static_share = 1.0;

@@ -2,7 +2,7 @@
 
 use super::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
+use crate::method::harmonic_balance::equations::homotopy::SearchContext;
 use num_complex::Complex64;
 
 impl Discretization {

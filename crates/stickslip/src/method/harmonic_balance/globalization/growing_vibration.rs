@@ -8,9 +8,9 @@
 
 use crate::method::harmonic_balance::aft::{Port, StaticState};
 use crate::method::harmonic_balance::equations::HarmonicSolution;
+use crate::method::harmonic_balance::equations::homotopy::SearchContext;
+use crate::method::harmonic_balance::found_by::FoundBy;
 use crate::method::harmonic_balance::globalization::SearchSettings;
-use crate::method::harmonic_balance::globalization::found_by::FoundBy;
-use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::method::{ErrorEstimate, Request};
 use crate::orbit::Orbit;

@@ -16,8 +16,8 @@
 //! Wright, "Primal-Dual Interior-Point Methods" (1997).
 
 use super::SearchSettings;
-use super::homotopy::{GIVEN_EQUATIONS, SearchContext};
 use crate::method::harmonic_balance::aft::{FrequencyTime, InteriorPort, Port, Ports, tangent_range};
+use crate::method::harmonic_balance::equations::homotopy::{GIVEN_EQUATIONS, SearchContext};
 use crate::method::harmonic_balance::equations::{
     CLOSED_CONTACT_SIGN, DerivativeScope, Discretization, HarmonicSolution,
 };
@@ -93,7 +93,7 @@ impl Discretization {
                 argument((self, p, port), omega, motion, &mut along.argument);
                 match &mut along.barriers[p] {
                     Some(barrier) => {
-                        barrier.linearise(&mut along.aft, &along.argument, &mut self.workspace.tangents[tangent]);
+                        barrier.linearize(&mut along.aft, &along.argument, &mut self.workspace.tangents[tangent]);
                     }
                     None => {
                         self.force_port_residual(SearchContext::given(ports, omega), p, motion, DerivativeScope::All)
@@ -207,11 +207,11 @@ fn argument(
 
 #[cfg(test)]
 mod tests {
-    use super::super::homotopy::RESIDUAL_TOLERANCE;
     use super::*;
     use crate::law::{Coulomb, Jenkins};
     use crate::method::harmonic_balance::dynamics::banded::BandedForm;
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+    use crate::method::harmonic_balance::equations::homotopy::RESIDUAL_TOLERANCE;
     use crate::model::{
         Disk, Force, GROUND, Joint, Mass, Model, SectorDistribution, Spring, System, normal_deviations,
     };

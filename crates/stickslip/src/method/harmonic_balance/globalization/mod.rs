@@ -1,8 +1,8 @@
 //! The solution of a point: Newton's method, then the searches of one table.
 //!
 //! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
-//! [`FALLBACKS`] follow in their order. Each receives the same initial guess; the homotopy ignores
-//! it. If all of them fail, the solver lets the vibration grow (`growing_vibration`), and at last
+//! [`FALLBACKS`] follow in their order. Each receives the same initial guess; the slip-limit homotopy
+//! ignores it. If all of them fail, the solver lets the vibration grow (`growing_vibration`), and at last
 //! begins from a time integration (`time_start`). These two are no rows of the table, because they
 //! search several times.
 //!
@@ -11,28 +11,24 @@
 //! page on harmonic balance list. Quick and general searches come first. The work limit of a point
 //! ([`WorkSettings`](super::settings::WorkSettings)) covers all of them together.
 //!
-//! - `homotopy`: parameters of the homotopies, and the tolerance of a solution
 //! - `interior_point`: interior point method for rigid friction
 //! - `proximal_point`: proximal point method for forces that the equations leave undetermined
 //! - `slip_limit_homotopy`: homotopy in the slip limits
 //! - `time_start`: initial guesses from time integration
 //! - `growing_vibration`: search with a vibration that grows slowly from static equilibrium
-//! - `found_by`: the search that found a solution
 
-pub(super) mod found_by;
 mod growing_vibration;
-pub(super) mod homotopy;
 pub(super) mod interior_point;
 pub(super) mod proximal_point;
 mod slip_limit_homotopy;
 pub(super) mod time_start;
 
 use super::aft::Ports;
+use super::equations::homotopy::SearchContext;
 use super::equations::{Discretization, HarmonicSolution};
+use super::found_by::FoundBy;
 use super::newton::{SolveError, StopCriterion};
 use super::settings::NewtonSettings;
-use found_by::FoundBy;
-use homotopy::SearchContext;
 
 /// A search that follows if Newton's method fails.
 struct Fallback {
@@ -40,11 +36,16 @@ struct Fallback {
     /// True if the search can help with these ports.
     applies: fn(&Ports) -> bool,
     /// False if the search ignores the initial guess. It then does not follow a guess from an
-    /// adjacent orbit or from a time integration: it was tried before, or the point can be omitted.
+    /// adjacent orbit, from a growing vibration or from a time integration: it was tried before, or
+    /// the point can be omitted.
     uses_guess: bool,
-    /// Replaces the initial guess in the last argument by a solution. The search begins with
-    /// [`Discretization::begin_search`] if it does not continue with the states of Newton's method,
-    /// and adds its iterations to those of the guess.
+    /// Replaces the initial guess in the last argument by a solution of the given equations: motion,
+    /// force and residual. Adds its iterations to those of the guess; if it fails, only these are
+    /// used. It ends when [`Discretization::is_budget_used`], and restores everything else that it
+    /// changes in the discretization.
+    ///
+    /// [`Discretization::begin_search`] forgets the states of laws with memory and begins the budget
+    /// of another search. Without it, a search continues both.
     search: fn(&mut Discretization, &Ports, f64, &mut HarmonicSolution) -> Result<(), SolveError>,
 }
 

@@ -13,8 +13,10 @@
 //! Source: Rockafellar (1976), "Monotone operators and the proximal point algorithm".
 
 use super::SearchSettings;
-use super::homotopy::{GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE, SearchContext};
 use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::equations::homotopy::{
+    GIVEN_EQUATIONS, Homotopy, RESIDUAL_TOLERANCE, SearchContext,
+};
 use crate::method::harmonic_balance::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::newton::SolveError;
 use crate::method::harmonic_balance::settings::ProximalSettings;

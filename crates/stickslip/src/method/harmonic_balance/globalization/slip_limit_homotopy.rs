@@ -4,8 +4,8 @@
 //! each solution is the initial guess of the next.
 
 use super::SearchSettings;
-use super::homotopy::{GIVEN_EQUATIONS, Homotopy, SearchContext};
 use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::equations::homotopy::{GIVEN_EQUATIONS, Homotopy, SearchContext};
 use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
 use crate::method::harmonic_balance::newton::SolveError;
 use crate::method::harmonic_balance::settings::SlipHomotopySettings;

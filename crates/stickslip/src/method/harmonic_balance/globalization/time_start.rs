@@ -1,10 +1,10 @@
-//! Initial guesses from time integration, if neither warm starts nor describing functions lead
-//! to an orbit.
+//! Initial guesses from time integration: for orbits of several periods, from the state of another
+//! method's orbit, and after all other searches failed.
 
-use super::found_by::FoundBy;
 use crate::method::OrbitError;
 use crate::method::harmonic_balance::NAME;
 use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
+use crate::method::harmonic_balance::found_by::FoundBy;
 use crate::method::harmonic_balance::settings::{TimeStartSettings, WorkSettings};
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::method::orbit_search::describing_guess::DescribingGuess;

@@ -1,14 +1,14 @@
-//! Linearised equations at a motion: the system of a Newton step.
+//! Linearized equations at a motion: the system of a Newton step.
 //!
 //! The Jacobian is `δ_qp r_y - r_u R_qp f_y`, see `equations`. The matrix has
 //! the lowest harmonics alone, or all of them.
 
 use crate::method::harmonic_balance::aft::{Port, Ports, tangent_range};
-use crate::method::harmonic_balance::globalization::homotopy::Homotopy;
+use crate::method::harmonic_balance::equations::homotopy::Homotopy;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// The linearised equations at a motion.
+/// The linearized equations at a motion.
 pub(crate) struct LinearizedEquations<'a> {
     pub ports: &'a Ports,
     pub harmonics: &'a [usize],

@@ -16,7 +16,7 @@ use super::linearization::LinearizedEquations;
 use super::modal_preconditioner::ModalPreconditioner;
 use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Port, Ports};
 use crate::method::harmonic_balance::dynamics::receptance::Receptance;
-use crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE;
+use crate::method::harmonic_balance::equations::homotopy::RESIDUAL_TOLERANCE;
 use num_complex::Complex64;
 use std::sync::Arc;
 use stickslip_numerics::dense::{ProductShape, Transpose, multiply_blocked};
@@ -371,8 +371,8 @@ mod tests {
     use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
     use crate::method::harmonic_balance::dynamics::receptance::ModalReceptance;
     use crate::method::harmonic_balance::dynamics::uncoupled_modes::UncoupledDynamics;
+    use crate::method::harmonic_balance::equations::homotopy::SearchContext;
     use crate::method::harmonic_balance::equations::{Discretization, HarmonicSolution};
-    use crate::method::harmonic_balance::globalization::homotopy::SearchContext;
     use crate::method::harmonic_balance::settings::WorkSettings;
     use crate::model::{Axis, System};
     use crate::structure::Structure;

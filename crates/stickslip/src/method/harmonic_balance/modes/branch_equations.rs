@@ -238,7 +238,7 @@ impl ParametricEquations for BranchEquations<'_> {
 
     fn tolerance(&self) -> f64 {
         let settings = BranchSettings::default();
-        crate::method::harmonic_balance::globalization::homotopy::RESIDUAL_TOLERANCE / settings.unit_of_motion
+        crate::method::harmonic_balance::equations::homotopy::RESIDUAL_TOLERANCE / settings.unit_of_motion
     }
 
     fn evaluate(&mut self, x: &[f64], p: f64, f: &mut [f64], by_x: &mut [f64], by_p: &mut [f64]) -> bool {

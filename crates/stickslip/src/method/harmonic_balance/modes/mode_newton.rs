@@ -5,10 +5,9 @@
 
 use super::mode_continuation::ModeArc;
 use super::nonlinear_mode::{ModeEquations, ModeSettings, ModeState, scaled_norm};
-use crate::method::harmonic_balance::line_search::LineSearch;
-use crate::method::harmonic_balance::settings::NewtonSettings;
+use stickslip_numerics::dense;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
-use stickslip_numerics::{dense, interrupt};
+use stickslip_numerics::newton::{AcceptedStep, DampedNewton, NewtonEnd, NewtonEquations};
 
 /// Limits of one iteration.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +29,67 @@ pub(super) struct ModeSolution {
     bordered: Vec<f64>,
 }
 
+/// Newton's method for a nonlinear mode.
+struct ModeIteration<'a, 'e> {
+    equations: &'a mut ModeEquations<'e>,
+    /// Initial guess, along which the phase is fixed.
+    guess: ModeState,
+    /// Start of the step.
+    start: ModeArc,
+    /// Current point.
+    solution: ModeSolution,
+    /// True if the Jacobian is that of the current point.
+    has_jacobian: bool,
+    residual: Vec<f64>,
+    step: Vec<f64>,
+    row: Option<&'a [f64]>,
+}
+
+impl ModeIteration<'_, '_> {
+    /// Evaluates the residual, and the Jacobian if wanted. Returns the norm of the residual.
+    fn evaluate(&mut self, with_jacobian: bool) -> f64 {
+        let ModeSolution { point, jacobian, units, .. } = &mut self.solution;
+        self.has_jacobian = with_jacobian;
+        let jacobian = with_jacobian.then_some(&mut jacobian[..]);
+        self.equations.evaluate(&point.state, (&self.guess, point.amplitude), &mut self.residual, jacobian);
+        scaled_norm(units, &self.residual)
+    }
+
+    fn complete_jacobian(&mut self) {
+        if !self.has_jacobian {
+            self.evaluate(true);
+        }
+    }
+}
+
+impl NewtonEquations for ModeIteration<'_, '_> {
+    fn solve_step(&mut self, _residual: f64) -> bool {
+        self.complete_jacobian();
+        let ModeIteration { equations, solution, residual, step, row, start, .. } = self;
+        let ModeSolution { point, jacobian, units, bordered, .. } = solution;
+        step.iter_mut().zip(residual.iter().zip(&*units)).for_each(|(d, (r, unit))| *d = r / unit);
+        step[residual.len()] = 0.0;
+        start.clone_from(point);
+        equations.solve_bordered(point, (jacobian, units), *row, (bordered, step)).is_some()
+    }
+
+    /// The Jacobian takes most of the time of an evaluation, and most steps are whole. Shorter
+    /// steps are tried without it.
+    fn move_by(&mut self, fraction: f64) -> f64 {
+        let point = &mut self.solution.point;
+        point.clone_from(&self.start);
+        point.shift(&self.step, -fraction);
+        if !(point.state.omega > 0.0 && point.amplitude.is_finite() && point.amplitude > 0.0) {
+            return f64::INFINITY;
+        }
+        self.evaluate(fraction == 1.0)
+    }
+
+    fn accept(&mut self, _step: AcceptedStep) -> Option<f64> {
+        None
+    }
+}
+
 impl ModeEquations<'_> {
     /// Solves at amplitude `a` from `start`, whose motion is scaled to `a`. Forces along laws
     /// of velocity keep their values, as in slip.
@@ -42,60 +102,40 @@ impl ModeEquations<'_> {
     }
 
     /// Newton's method in the plane through `point` with the normal `row`, or at its amplitude.
-    pub(super) fn newton(
-        &mut self,
-        mut point: ModeArc,
-        row: Option<&[f64]>,
-        limits: NewtonLimits,
-    ) -> Option<ModeSolution> {
+    pub(super) fn newton(&mut self, point: ModeArc, row: Option<&[f64]>, limits: NewtonLimits) -> Option<ModeSolution> {
         let settings = ModeSettings::default();
-        let size = self.size();
-        let start = point.clone();
-        let units = self.units(&start.state, start.amplitude);
-        let (mut residual, mut jacobian) = (vec![0.0; size], vec![0.0; size * size]);
-        let evaluate = |this: &mut Self, point: &ModeArc, residual: &mut [f64], jacobian: Option<&mut [f64]>| {
-            this.evaluate(&point.state, (&start.state, point.amplitude), residual, jacobian);
-            scaled_norm(&units, residual)
+        let newton = DampedNewton {
+            tolerance: settings.tolerance,
+            rounding: settings.rounding,
+            iterations: limits.iterations,
+            largest_growth: if limits.bold { DampedNewton::default().largest_growth } else { 0.0 },
+            ..DampedNewton::default()
         };
-        let mut now = evaluate(self, &point, &mut residual, Some(&mut jacobian));
-        let mut iterations = 0;
-        let (mut bordered, mut step) = (Vec::new(), vec![0.0; size + 1]);
-        while now > settings.tolerance && iterations < limits.iterations {
-            interrupt::check();
-            step.iter_mut().zip(residual.iter().zip(&units)).for_each(|(d, (r, unit))| *d = r / unit);
-            step[size] = 0.0;
-            self.solve_bordered(&point, (&jacobian, &units), row, (&mut bordered, &mut step))?;
-            iterations += 1;
-            let mut trial = point.clone();
-            // The Jacobian takes most of the time of an evaluation, and most steps are whole.
-            // Shorter steps are tried without it.
-            let mut is_whole = true;
-            let mut try_fraction = |fraction: f64| {
-                is_whole = fraction == 1.0;
-                trial.clone_from(&point);
-                trial.shift(&step, -fraction);
-                let sensible = trial.state.omega > 0.0 && trial.amplitude.is_finite() && trial.amplitude > 0.0;
-                let jacobian = is_whole.then_some(&mut jacobian[..]);
-                if sensible { evaluate(self, &trial, &mut residual, jacobian) } else { f64::INFINITY }
-            };
-            match LineSearch::default().run(now, &mut try_fraction) {
-                Some(after) => (point, now) = (trial, after),
-                None if now <= settings.rounded => {
-                    // rounding prevents a smaller residual
-                    now = evaluate(self, &point, &mut residual, Some(&mut jacobian));
-                    break;
-                }
-                None => {
-                    let after = Some(try_fraction(1.0))
-                        .filter(|after| limits.bold && *after < NewtonSettings::default().divergence * now)?;
-                    (point, now) = (trial, after);
-                }
-            }
-            if !is_whole {
-                now = evaluate(self, &point, &mut residual, Some(&mut jacobian));
-            }
+        let size = self.size();
+        let units = self.units(&point.state, point.amplitude);
+        let mut iteration = ModeIteration {
+            guess: point.state.clone(),
+            start: point.clone(),
+            solution: ModeSolution {
+                point,
+                iterations: 0,
+                jacobian: vec![0.0; size * size],
+                units,
+                bordered: Vec::new(),
+            },
+            has_jacobian: false,
+            residual: vec![0.0; size],
+            step: vec![0.0; size + 1],
+            row,
+            equations: self,
+        };
+        let first = iteration.evaluate(true);
+        let result = newton.run(&mut iteration, first);
+        if result.residual > settings.rounding || matches!(result.end, NewtonEnd::Singular | NewtonEnd::Diverged) {
+            return None;
         }
-        (now <= settings.rounded).then_some(ModeSolution { point, iterations, jacobian, units, bordered })
+        iteration.complete_jacobian();
+        Some(ModeSolution { iterations: result.iterations, ..iteration.solution })
     }
 
     /// Returns the direction of the curve through a solution, on the side of `row`, and the sign of

@@ -45,9 +45,9 @@ pub(crate) struct ModeSettings {
     /// Residual, relative to the elastic forces and to the slip limits, at which a motion counts
     /// as periodic.
     pub tolerance: f64,
-    /// The residual at which a stagnating iteration counts as converged. A stiff joint between
-    /// soft springs loses three digits to rounding.
-    pub rounded: f64,
+    /// Residual up to which an iteration that cannot reduce it, or has used its steps, counts as
+    /// converged. A stiff joint between soft springs loses three digits to rounding.
+    pub rounding: f64,
     /// Least motion that the residual is relative to, as a fraction of the static displacements.
     pub least_motion: f64,
     /// Stiffness of the springs of [`ModeEquations::hold_free_bodies`], relative to the inertia
@@ -61,7 +61,7 @@ impl Default for ModeSettings {
             iterations: 60,
             step_iterations: 20,
             tolerance: 1e-11,
-            rounded: 1e-8,
+            rounding: 1e-8,
             least_motion: 1e-5,
             mean_springs: 1e-10,
         }

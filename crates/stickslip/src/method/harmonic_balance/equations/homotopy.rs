@@ -4,7 +4,8 @@ use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::regularization::force_regularization;
 
 /// Residual, relative to the motion and to the slip limits, at which the equations count as
-/// solved. It is a thousand times the rounding of a stiff system.
+/// solved. The usual rounding is a thousandth of it; larger rounding ends an iteration too, see
+/// [`NewtonSettings`](crate::method::harmonic_balance::settings::NewtonSettings).
 pub(crate) const RESIDUAL_TOLERANCE: f64 = 1e-10;
 
 /// Parameters of the homotopy between easier equations and the given ones.

@@ -1,7 +1,7 @@
 //! The search that found a solution.
 
-/// The search that found a solution, in the order in which the searches are tried. All but the
-/// first and the last two are rows of [`FALLBACKS`](super::FALLBACKS).
+/// The search that found a solution, roughly in the order in which the searches are tried. All but
+/// the first and the last two are rows of the table in `globalization`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum FoundBy {
     /// Newton's method from an initial guess or a warm start.
