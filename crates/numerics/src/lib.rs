@@ -2,7 +2,6 @@
 
 pub mod banded;
 pub mod complementarity;
-pub mod complex_gemv;
 pub mod continuation;
 pub mod definiteness;
 pub mod dense;

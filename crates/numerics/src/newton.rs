@@ -47,9 +47,6 @@ pub struct AcceptedStep {
     pub is_least: bool,
 }
 
-/// Number of last residuals that the line search can compare with.
-const LONGEST_MEMORY: usize = 4;
-
 /// Settings of the iteration.
 ///
 /// # Example
@@ -98,10 +95,6 @@ pub struct DampedNewton {
     /// Sufficient decrease: a step of fraction `t` must reduce the residual to at most
     /// `1 - t decrease` of its value. Default 1e-3: nearly every decrease is accepted.
     pub decrease: f64,
-    /// Number of last residuals, at most four; a step must only reduce the largest of them.
-    /// Default 1. Source for more: Grippo, Lampariello, Lucidi (1986), "A nonmonotone line search
-    /// technique for Newton's method".
-    pub memory: usize,
     /// Largest growth of the residual in a step. If no fraction of a step reduces the residual,
     /// the whole step is taken within this growth, which may break a cycle of slipping samples.
     /// Default 100; 0 takes no such step.
@@ -119,7 +112,6 @@ impl Default for DampedNewton {
             iterations: 60,
             halvings: 7,
             decrease: 1e-3,
-            memory: 1,
             largest_growth: 100.0,
             patience: usize::MAX,
         }
@@ -163,8 +155,6 @@ pub struct NewtonResult {
 impl DampedNewton {
     /// Iterates from the current point of the equations, which has the residual `first`.
     pub fn run(&self, equations: &mut impl NewtonEquations, first: f64) -> NewtonResult {
-        let memory = self.memory.clamp(1, LONGEST_MEMORY);
-        let mut recent = [first; LONGEST_MEMORY];
         let mut result =
             NewtonResult { end: NewtonEnd::Iterations, residual: first, least: f64::INFINITY, iterations: 0 };
         let (mut to_halve, mut stagnating) = (first, 0);
@@ -188,8 +178,7 @@ impl DampedNewton {
                 return ended(NewtonEnd::Singular);
             }
             result.iterations += 1;
-            let reference = recent[..memory].iter().fold(before, |most, r| most.max(*r));
-            let after = match self.line_search(equations, reference) {
+            let after = match self.line_search(equations, before) {
                 Ok(reduced) => reduced,
                 Err(_) if before <= self.rounding && equations.has_exact_jacobian() => {
                     result.residual = equations.move_by(0.0);
@@ -204,7 +193,6 @@ impl DampedNewton {
                 return NewtonResult { end: NewtonEnd::Diverged, ..result };
             }
             result.residual = after;
-            recent[result.iterations % memory] = after;
             let is_least = after < result.least;
             result.least = result.least.min(after);
             if result.least < 0.5 * to_halve {
@@ -213,18 +201,18 @@ impl DampedNewton {
                 stagnating += 1;
             }
             if let Some(residual) = equations.accept(AcceptedStep { before, after, is_least }) {
-                (result.residual, result.least, recent) = (residual, f64::INFINITY, [residual; LONGEST_MEMORY]);
+                (result.residual, result.least) = (residual, f64::INFINITY);
             }
         }
     }
 
-    /// Moves to the first fraction of 1, ½, ¼, … that reduces the residual below `reference`, and
-    /// returns the residual there. Fails with the residual of the shortest step if none does.
-    fn line_search(&self, equations: &mut impl NewtonEquations, reference: f64) -> Result<f64, f64> {
+    /// Moves to the first fraction of 1, ½, ¼, … that reduces the residual, and returns
+    /// the residual there. Fails with the residual of the shortest step if none does.
+    fn line_search(&self, equations: &mut impl NewtonEquations, before: f64) -> Result<f64, f64> {
         let (mut fraction, mut after) = (1.0, f64::INFINITY);
         for _ in 0..=self.halvings {
             after = equations.move_by(fraction);
-            if after < (1.0 - self.decrease * fraction) * reference {
+            if after < (1.0 - self.decrease * fraction) * before {
                 return Ok(after);
             }
             fraction *= 0.5;
@@ -297,17 +285,5 @@ mod tests {
             NewtonEnd::Converged
         );
         assert_eq!(Scalar::new(1.0, |_| 1.0, |_| 0.0).run(whole(1.2)).end, NewtonEnd::Singular);
-    }
-
-    /// Steps of one from 4 to 0 over a residual that rises once.
-    #[test]
-    fn a_memory_accepts_a_step_that_is_below_an_earlier_residual() {
-        let residual = |x: f64| [0.0, 0.3, 0.8, 0.5, 1.0][x.ceil() as usize];
-        let mut monotone = Scalar::new(4.0, residual, |_| 1.0);
-        let mut with_memory = Scalar::new(4.0, residual, |_| 1.0);
-        assert_eq!(with_memory.run(DampedNewton { memory: 4, ..DampedNewton::default() }).iterations, 4);
-        assert_eq!(with_memory.moves, 4);
-        monotone.run(DampedNewton::default());
-        assert!(monotone.moves > 4, "{}", monotone.moves);
     }
 }

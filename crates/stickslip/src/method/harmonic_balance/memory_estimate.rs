@@ -3,7 +3,7 @@
 use super::NAME;
 use super::aft::{Ports, derivative_batch};
 use super::dynamics::banded::BandedForm;
-use super::dynamics::linear_dynamics::{CACHED, LinearDynamics};
+use super::dynamics::linear_dynamics::LinearDynamics;
 use super::linear_solve::{harmonic_preconditioner, newton_krylov};
 use crate::method::MethodError;
 use crate::method::options::PERIOD;
@@ -45,10 +45,8 @@ pub(super) fn unbanded_memory(ports: &Ports, dynamics: &LinearDynamics, harmonic
     let structure = match dynamics.modes_for(ports).filter(|_| !always) {
         Some(structure) => structure.at.len() as f64 + 3.0 * axes * axes,
         None => {
-            // the matrices; their copies for products and for the longer series, if they stay
-            // in the cache; and the preconditioner
-            let each = if ports.count() <= CACHED { 4.0 } else { 2.0 };
-            2.0 * each * harmonics as f64 * axes * axes
+            // complex: the matrices and the preconditioner
+            4.0 * harmonics as f64 * axes * axes
                 + harmonic_preconditioner::lowest_factor_entries(ports, harmonics) as f64
         }
     };
@@ -136,10 +134,7 @@ mod tests {
             };
             let coupled = discretization.newton_krylov.as_ref().expect("by products");
             assert!(coupled.bytes() > 0, "{joints}: none is kept");
-            let kept = formed.bytes()
-                + dynamics.bytes()
-                + coupled.bytes()
-                + size_of_val(&discretization.workspace.tangents[..]);
+            let kept = formed.bytes() + coupled.bytes() + size_of_val(&discretization.workspace.tangents[..]);
             // the estimate also counts a matrix that may be formed
             let size = discretization.workspace.residual.len() as f64;
             let formed = if size <= super::newton_krylov::FORMED_UNKNOWNS as f64 { 8.0 * size * size } else { 0.0 };

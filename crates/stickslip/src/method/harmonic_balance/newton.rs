@@ -171,11 +171,7 @@ impl Discretization {
         NewtonSettings::default().coarse.tolerance * spacing.powi(2).max(1.0)
     }
 
-    /// Newton's method with a line search, to a given residual.
-    ///
-    /// On coarse samples the line search is non-monotone: at the onset of slip and of opening,
-    /// residuals rise before the solution is reached. This saves a third of the steps at the onset
-    /// of slip of 16 to 300 nodes.
+    /// Newton's method to a given residual, on the samples that are set.
     fn newton_on_these_samples(
         &mut self,
         context: SearchContext<'_>,
@@ -197,7 +193,6 @@ impl Discretization {
             iterations: settings.iterations,
             // forces that do not settle are soon left to the proximal point method
             patience: if context.ports.has_forces() { defaults.stagnation_iterations } else { settings.patience },
-            memory: if on_coarse_samples { defaults.coarse.memory } else { 1 },
             ..DampedNewton::default()
         };
         let may_use_coarse_jacobian = self.search.uses_coarse && !on_coarse_samples;

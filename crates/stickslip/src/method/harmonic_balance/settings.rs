@@ -46,13 +46,11 @@ pub(super) struct CoarseSettings {
     /// ends the use of coarse Jacobians. A smaller one keeps the Jacobian for the next step,
     /// because a new one would have the same sampling error. Default 0.1.
     pub reduction: f64,
-    /// Number of last residuals, the largest of which a step must reduce. Default 4.
-    pub memory: usize,
 }
 
 impl Default for CoarseSettings {
     fn default() -> Self {
-        CoarseSettings { tolerance: 8e-4, reduction: 0.1, memory: 4 }
+        CoarseSettings { tolerance: 8e-4, reduction: 0.1 }
     }
 }
 

@@ -403,35 +403,26 @@ impl FrequencyTime {
             let shape = ProductShape { rows: d * m, inner: n, columns: wide };
             multiply_blocked(&memory.by_state, &memory.projection, &mut memory.of_states, shape, Transpose::Yes);
         }
-        // a force that depends only on the end of the step has a slope at every sample
-        let one = Complex64::new(1.0, 0.0);
-        let ends = |h: &usize| sequence.inputs() == 2 && sequence.input_factors(*h, TAU / n as f64, one)[1] == one;
-        let by_ends = few && self.harmonics.iter().all(ends);
-        let own = if by_ends { d - PeriodDerivatives::new(sequence, &memory.rows, n).momentary() } else { d };
-        for a in own..d {
-            self.momentary_tangent(sequence, &memory.rows, a, tangent);
-        }
         // few harmonics: all axes at once; a long series: one axis and a group
         // of harmonics at a time
         let (together, count) = if few { (d, nh) } else { (1, derivative_batch(d, n, nh).0) };
-        let moved = if own == 0 { 0 } else { d };
         for range in (0..nh).step_by(count).map(|from| from..nh.min(from + count)) {
             self.fill_input_factors(sequence, memory, range.clone());
-            for first in (0..moved).step_by(together.max(1)) {
+            for first in (0..d).step_by(together) {
                 let (wide_here, steps) = (2 * range.len(), (beginning.as_deref(), &inverse));
                 let tall = together * wide_here;
                 self.differentiate_forces(
                     sequence,
                     memory,
                     steps,
-                    (DerivativeVariable::Solution { first }, together, wide_here, own),
+                    (DerivativeVariable::Solution { first }, together, wide_here),
                 );
                 if few {
                     // [sample][axis][column] times the projection on the harmonics
-                    memory.spectrum.resize(own * tall * wide, 0.0);
-                    let shape = ProductShape { rows: own * tall, inner: n, columns: wide };
+                    memory.spectrum.resize(d * tall * wide, 0.0);
+                    let shape = ProductShape { rows: d * tall, inner: n, columns: wide };
                     multiply_blocked(&memory.columns, &memory.projection, &mut memory.spectrum, shape, Transpose::Yes);
-                    for (to, values) in memory.spectrum.chunks_exact(own * tall).enumerate() {
+                    for (to, values) in memory.spectrum.chunks_exact(d * tall).enumerate() {
                         for (a, values) in values.chunks_exact(tall).enumerate() {
                             let row = &mut tangent[(a * wide + to) * size + first * wide..][..tall];
                             row.iter_mut().zip(values).for_each(|(t, value)| *t += value);
@@ -464,7 +455,7 @@ impl FrequencyTime {
                 sequence,
                 memory,
                 (beginning.as_deref(), &inverse),
-                (DerivativeVariable::Frequency, 1, 1, d),
+                (DerivativeVariable::Frequency, 1, 1),
             );
             memory.shift_columns(m, 1);
             memory.signal.resize(n, 0.0);
@@ -476,20 +467,6 @@ impl FrequencyTime {
             }
         }
         true
-    }
-
-    /// Adds the derivative of the force along axis `a` by the displacement at
-    /// the end of the step, at every sample.
-    fn momentary_tangent(&mut self, sequence: &dyn StepSequence, rows: &[f64], a: usize, tangent: &mut [f64]) {
-        let (m, d, width) = (sequence.states(), sequence.axes(), width(sequence));
-        self.reserve_slopes(1);
-        for b in 0..d {
-            let slopes = rows.chunks_exact((m + d) * width).map(|rows| rows[(m + a) * width + d + b]);
-            self.slopes[0].iter_mut().zip(slopes).for_each(|(to, slope)| *to = slope);
-            if self.slope_spectrum(0, 0) {
-                self.add_slope(tangent, (a, b), d, |_| Complex64::new(1.0, 0.0));
-            }
-        }
     }
 
     /// Fills the matrix from a signal to its harmonics: real and imaginary parts, 2 × harmonics
@@ -513,7 +490,7 @@ impl FrequencyTime {
     fn fill_input_factors(
         &self,
         sequence: &dyn StepSequence,
-        StepWorkspace { input_factors: waves, steps, .. }: &mut StepWorkspace,
+        StepWorkspace { input_factors: waves, .. }: &mut StepWorkspace,
         range: Range<usize>,
     ) {
         let (n, kinds, harmonics) = (self.samples(), sequence.inputs(), &self.harmonics[range]);
@@ -522,9 +499,6 @@ impl FrequencyTime {
         let each = harmonics.iter().map(|&h| sequence.input_factors(h, TAU / n as f64, one));
         let fixed: Vec<[Complex64; 4]> =
             each.chain(harmonics.iter().map(|&h| sequence.initial_input_factors(h))).collect();
-        if waves.len() == 2 * (n + 1) * kinds * harmonics.len() && *steps == fixed {
-            return;
-        }
         waves.clear();
         let mut at = vec![0; harmonics.len()];
         for _ in 0..n {
@@ -541,12 +515,10 @@ impl FrequencyTime {
             let first = fixed[harmonics.len()..].iter().zip(harmonics);
             waves.extend(first.flat_map(|(first, &h)| <[f64; 2]>::from(parts(first[kind], h))));
         }
-        *steps = fixed;
     }
 
     /// Computes the derivative of the sampled forces by the inputs at fixed states at t = 0,
-    /// into `memory.columns`: [sample][axis][column], for the first `own` axes. Writes the
-    /// changes of these states that keep them periodic into `memory.shift`.
+    /// into `memory.columns`: [sample][axis][column]. Writes the changes of these states that keep them periodic into `memory.shift`.
     ///
     /// The columns are the parts of the harmonics of the motion along `count` axes, or the
     /// frequency. `beginning` contains the steps of the periods from static equilibrium if
@@ -556,7 +528,7 @@ impl FrequencyTime {
         sequence: &dyn StepSequence,
         memory: &mut StepWorkspace,
         (beginning, inverse): (Option<&[Vec<f64>]>, &DMatrix<f64>),
-        (input, count, wide, own): (DerivativeVariable, usize, usize, usize),
+        (input, count, wide): (DerivativeVariable, usize, usize),
     ) {
         let n = self.samples();
         let (m, d) = (sequence.states(), sequence.axes());
@@ -579,14 +551,13 @@ impl FrequencyTime {
             }
         }
         // one period from the initial change
-        memory.columns.resize(n * own * tall, 0.0);
+        memory.columns.resize(n * d * tall, 0.0);
         let mut s = start.clone();
         for step in 1..=n {
             let i = step % n;
             let (states, forces) = memory.rows[i * size..(i + 1) * size].split_at(m * width);
             by.advance(states, waves(i), &s, &mut next);
-            let columns = &mut memory.columns[i * own * tall..][..own * tall];
-            let forces = &forces[..own * width];
+            let columns = &mut memory.columns[i * d * tall..][..d * tall];
             let same = forces.iter().zip(states).take_while(|(a, b)| a == b).count() / width;
             // forces that are states have the same derivatives
             let (alike, other) = columns.split_at_mut(same * tall);
@@ -655,18 +626,6 @@ impl<'a> PeriodDerivatives<'a> {
     fn new(sequence: &dyn StepSequence, rows: &'a [f64], samples: usize) -> Self {
         let (states, axes) = (sequence.states(), sequence.axes());
         PeriodDerivatives { rows, width: width(sequence), before: sequence.inputs() * axes, states, axes, samples }
-    }
-
-    /// Returns the number of trailing forces that depend only on the end of the step at every
-    /// sample. The inputs are the displacements before and after the step.
-    fn momentary(&self) -> usize {
-        let size = (self.states + self.axes) * self.width;
-        let remember = |a: usize| {
-            let row = |rows: &'a [f64]| &rows[(self.states + a) * self.width..][..self.width];
-            let mut rows = self.rows[..self.samples * size].chunks_exact(size).map(row);
-            rows.any(|row| row[..self.axes].iter().chain(&row[2 * self.axes..]).any(|x| *x != 0.0))
-        };
-        (0..self.axes).rev().take_while(|a| !remember(*a)).count()
     }
 
     /// Returns Π, the derivative of the states after a period by those before

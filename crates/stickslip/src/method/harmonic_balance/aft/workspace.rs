@@ -1,7 +1,5 @@
 //! Scratch memory for the integration of laws with memory.
 
-use num_complex::Complex64;
-
 /// Change of the states over a period, relative to their size, at which they
 /// count as periodic: the rounding of a thousand steps.
 pub(in super::super) const PERIODICITY_TOLERANCE: f64 = 1e-12;
@@ -28,8 +26,6 @@ pub(in super::super) struct StepWorkspace {
     pub(super) by_state: Vec<f64>,
     /// Derivatives of the inputs by the harmonics of a motion.
     pub(super) input_factors: Vec<f64>,
-    /// Factors of the steps for which `input_factors` was computed.
-    pub(super) steps: Vec<[Complex64; 4]>,
     /// Derivatives of the forces by the inputs: [sample][axis][column].
     pub(super) columns: Vec<f64>,
     /// Changes of the states at t = 0 for these columns, [state][column].

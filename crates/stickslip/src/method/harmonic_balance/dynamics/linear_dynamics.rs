@@ -21,15 +21,13 @@ use crate::model::System;
 use crate::structure::Structure;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use std::cell::{OnceCell, RefCell};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stickslip_numerics::dense::DenseLu;
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 
-/// Number of axes up to which a complex matrix fits in the cache of the processor, 260 kB.
-pub(crate) const CACHED: usize = 128;
 /// Limits of the linear dynamics.
 #[derive(Debug, Clone, Copy)]
 struct LinearDynamicsSettings {
@@ -108,8 +106,6 @@ impl Form {
 pub(crate) struct LinearDynamics {
     n: usize,
     form: Form,
-    /// Receptances at the last frequency. A longer series requests those of a shorter one again.
-    receptances: RefCell<ReceptanceCache>,
     structure: Structure,
     /// Directions of the axes.
     directions: Directions,
@@ -117,13 +113,6 @@ pub(crate) struct LinearDynamics {
     springs: Vec<f64>,
     /// The structure with these springs, if they alone hold some motion of it.
     closed: OnceCell<Option<ClosedContacts>>,
-}
-
-/// Receptances at the harmonics of an excitation frequency, rad/s.
-#[derive(Debug, Clone, Default)]
-struct ReceptanceCache {
-    omega: f64,
-    receptances: BTreeMap<usize, DMatrix<Complex64>>,
 }
 
 /// The structure at rest with its contacts closed, see [`closed_contacts`].
@@ -176,7 +165,6 @@ impl LinearDynamics {
         LinearDynamics {
             n: system.dofs(),
             form: Form::new(system, ports, &directions),
-            receptances: RefCell::default(),
             structure: system.structure().clone(),
             springs: closed_contacts::closed_stiffness(ports),
             closed: OnceCell::new(),
@@ -250,28 +238,6 @@ impl LinearDynamics {
     /// # Errors
     /// An undamped resonance.
     pub fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
-        if self.directions.len() > CACHED {
-            return self.compute_receptance(harmonic, omega);
-        }
-        let mut known = self.receptances.borrow_mut();
-        if known.omega != omega {
-            *known = ReceptanceCache { omega, receptances: BTreeMap::new() };
-        }
-        if let Some(receptance) = known.receptances.get(&harmonic) {
-            return Ok(receptance.clone());
-        }
-        let receptance = self.compute_receptance(harmonic, omega)?;
-        known.receptances.insert(harmonic, receptance.clone());
-        Ok(receptance)
-    }
-
-    /// Returns the memory of the kept receptances, bytes.
-    #[cfg(test)]
-    pub fn bytes(&self) -> usize {
-        self.receptances.borrow().receptances.values().map(|matrix| size_of_val(matrix.as_slice())).sum()
-    }
-
-    fn compute_receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
         match self.closed_at(harmonic, omega) {
             Some(closed) => closed.receptance(omega),
             None => self.form.dynamics().receptance(harmonic, omega),

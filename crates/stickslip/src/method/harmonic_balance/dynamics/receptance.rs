@@ -1,12 +1,11 @@
 //! Receptances: the motions along the axes under forces along them. Large ones
 //! are applied by modes and not formed.
 
-use super::linear_dynamics::{CACHED, ClosedContacts};
+use super::linear_dynamics::ClosedContacts;
 use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::sync::Arc;
-use stickslip_numerics::complex_gemv::ComplexGemv;
 use stickslip_numerics::dense::{DenseLu, ProductShape, Transpose, multiply_blocked};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -20,29 +19,23 @@ pub(crate) enum Receptance {
     Modal(ModalReceptance),
 }
 
-/// Receptance matrices. Matrices of many axes that fit in the cache have a copy for fast products.
+/// Receptance matrices.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ReceptanceMatrices {
     pub matrices: Vec<DMatrix<Complex64>>,
-    gemv_copies: Vec<ComplexGemv>,
-    /// Forces and motions of one harmonic, and scratch memory of its product.
+    /// Forces and motions of one harmonic.
     force: Vec<Complex64>,
-    memory: Vec<f64>,
 }
 
 impl ReceptanceMatrices {
     pub fn new(matrices: Vec<DMatrix<Complex64>>) -> Self {
-        let few = |matrix: &&DMatrix<Complex64>| multiplies_in_blocks(matrix.nrows()) && matrix.nrows() <= CACHED;
-        let pairs =
-            matrices.iter().filter(few).map(|matrix| ComplexGemv::new(matrix.as_slice(), matrix.nrows())).collect();
-        ReceptanceMatrices { matrices, gemv_copies: pairs, ..ReceptanceMatrices::default() }
+        ReceptanceMatrices { matrices, ..ReceptanceMatrices::default() }
     }
 
-    /// Returns the memory of the matrices and of their copies, bytes.
+    /// Returns the memory of the matrices, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.matrices.iter().map(|matrix| size_of_val(matrix.as_slice())).sum::<usize>()
-            + self.gemv_copies.iter().map(ComplexGemv::bytes).sum::<usize>()
     }
 
     fn apply(&mut self, force: &[Complex64], moved: &mut [Complex64]) {
@@ -52,10 +45,7 @@ impl ReceptanceMatrices {
         let (forces, sum) = self.force.split_at_mut(axes);
         for (k, matrix) in self.matrices.iter().enumerate() {
             forces.iter_mut().zip(force[k..].iter().step_by(nh)).for_each(|(own, force)| *own = *force);
-            let own = if let Some(pairs) = self.gemv_copies.get(k) {
-                pairs.apply(forces, &mut self.memory);
-                &*forces
-            } else if multiplies_in_blocks(axes) {
+            if multiplies_in_blocks(axes) {
                 multiply_blocked(
                     matrix.as_slice(),
                     forces,
@@ -63,16 +53,14 @@ impl ReceptanceMatrices {
                     ProductShape { rows: axes, inner: axes, columns: 1 },
                     Transpose::No,
                 );
-                &*sum
             } else {
                 // column by column, the order in memory
                 sum.fill(ZERO);
                 for (column, f) in matrix.as_slice().chunks_exact(axes).zip(&*forces) {
                     sum.iter_mut().zip(column).for_each(|(sum, r)| *sum += r * f);
                 }
-                &*sum
-            };
-            moved[k..].iter_mut().step_by(nh).zip(own).for_each(|(moved, own)| *moved = *own);
+            }
+            moved[k..].iter_mut().step_by(nh).zip(&*sum).for_each(|(moved, sum)| *moved = *sum);
         }
     }
 }

@@ -5,10 +5,8 @@
 
 use super::linearization::LinearizedEquations;
 use crate::method::harmonic_balance::aft::Ports;
-use crate::method::harmonic_balance::dynamics::linear_dynamics::CACHED;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use stickslip_numerics::complex_gemv::ComplexGemv;
 use stickslip_numerics::dense::{ComplexLu, DenseLu};
 
 const ZERO: Complex64 = Complex64::new(0.0, 0.0);
@@ -32,7 +30,7 @@ impl Default for HarmonicPreconditionerSettings {
 #[derive(Debug, Clone)]
 pub(super) struct HarmonicPreconditioner {
     lowest: LowestHarmonicsFactor,
-    others: Vec<BlockSolver>,
+    others: Vec<ComplexLu>,
 }
 
 impl HarmonicPreconditioner {
@@ -50,12 +48,12 @@ impl HarmonicPreconditioner {
         let count = self.lowest.count;
         let together = self.lowest.apply(v, pair);
         linear.multiply_by_residual_units(v);
-        let (mut column, mut memory) = (vec![ZERO; v.len() / pair], Vec::new());
+        let mut column = vec![ZERO; v.len() / pair];
         for (k, factor) in (count..).zip(&self.others) {
             for (c, v) in column.iter_mut().zip(v.chunks_exact(pair)) {
                 *c = Complex64::new(v[2 * k], v[2 * k + 1]);
             }
-            factor.apply(&mut column, &mut memory);
+            factor.solve(&mut column);
             for (c, v) in column.iter().zip(v.chunks_exact_mut(pair)) {
                 (v[2 * k], v[2 * k + 1]) = (c.re, c.im);
             }
@@ -70,11 +68,7 @@ impl HarmonicPreconditioner {
     /// Returns its memory, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
-        let of = |answer: &BlockSolver| match answer {
-            BlockSolver::Inverse(inverse) => inverse.bytes(),
-            BlockSolver::Factor(factor) => factor.bytes(),
-        };
-        self.others.iter().map(of).sum::<usize>() + self.lowest.transposed.bytes()
+        self.others.iter().map(ComplexLu::bytes).sum::<usize>() + self.lowest.transposed.bytes()
     }
 }
 
@@ -101,7 +95,7 @@ fn lowest_harmonics(linear: &LinearizedEquations, receptance: &[DMatrix<Complex6
 }
 
 /// Factors the equations of one harmonic with the mean tangents.
-fn harmonic_block(linear: &LinearizedEquations, k: usize, receptance: &DMatrix<Complex64>) -> Option<BlockSolver> {
+fn harmonic_block(linear: &LinearizedEquations, k: usize, receptance: &DMatrix<Complex64>) -> Option<ComplexLu> {
     let size = receptance.nrows();
     let moved = |q: usize| &receptance.as_slice()[q * size..][..size];
     let mut matrix = vec![ZERO; size * size];
@@ -143,35 +137,7 @@ fn harmonic_block(linear: &LinearizedEquations, k: usize, receptance: &DMatrix<C
             }
         }
     }
-    ComplexLu::new(matrix, size).ok().map(|factor| BlockSolver::new(factor, size))
-}
-
-/// The solver of one harmonic. A matrix that fits in the cache is inverted: the
-/// inverse is exact enough for a preconditioner. It takes a fifth of the time
-/// of triangular solutions, whose rows are too short for blocks.
-#[derive(Debug, Clone)]
-enum BlockSolver {
-    Inverse(ComplexGemv),
-    Factor(ComplexLu),
-}
-
-impl BlockSolver {
-    fn new(factor: ComplexLu, size: usize) -> Self {
-        if size > CACHED {
-            return BlockSolver::Factor(factor);
-        }
-        let mut inverse = vec![ZERO; size * size];
-        inverse.iter_mut().step_by(size + 1).for_each(|diagonal| *diagonal = Complex64::ONE);
-        factor.solve(&mut inverse);
-        BlockSolver::Inverse(ComplexGemv::new(&inverse, size))
-    }
-
-    fn apply(&self, right: &mut [Complex64], memory: &mut Vec<f64>) {
-        match self {
-            BlockSolver::Inverse(inverse) => inverse.apply(right, memory),
-            BlockSolver::Factor(factor) => factor.solve(right),
-        }
-    }
+    ComplexLu::new(matrix, size).ok()
 }
 
 /// The factor of the lowest harmonics together.
