@@ -101,7 +101,8 @@ pub enum Note {
         /// The method that found the orbits.
         found: String,
     },
-    /// Number of points with unknown stability: the friction falls with velocity.
+    /// Number of points with unknown stability in a model that may be unstable: friction falls with
+    /// velocity, or the stiffness or damping of a spring is negative.
     #[serde(rename = "Unjudged")]
     UnknownStability(usize),
     /// Time histories on a reduced model. Its error is known for harmonic forces up to this
@@ -152,7 +153,9 @@ impl Note {
             found: orbit.method.to_owned(),
         });
         let falls = |joint: &Joint| joint.law.prox().is_some() && !joint.law.is_incrementally_passive();
-        let unjudged = (stable.is_none() && model.joints.iter().any(falls)).then_some(Note::UnknownStability(1));
+        let may_be_unstable = model.joints.iter().any(falls)
+            || model.springs.iter().any(|spring| spring.stiffness < 0.0 || spring.damping < 0.0);
+        let unjudged = (stable.is_none() && may_be_unstable).then_some(Note::UnknownStability(1));
         let said = instead.into_iter().chain(unstable).chain(unjudged).chain(accuracy);
         // Relative change of the amplitudes with the history above which it is reported: the
         // tolerance of harmonic balance.
@@ -419,9 +422,9 @@ impl Note {
                 points(*count)
             )),
             Note::UnknownStability(count) => Some(format!(
-                "At {} the stability of the orbit is unknown, because no time integration supports friction that \
-                 falls with velocity: the real motion may be stick-slip with other amplitudes. Compare with \
-                 kind = \"transient\" and a `width` (m/s) over which friction changes its sign.",
+                "{WARNING}at {} the stability of the orbit is unknown, and friction that falls with velocity, or a negative \
+                 stiffness or damping, may make it unstable: the real motion then has other amplitudes. Compare \
+                 with kind = \"transient\" (rigid friction needs a `width` (m/s) over which it changes its sign).",
                 points(*count)
             )),
             Note::TimeHistory(up_to) => {
@@ -513,7 +516,7 @@ mod tests {
             "{}",
             texts[3]
         );
-        assert!(texts[4].starts_with("At 3 points the stability of the orbit is unknown"), "{}", texts[4]);
+        assert!(texts[4].contains("at 3 points the stability of the orbit is unknown"), "{}", texts[4]);
         assert_eq!(texts[5], "It is so.");
         assert!(texts[6].starts_with("At 2 points `shooting`") && texts[6].contains("`harmonic-balance` found one"));
         assert!(texts[7].starts_with("At 1 point `event-driven`"), "{}", texts[7]);

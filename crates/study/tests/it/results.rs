@@ -415,6 +415,58 @@ kind = "event-driven"
     }
 }
 
+/// The stability of an orbit of more than 24 degrees of freedom is unknown. A damper of negative
+/// damping may make it unstable, and a warning says so.
+#[test]
+fn unknown_stability_with_a_negative_damping_is_reported() {
+    for (damping, is_reported) in [("-30 N s/m", true), ("30 N s/m", false)] {
+        let text = r#"
+schema = 1
+title = "A row with a damper of negative damping"
+
+[[mass]]
+repeat = { i = 30 }
+name = "m{i}"
+mass = "1 kg"
+
+[[spring]]
+repeat = { i = 30 }
+between = ["m{i}", "ground"]
+stiffness = "10 N/mm"
+damping = "2 N s/m"
+
+[[spring]]
+repeat = { i = 29 }
+between = ["m{i}", "m{i+1}"]
+stiffness = "2 N/mm"
+
+[[spring]]
+between = ["m3", "m4"]
+stiffness = "0 N/mm"
+damping = "-30 N s/m"
+
+[[joint]]
+name = "j"
+between = ["m3", "ground"]
+law = { kind = "cubic", stiffness = "1e9 N/m^3" }
+
+[[force]]
+on = "m1"
+amplitude = "1 N"
+
+[study]
+kind = "response"
+frequency = ["14 Hz", "18 Hz"]
+peaks = false
+"#
+        .replace("-30 N s/m", damping);
+        let notes = of(&text).1.notes;
+        let found = notes.iter().find(|note| note.contains("the stability of the orbit is unknown"));
+        assert_eq!(found.is_some(), is_reported, "{damping}: {notes:?}");
+        assert!(found.is_none_or(|note| note.starts_with("warning: at 2 points")), "{found:?}");
+    }
+}
+
 /// A contact that sticks may reach its limit for an instant of the period. The derivative of
 /// the return map is then that of slip: 1.41 for a stable orbit, without the contact that stays
 /// open. Such an orbit is one of a continuum, and its stability is unknown.
