@@ -27,7 +27,7 @@ pub fn to_si(value: &Bound<'_, PyAny>, dimension: Dimension, what: &str) -> PyRe
             dimension.name_and_unit().map_or_else(|| dimension.to_string(), |(name, unit)| format!("{name} in {unit}"));
         error::model(
             py,
-            format!("{what} ({unit}) must be a number in SI units or a string with a unit, found {}", kind(value)),
+            format!("{what} must be a number in SI units or a string with a unit ({unit}), found {}", kind(value)),
         )
     })?;
     if !number.is_finite() {

@@ -223,7 +223,7 @@ class _Kernel:
             into[...] = row.value if isinstance(row, Dual) else row
         return (out,)
 
-    def linearise(self, u: _Array, v: _Array, z: _Array, values: Sequence[float]) -> tuple[_Array, _Array]:
+    def linearize(self, u: _Array, v: _Array, z: _Array, values: Sequence[float]) -> tuple[_Array, _Array]:
         n, d = u.shape[1], self._directions
         arguments, rows = 2 * d + self._states, d + self._states
         if self._derivatives is not None:
@@ -250,7 +250,7 @@ class _Kernel:
         def split(arguments: _Array) -> tuple[_Array, _Array, _Array]:
             return arguments[:d], arguments[d : 2 * d], arguments[2 * d :]
 
-        out, slopes = self.linearise(*split(instants), values)
+        out, slopes = self.linearize(*split(instants), values)
         slopes = slopes.reshape(d + m, 2 * d + m, n)
         worst = (0.0, "")
         for argument in range(2 * d + m):
