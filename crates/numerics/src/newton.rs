@@ -1,7 +1,7 @@
 //! Damped Newton iteration: whole steps where they reduce the residual, shorter ones elsewhere.
 //!
-//! It serves orbits of harmonic balance, nonlinear modes and arc-length continuation, which describe
-//! their equations by [`NewtonEquations`].
+//! It serves orbits of harmonic balance, nonlinear modes and arc-length continuation, which
+//! describe their equations by [`NewtonEquations`].
 //!
 //! Source: Dennis and Schnabel, "Numerical Methods for Unconstrained Optimization and Nonlinear
 //! Equations" (1996), Ch. 6.
@@ -15,8 +15,8 @@ pub trait NewtonEquations {
     /// if there is no step.
     fn solve_step(&mut self, residual: f64) -> bool;
 
-    /// Moves from the start of the step by a fraction of it, from 0 (back to the start) to 1, in any
-    /// order. Returns the norm of the residual there, which is not finite if the point is not
+    /// Moves from the start of the step by a fraction of it, from 0 (back to the start) to 1, in
+    /// any order. Returns the norm of the residual there, which is not finite if the point is not
     /// allowed.
     fn move_by(&mut self, fraction: f64) -> f64;
 
@@ -24,8 +24,8 @@ pub trait NewtonEquations {
     /// residuals has changed.
     fn accept(&mut self, step: AcceptedStep) -> Option<f64>;
 
-    /// Returns false if the last step had an approximate Jacobian. A residual that it does not reduce
-    /// need not be rounding.
+    /// Returns false if the last step had an approximate Jacobian. A residual that it does not
+    /// reduce need not be rounding.
     fn has_exact_jacobian(&self) -> bool {
         true
     }
@@ -127,8 +127,8 @@ pub enum NewtonEnd {
     Rounding,
     /// There is no Newton step.
     Singular,
-    /// The last step is not permitted: the residual grows too much, is not finite, or is not reduced
-    /// by any fraction while `largest_growth` is 0.
+    /// The last step is not permitted: the residual grows too much, is not finite, or is not
+    /// reduced by any fraction while `largest_growth` is 0.
     Diverged,
     /// The residual did not halve.
     Stagnated,
@@ -226,7 +226,7 @@ mod tests {
     use super::*;
 
     /// Equations of one unknown: the residual at `x` and the Newton step there.
-    struct Scalar {
+    struct OneUnknown {
         residual: fn(f64) -> f64,
         newton_step: fn(f64) -> f64,
         start: f64,
@@ -234,9 +234,9 @@ mod tests {
         moves: usize,
     }
 
-    impl Scalar {
-        fn new(x: f64, residual: fn(f64) -> f64, newton_step: fn(f64) -> f64) -> Scalar {
-            Scalar { residual, newton_step, start: x, x, moves: 0 }
+    impl OneUnknown {
+        fn new(x: f64, residual: fn(f64) -> f64, newton_step: fn(f64) -> f64) -> OneUnknown {
+            OneUnknown { residual, newton_step, start: x, x, moves: 0 }
         }
 
         fn run(&mut self, newton: DampedNewton) -> NewtonResult {
@@ -244,7 +244,7 @@ mod tests {
         }
     }
 
-    impl NewtonEquations for Scalar {
+    impl NewtonEquations for OneUnknown {
         fn solve_step(&mut self, _: f64) -> bool {
             self.start = self.x;
             (self.newton_step)(self.x) != 0.0
@@ -262,7 +262,7 @@ mod tests {
     /// Rounding leaves a residual of 1e-9: steps from there change the point and reduce nothing.
     #[test]
     fn a_residual_of_rounding_ends_the_iteration_at_the_last_good_point() {
-        let rounded = || Scalar::new(1.0, |x| x.abs().max(1e-9), |x| if x.abs() > 1e-11 { x } else { 1e-12 });
+        let rounded = || OneUnknown::new(1.0, |x| x.abs().max(1e-9), |x| if x.abs() > 1e-11 { x } else { 1e-12 });
         let mut equations = rounded();
         let result = equations.run(DampedNewton { rounding: 1e-8, ..DampedNewton::default() });
         assert_eq!((result.end, result.residual), (NewtonEnd::Rounding, 1e-9));
@@ -275,7 +275,7 @@ mod tests {
     /// The whole steps of `x^(1/3) = 0` lead to `-2 x`: the residual grows by the factor 1.26.
     #[test]
     fn whole_steps_may_let_the_residual_grow_within_a_limit() {
-        let cubic_root = || Scalar::new(1.0, |x| x.cbrt().abs(), |x| 3.0 * x);
+        let cubic_root = || OneUnknown::new(1.0, |x| x.cbrt().abs(), |x| 3.0 * x);
         let whole = |largest_growth| DampedNewton { halvings: 0, largest_growth, ..DampedNewton::default() };
         assert_eq!(cubic_root().run(whole(1.2)).end, NewtonEnd::Diverged);
         assert_eq!(cubic_root().run(whole(0.0)).end, NewtonEnd::Diverged);
@@ -284,6 +284,6 @@ mod tests {
             cubic_root().run(DampedNewton { iterations: 200, ..DampedNewton::default() }).end,
             NewtonEnd::Converged
         );
-        assert_eq!(Scalar::new(1.0, |_| 1.0, |_| 0.0).run(whole(1.2)).end, NewtonEnd::Singular);
+        assert_eq!(OneUnknown::new(1.0, |_| 1.0, |_| 0.0).run(whole(1.2)).end, NewtonEnd::Singular);
     }
 }

@@ -42,8 +42,8 @@ pub struct Evidence {
     /// Comparison of that error with the tolerance.
     pub accuracy: Accuracy,
     /// Distance between the state at t = 0 and its return under an independent time integration,
-    /// relative to the vibration, in the energy norm. It equals the residual of a
-    /// method that integrates in time. `None` if no integrator supports the system, or if the system is too
+    /// relative to the vibration, in the energy norm. It equals the residual of a method that
+    /// integrates in time. `None` if no integrator supports the system, or if the system is too
     /// large for an automatic check (see [`Orbit::return_defect`](super::Orbit::return_defect)).
     pub return_defect: Option<f64>,
     /// Names of joints that stick for the whole period. Their offset is not unique, and the

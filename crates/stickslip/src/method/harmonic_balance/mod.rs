@@ -1,5 +1,5 @@
-//! Harmonic balance: the orbit as a Fourier series, with joint forces in closed form between turning
-//! points or by alternating frequency-time (AFT).
+//! Harmonic balance: the orbit as a Fourier series, with joint forces in closed form between
+//! turning points or by alternating frequency-time (AFT).
 //!
 //! The equations are written along the joints. Per harmonic, `u = u_lin - R f` relates the
 //! relative motions `u` of the joints, their forces `f` and the receptance `R` of the linear

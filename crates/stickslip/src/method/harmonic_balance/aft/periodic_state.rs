@@ -518,7 +518,8 @@ impl FrequencyTime {
     }
 
     /// Computes the derivative of the sampled forces by the inputs at fixed states at t = 0,
-    /// into `memory.columns`: [sample][axis][column]. Writes the changes of these states that keep them periodic into `memory.shift`.
+    /// into `memory.columns`: [sample][axis][column]. Writes the changes of these states that keep
+    /// them periodic into `memory.shift`.
     ///
     /// The columns are the parts of the harmonics of the motion along `count` axes, or the
     /// frequency. `beginning` contains the steps of the periods from static equilibrium if

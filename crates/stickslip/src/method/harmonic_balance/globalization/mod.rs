@@ -1,10 +1,10 @@
 //! The solution of a point: Newton's method, then the searches of one table.
 //!
 //! Newton's method begins at an initial guess or a warm start. If it fails, the rows of
-//! [`FALLBACKS`] follow in their order. Each receives the same initial guess; the slip-limit homotopy
-//! ignores it. If all of them fail, the solver lets the vibration grow (`growing_vibration`), and at last
-//! begins from a time integration (`time_start`). These two are no rows of the table, because they
-//! search several times.
+//! [`FALLBACKS`] follow in their order. Each receives the same initial guess; the slip-limit
+//! homotopy ignores it. If all of them fail, the solver lets the vibration grow
+//! (`growing_vibration`), and at last begins from a time integration (`time_start`). These two are
+//! no rows of the table, because they search several times.
 //!
 //! To add a search: its file and `mod` line, one row of [`FALLBACKS`], and a variant of [`FoundBy`]
 //! with its name, which [`Evidence::found_by`](crate::orbit::Evidence::found_by) and the book's
@@ -39,13 +39,13 @@ struct Fallback {
     /// adjacent orbit, from a growing vibration or from a time integration: it was tried before, or
     /// the point can be omitted.
     uses_guess: bool,
-    /// Replaces the initial guess in the last argument by a solution of the given equations: motion,
-    /// force and residual. Adds its iterations to those of the guess; if it fails, only these are
-    /// used. It ends when [`Discretization::is_budget_used`], and restores everything else that it
-    /// changes in the discretization.
+    /// Replaces the initial guess in the last argument by a solution of the given equations:
+    /// motion, force and residual. Adds its iterations to those of the guess; if it fails, only
+    /// these are used. It ends when [`Discretization::is_budget_used`], and restores everything
+    /// else that it changes in the discretization.
     ///
-    /// [`Discretization::begin_search`] forgets the states of laws with memory and begins the budget
-    /// of another search. Without it, a search continues both.
+    /// [`Discretization::begin_search`] forgets the states of laws with memory and begins the
+    /// budget of another search. Without it, a search continues both.
     search: fn(&mut Discretization, &Ports, f64, &mut HarmonicSolution) -> Result<(), SolveError>,
 }
 
