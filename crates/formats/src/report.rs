@@ -94,7 +94,7 @@ impl fmt::Display for MatrixReport {
         let Self { rows, columns, entries, zeros, largest, smallest, asymmetry, .. } = self;
         write!(f, "{rows} x {columns}, {entries} {}", if *entries == 1 { "entry" } else { "entries" })?;
         if *zeros > 0 {
-            write!(f, " and {zeros} explicit zero{}", if *zeros == 1 { "" } else { "s" })?;
+            write!(f, " and {}", counted(*zeros, "explicit zero"))?;
         }
         if !self.origin.is_empty() {
             write!(f, ", from {}", self.origin)?;
@@ -118,8 +118,7 @@ impl fmt::Display for MatrixReport {
         for (what, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
             let first: Vec<String> = list.iter().take(SHOWN).map(|row| (row + 1).to_string()).collect();
             let more = if list.len() > SHOWN { ", …" } else { "" };
-            let rows = if list.len() == 1 { "row with" } else { "rows with" };
-            write!(f, "\n{} {rows} {what}: {}{more}", list.len(), first.join(", "))?;
+            write!(f, "\n{} with {what}: {}{more}", counted(list.len(), "row"), first.join(", "))?;
         }
         if let Some((names, count)) = &self.names {
             let more = if *count > SHOWN { ", …" } else { "" };
@@ -127,6 +126,11 @@ impl fmt::Display for MatrixReport {
         }
         Ok(())
     }
+}
+
+/// Returns a count with its noun.
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

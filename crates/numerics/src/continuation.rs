@@ -5,7 +5,7 @@
 //! (2003), Ch. 6.
 
 use crate::dense;
-use crate::newton::{AcceptedStep, DampedNewton, NewtonEnd, NewtonEquations};
+use crate::newton::{DampedNewton, NewtonEnd, NewtonEquations};
 
 /// Equations with a parameter.
 ///
@@ -355,10 +355,6 @@ impl<E: ParametricEquations> NewtonEquations for Correction<'_, E> {
             return f64::INFINITY;
         }
         f.iter().map(|f| f * f).sum::<f64>().sqrt()
-    }
-
-    fn accept(&mut self, _step: AcceptedStep) -> Option<f64> {
-        None
     }
 }
 

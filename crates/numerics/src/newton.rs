@@ -10,9 +10,8 @@ use crate::interrupt;
 
 /// Equations with a current point, an approximate solution.
 pub trait NewtonEquations {
-    /// Solves for the Newton step at the current point, which has this residual. The current
-    /// point stays the start of the step until [`accept`](NewtonEquations::accept). Returns false
-    /// if there is no step.
+    /// Solves for the Newton step at the current point, which has this residual, and keeps this
+    /// point as the start of the step. Returns false if there is no step.
     fn solve_step(&mut self, residual: f64) -> bool;
 
     /// Moves from the start of the step by a fraction of it, from 0 (back to the start) to 1, in
@@ -20,9 +19,11 @@ pub trait NewtonEquations {
     /// allowed.
     fn move_by(&mut self, fraction: f64) -> f64;
 
-    /// Makes the point of the last move the current one. Returns its residual if the unit of
-    /// residuals has changed.
-    fn accept(&mut self, step: AcceptedStep) -> Option<f64>;
+    /// Is called with the step that leads to the current point. Returns the residual there if the
+    /// unit of residuals has changed.
+    fn accept(&mut self, _step: AcceptedStep) -> Option<f64> {
+        None
+    }
 
     /// Returns false if the last step had an approximate Jacobian. A residual that it does not
     /// reduce need not be rounding.
@@ -52,7 +53,7 @@ pub struct AcceptedStep {
 /// # Example
 /// `arctan x = 0`, where whole steps from `x = 3` diverge:
 /// ```
-/// use stickslip_numerics::newton::{AcceptedStep, DampedNewton, NewtonEnd, NewtonEquations};
+/// use stickslip_numerics::newton::{DampedNewton, NewtonEnd, NewtonEquations};
 /// struct Arctan {
 ///     start: f64,
 ///     step: f64,
@@ -66,9 +67,6 @@ pub struct AcceptedStep {
 ///     fn move_by(&mut self, fraction: f64) -> f64 {
 ///         self.x = self.start - fraction * self.step;
 ///         self.x.atan().abs()
-///     }
-///     fn accept(&mut self, _: AcceptedStep) -> Option<f64> {
-///         None
 ///     }
 /// }
 /// let newton = DampedNewton { tolerance: 1e-12, ..DampedNewton::default() };
@@ -253,9 +251,6 @@ mod tests {
             self.moves += 1;
             self.x = self.start - fraction * (self.newton_step)(self.start);
             (self.residual)(self.x)
-        }
-        fn accept(&mut self, _: AcceptedStep) -> Option<f64> {
-            None
         }
     }
 

@@ -1,6 +1,7 @@
 //! A mesh in a few lines: sizes, elements, extent and sets.
 
 use super::{Members, Mesh};
+use crate::report::counted;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -31,19 +32,19 @@ impl fmt::Display for MeshReport<'_> {
         let faces = mesh.outer_faces();
         if !faces.is_empty() {
             let area = faces.iter().map(super::Face::area).sum();
-            writeln!(f, "{}, area {}", counted(faces.len(), "outer face", ""), short(area))?;
+            writeln!(f, "{}, area {}", counted(faces.len(), "outer face"), short(area))?;
         }
         for set in mesh.sets().iter().take(LISTED) {
             let members = match &set.members {
-                Members::Nodes(nodes) => counted(nodes.len(), "node", ""),
-                Members::Elements(elements) => counted(elements.len(), "element", ""),
-                Members::Sides(sides) => counted(sides.len(), "side", " of elements"),
+                Members::Nodes(nodes) => counted(nodes.len(), "node"),
+                Members::Elements(elements) => counted(elements.len(), "element"),
+                Members::Sides(sides) => counted(sides.len(), "side") + " of elements",
             };
             write!(f, "set {}: {members}", set.name)?;
             // the patch of the set that the name selects
             match mesh.set(&set.name).is_ok_and(|found| std::ptr::eq(found, set)).then(|| mesh.patch(&set.name)) {
                 Some(Ok(patch)) => {
-                    writeln!(f, ", {}, area {}", counted(patch.faces().len(), "outer face", ""), short(patch.area()))?
+                    writeln!(f, ", {}, area {}", counted(patch.faces().len(), "outer face"), short(patch.area()))?
                 }
                 _ => writeln!(f)?,
             }
@@ -56,11 +57,6 @@ impl fmt::Display for MeshReport<'_> {
         }
         Ok(())
     }
-}
-
-/// Returns a count with its noun, which stands before `rest`.
-fn counted(count: usize, noun: &str, rest: &str) -> String {
-    format!("{count} {noun}{}{rest}", if count == 1 { "" } else { "s" })
 }
 
 /// Returns a number with six significant digits.

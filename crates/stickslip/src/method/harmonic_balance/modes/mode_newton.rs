@@ -7,7 +7,7 @@ use super::mode_continuation::ModeArc;
 use super::nonlinear_mode::{ModeEquations, ModeSettings, ModeState, scaled_norm};
 use stickslip_numerics::dense;
 use stickslip_numerics::min_norm::{min_norm_step, null_directions};
-use stickslip_numerics::newton::{AcceptedStep, DampedNewton, NewtonEnd, NewtonEquations};
+use stickslip_numerics::newton::{DampedNewton, NewtonEnd, NewtonEquations};
 
 /// Limits of one iteration.
 #[derive(Debug, Clone, Copy)]
@@ -83,10 +83,6 @@ impl NewtonEquations for ModeIteration<'_, '_> {
             return f64::INFINITY;
         }
         self.evaluate(fraction == 1.0)
-    }
-
-    fn accept(&mut self, _step: AcceptedStep) -> Option<f64> {
-        None
     }
 }
 
