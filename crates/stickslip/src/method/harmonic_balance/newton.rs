@@ -6,6 +6,7 @@
 use super::aft::Ports;
 use super::dynamics::banded::StepParameters;
 use super::equations::homotopy::{RESIDUAL_TOLERANCE, SearchContext};
+use super::equations::regularization::REGULARIZING_FREQUENCY;
 use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use super::globalization::SearchSettings;
 use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart};
@@ -183,12 +184,16 @@ impl Discretization {
         let length = self.motion_scale(motion);
         self.search.reuses_states = self.search.uses_coarse;
         let first = self.evaluate(context, motion, length, DerivativeScope::Cheap);
+        let solved_at = match settings.goal {
+            StopCriterion::Solved => RESIDUAL_TOLERANCE,
+            StopCriterion::Rough(solved) => solved,
+            StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
+        };
+        // a residual changes the mean of a direction without support much more than the vibration,
+        // so the iteration goes on to its rounding
+        let is_unsupported = self.linear.contacts.iter().any(|contact| contact.mean_stiffness > 0.0);
         let newton = DampedNewton {
-            tolerance: match settings.goal {
-                StopCriterion::Solved => RESIDUAL_TOLERANCE,
-                StopCriterion::Rough(solved) => solved,
-                StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
-            },
+            tolerance: if is_unsupported { REGULARIZING_FREQUENCY * solved_at } else { solved_at },
             rounding: defaults.rounding,
             iterations: settings.iterations,
             // forces that do not settle are soon left to the proximal point method
@@ -216,10 +221,11 @@ impl Discretization {
             residual = self.evaluate(context, motion, length, DerivativeScope::None);
         }
         let is_rounding = result.end == NewtonEnd::Stagnated && residual <= newton.rounding;
+        let solved = solved || is_rounding || residual <= solved_at;
         self.search.reuses_states = false;
         self.search.keeps_tangents = false;
         motion.residual = residual;
-        if solved || is_rounding {
+        if solved {
             Ok(())
         } else {
             Err(SolveError {
@@ -310,7 +316,7 @@ impl Discretization {
         let SearchContext { ports, homotopy, .. } = context;
         self.work.eliminations += 1;
         if let Some(banded) = &mut self.banded {
-            let along = StepParameters { penalty: &self.linear.penalty, homotopy };
+            let along = StepParameters { contacts: &self.linear.contacts, homotopy };
             if !banded.linearize(ports, &along, &self.workspace.tangents) {
                 return false;
             }

@@ -36,46 +36,59 @@ pub(super) fn places(
         .map(|k| {
             let h = discretization.harmonics()[k];
             let along = |q: usize| acting[q * nh + k];
-            let Some(banded) = &mut discretization.banded else {
-                let singular = |_| h as f64 * omega;
-                let mut x = &discretization.linear.free_response[k]
-                    - dynamics.respond_along(h, omega, along).map_err(singular)?;
-                if h == 0 {
-                    dynamics.correct_mean(omega, &mut x, |q| discretization.mean(q, motion)).map_err(singular)?;
+            if h == 0 {
+                let forces = dynamics.force_on_places(h, along);
+                // the responses of an unsupported structure to the load and to the forces alone are
+                // so large that their difference would be rounding
+                let load = discretization.linear.mean_load.as_ref().map_or_else(|| -&forces, |load| load - &forces);
+                let mut x = DVector::from_element(load.len(), ZERO);
+                match &mut discretization.banded {
+                    Some(banded) => banded.respond(k, |i| load[i], x.as_mut_slice()),
+                    None => {
+                        x = dynamics.respond(h, omega, &load).map_err(|_| 0.0)?;
+                        dynamics.correct_mean(omega, &mut x, |q| discretization.mean(q, motion)).map_err(|_| 0.0)?;
+                    }
                 }
                 return Ok(x);
-            };
-            let forces = dynamics.force_on_places(h, along);
+            }
             let mut x = discretization.linear.free_response[k].clone();
-            let mut moved = x.clone();
-            banded.respond(k, |i| forces[i], moved.as_mut_slice());
-            x -= moved;
+            match &mut discretization.banded {
+                Some(banded) => {
+                    let forces = dynamics.force_on_places(h, along);
+                    let mut moved = x.clone();
+                    banded.respond(k, |i| forces[i], moved.as_mut_slice());
+                    x -= moved;
+                }
+                None => {
+                    x -= dynamics.respond_along(h, omega, along).map_err(|_| h as f64 * omega)?;
+                }
+            }
             Ok(x)
         })
         .collect()
 }
 
 /// Returns true if the mean forces balance without the springs that regularize unsupported
-/// directions.
+/// directions. `x` are the harmonics of all places.
 pub(super) fn mean_forces_balance(
-    setting: &OrbitInput,
+    (system, ports, omega): (&System, &Ports, f64),
     discretization: &Discretization,
     motion: &HarmonicSolution,
     x: &[DVector<Complex64>],
 ) -> bool {
-    let (system, nh) = (setting.system, discretization.harmonics().len());
+    let nh = discretization.harmonics().len();
     if discretization.harmonics()[0] != 0 {
         return true;
     }
-    let excitation = system.excitation(setting.omega);
+    let excitation = system.excitation(omega);
     let mut left = excitation
         .iter()
         .find(|(h, _)| *h == 0)
         .map_or_else(|| DVector::from_element(system.dofs(), ZERO), |(_, load)| load.clone());
     let mut size = left.norm();
-    for q in 0..setting.ports.count() {
+    for q in 0..ports.count() {
         let force = motion.force[q * nh].re;
-        let rows = setting.ports.axis(system, q).rows();
+        let rows = ports.axis(system, q).rows();
         rows.iter().for_each(|&(i, weight)| left[i] -= weight * force);
         size += rows.iter().map(|(_, weight)| weight * weight).sum::<f64>().sqrt() * force.abs();
     }
@@ -152,7 +165,7 @@ fn orbit_of_all(
     x: Vec<DVector<Complex64>>,
     wave: Option<CyclicSymmetry>,
 ) -> Option<Orbit> {
-    if !mean_forces_balance(&setting, discretization, motion, &x) {
+    if !mean_forces_balance((setting.system, setting.ports, setting.omega), discretization, motion, &x) {
         return None;
     }
     let harmonics = discretization.harmonics().to_vec();

@@ -9,6 +9,7 @@ use crate::method::harmonic_balance::equations::{self, Discretization, HarmonicS
 use crate::method::harmonic_balance::globalization::SearchSettings;
 use crate::method::harmonic_balance::newton::{SolveError, StopCriterion};
 use crate::method::harmonic_balance::options::{NAME, TOLERANCE};
+use crate::method::harmonic_balance::postprocess::mean_forces_balance;
 use crate::method::harmonic_balance::settings::WorkSettings;
 use crate::method::harmonic_balance::solver::HarmonicBalanceSolver;
 use crate::orbit::Orbit;
@@ -188,6 +189,11 @@ impl HarmonicBalanceSolver {
                 Err(_) if top > first && !self.is_budget_used() => break,
                 Err(error) => return Err(self.solve_error(error)),
             };
+            // with few harmonics also a body that drifts may seem to move periodically
+            let system = (&*self.system, &self.ports, omega);
+            if top > first && !mean_forces_balance(system, &self.discretizations[&top], &motion, &x) {
+                return Err(OrbitError::drift(NAME, self.excitation_frequency));
+            }
             if (self.ports.has_forces() || self.steep) && top > first {
                 error = error.max(settings.least_error_ratio * estimate);
             }

@@ -53,6 +53,7 @@ pub(super) use workspace::{PERIODICITY_TOLERANCE, derivative_batch};
 
 use crate::law::{MAX_DIRECTIONS, MasingView, ProxView, SharedLaw};
 use crate::method::MethodError;
+use crate::method::harmonic_balance::equations::contact_parameter::ContactParameters;
 use crate::model::{Axis, CyclicSymmetry, System, SystemJoint};
 use num_complex::Complex64;
 
@@ -455,14 +456,14 @@ impl FrequencyTime {
         self.argument = motion;
     }
 
-    /// Computes the image of the forces λ of a force port along a motion c: `P J(λ + ε c')`. If
-    /// the motion is imposed (`penalty` infinite), the image is the law's force at that
-    /// velocity, and λ does not change it. Writes the derivative of the image by `λ + ε c'`
-    /// into `tangent`. For `limit_factor`, see [`FrequencyTime::motion_port_force`].
+    /// Computes the image of the forces λ of a force port along a motion c: `P J(λ + ε c' + κ c̄)`.
+    /// If the motion is imposed, the image is the law's force at that velocity, and λ does not
+    /// change it. Writes the derivative of the image by the argument of `J` into `tangent`. For
+    /// `limit_factor`, see [`FrequencyTime::motion_port_force`].
     pub fn force_port_image(
         &mut self,
         port: &Port,
-        (omega, penalty, limit_factor): (f64, f64, f64),
+        (omega, contact, limit_factor): (f64, ContactParameters, f64),
         (c, force): (&[Complex64], &[Complex64]),
         image: &mut [Complex64],
         mut tangent: Option<&mut [f64]>,
@@ -476,7 +477,7 @@ impl FrequencyTime {
         let turn = |i: usize, harmonics: &[usize]| Complex64::new(0.0, harmonics[i % nh] as f64 * omega);
         let mut signal = std::mem::take(&mut self.argument);
         signal.clear();
-        if penalty.is_infinite() {
+        if contact.is_imposed() {
             let speed: f64 = c.iter().enumerate().map(|(i, c)| (c * turn(i, &self.harmonics)).norm()).sum();
             // Velocity range over which rigid friction changes its sign, relative to the speed. It
             // applies where the motion along a contact is imposed, so that the structure cannot
@@ -485,16 +486,26 @@ impl FrequencyTime {
             signal.extend(c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) / limit_factor));
             self.velocity(prox, port, width / limit_factor, &mut signal, image);
         } else {
-            let moved = c.iter().enumerate().map(|(i, c)| c * turn(i, &self.harmonics) * penalty);
+            let moved = c.iter().enumerate().map(|(i, c)| match self.harmonics[i % nh] {
+                0 => c * contact.mean_stiffness,
+                _ => c * turn(i, &self.harmonics) * contact.epsilon,
+            });
             signal.extend(moved.zip(force).map(|(moved, force)| (force + moved) / limit_factor));
-            self.resolve(prox, port, penalty, &signal, image, tangent);
+            self.resolve(prox, port, contact.epsilon, &signal, image, tangent);
         }
         image.iter_mut().for_each(|f| *f *= limit_factor);
         self.argument = signal;
     }
 
     /// Samples the forces of a port in a converged motion, see [`FrequencyTime::force`].
-    pub fn sample(&mut self, port: &Port, omega: f64, penalty: f64, c: &[Complex64], force: &[Complex64]) {
+    pub fn sample(
+        &mut self,
+        port: &Port,
+        omega: f64,
+        contact: ContactParameters,
+        c: &[Complex64],
+        force: &[Complex64],
+    ) {
         if let Kernel::Sliders(parts) = &port.kernel {
             return self.sample_slides(parts, &port.static_state, c);
         }
@@ -507,7 +518,7 @@ impl FrequencyTime {
         {
             self.step_by_step(step, port, c, &mut out, None);
         } else if port.is_force() {
-            self.force_port_image(port, (omega, penalty, 1.0), (c, force), &mut out, None);
+            self.force_port_image(port, (omega, contact, 1.0), (c, force), &mut out, None);
         } else {
             self.motion_port_force(port, (omega, 1.0), c, &mut out, None);
         }

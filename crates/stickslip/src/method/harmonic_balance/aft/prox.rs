@@ -200,17 +200,20 @@ impl FrequencyTime {
             }
         }
         let size = 2 * self.harmonics.len();
+        // the rotations contain the sines, which would take a third of a Newton step
+        let half_change = |h: usize| Complex64::new(0.0, 0.5 * self.rotations[h].im);
+        let widened = |h: usize| if undo { 1.0 / (1.0 + half_change(h).norm_sqr() / 3.0) } else { 1.0 };
         for (a, &h) in self.harmonics.iter().enumerate() {
             for (b, &k) in self.harmonics.iter().enumerate() {
                 let (mut minus, mut plus) = spectrum_pair(&self.spectra[0], h, k);
                 if mean {
-                    let (row, column) = (half_sample_change(h, n).conj(), half_sample_change(k, n));
+                    let (row, column) = (half_change(h).conj(), half_change(k));
                     let (minus_1, plus_1) = spectrum_pair(&self.spectra[1], h, k);
                     let (minus_2, plus_2) = spectrum_pair(&self.spectra[2], h, k);
                     minus += (row + column) * minus_1 + row * column * minus_2;
                     plus += (row + column.conj()) * plus_1 + row * column.conj() * plus_2;
                 }
-                add_block(tangent, size, (a, h), (b, k), as_block(minus, plus).map(|x| widen(k) * x));
+                add_block(tangent, size, (a, h), (b, k), as_block(minus, plus).map(|x| widened(k) * x));
             }
         }
     }

@@ -9,6 +9,7 @@ use crate::law::{
 use crate::method::harmonic_balance::HarmonicBalance;
 use crate::method::harmonic_balance::dynamics::banded::BandedForm;
 use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
+use crate::method::harmonic_balance::equations::contact_parameter::ContactParameters;
 use crate::method::shooting::Shooting;
 use crate::method::{Method, solver_with_alternatives};
 use crate::model::{Force, GROUND, Joint, Mass, Model, Spring};
@@ -190,7 +191,8 @@ fn derivatives_agree_with_differences() {
                 let mut force = vec![ZERO; count];
                 if port.is_force() {
                     // without motion the argument of the image is the force alone
-                    aft.force_port_image(port, (omega, 1.0, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
+                    let contact = ContactParameters::supported(1.0);
+                    aft.force_port_image(port, (omega, contact, 1.0), (&vec![ZERO; count], c), &mut force, tangent);
                 } else {
                     aft.motion_port_force(port, (omega, 1.0), c, &mut force, tangent);
                 }

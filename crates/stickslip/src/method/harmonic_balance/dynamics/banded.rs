@@ -8,6 +8,7 @@
 //! `(1 - T) δλ + ε T D Wᵀ y = r`, with the time derivative `D`.
 
 use crate::method::harmonic_balance::aft::Ports;
+use crate::method::harmonic_balance::equations::contact_parameter::ContactParameters;
 use crate::method::harmonic_balance::equations::homotopy::Homotopy;
 use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::model::System;
@@ -21,7 +22,7 @@ pub(crate) const DESCRIBING_DOFS: usize = 40;
 /// Parameters of the linearized equations, in addition to the tangents.
 pub(crate) struct StepParameters<'a> {
     /// Penalty ε per port, N s/m.
-    pub penalty: &'a [f64],
+    pub contacts: &'a [ContactParameters],
     /// Parameters of the homotopy.
     pub homotopy: Homotopy,
 }
@@ -278,7 +279,7 @@ impl BandedForm {
         for (p, port) in ports.iter().enumerate() {
             let tangent = &tangents[crate::method::harmonic_balance::aft::tangent_range(&blocks, p, port, nh)];
             let wide = size * port.axes;
-            let penalty = along.penalty[p];
+            let contact = along.contacts[p];
             for (a, row) in tangent.chunks_exact(wide).enumerate() {
                 let own = port.first_axis + a / size;
                 let Some(force) = self.forces[own] else {
@@ -306,16 +307,16 @@ impl BandedForm {
                     for (b, value) in row.iter().enumerate() {
                         self.step_factor.add(at, base + b, -value);
                     }
-                    if penalty.is_infinite() {
+                    if contact.is_imposed() {
                         continue;
                     }
                     for &(i, w) in &self.ends[other] {
                         let column = self.position[i] * size;
                         for (k, &h) in self.harmonics.iter().enumerate() {
-                            // ε T jhΩ
-                            let rate = penalty * h * self.omega * w;
-                            self.step_factor.add(at, column + 2 * k, row[2 * k + 1] * rate);
-                            self.step_factor.add(at, column + 2 * k + 1, -row[2 * k] * rate);
+                            // T (ε jhΩ + κ)
+                            let (re, im) = contact.row((row[2 * k], row[2 * k + 1]), h as usize, self.omega);
+                            self.step_factor.add(at, column + 2 * k, re * w);
+                            self.step_factor.add(at, column + 2 * k + 1, im * w);
                         }
                     }
                 }

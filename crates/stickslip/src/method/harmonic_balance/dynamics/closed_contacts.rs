@@ -50,6 +50,14 @@ pub(crate) fn need_contact_support(
         return false;
     }
     let Ok(stiffer) = own(2.0 * omega) else { return false };
+    let free = unsupported(&once, &stiffer, largest);
+    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > well_supported)
+}
+
+/// Tells per axis whether only the regularizing frequency supports it, from the static receptances
+/// (m/N) with that of a frequency (`once`) and of twice the frequency (`stiffer`). `largest` is
+/// the largest entry of the stiffness matrix, N/m.
+pub(crate) fn unsupported(once: &[f64], stiffer: &[f64], largest: f64) -> impl Iterator<Item = bool> {
     // Ratio of the receptances at the frequency and at twice the frequency above which the
     // regularizing frequency alone supports a direction. Its springs are four times as stiff at
     // twice the frequency.
@@ -58,9 +66,7 @@ pub(crate) fn need_contact_support(
     // structure of 163 coordinates. A real spring that is as soft may count as none, because the
     // form with closed contacts holds for any structure.
     let rounding = 1e4 * f64::EPSILON * largest;
-    let is_free = |(once, stiffer): (&f64, &f64)| *once > regularized * stiffer || once * rounding > 1.0;
-    let free = once.iter().zip(&stiffer).map(is_free);
-    springs.iter().zip(&once).zip(free).any(|((k, own), free)| free && k * own > well_supported)
+    once.iter().zip(stiffer).map(move |(once, stiffer)| *once > regularized * stiffer || once * rounding > 1.0)
 }
 
 /// Structure in uncoupled modes, which the closed contacts couple.

@@ -17,6 +17,7 @@ use super::modal_sum::{ComplexModes, rigid_body_fraction};
 use super::travelling_wave::TravellingWaves;
 use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Ports};
+use crate::method::harmonic_balance::equations::regularization::REGULARIZING_FREQUENCY;
 use crate::model::System;
 use crate::structure::Structure;
 use nalgebra::{DMatrix, DVector};
@@ -113,6 +114,8 @@ pub(crate) struct LinearDynamics {
     springs: Vec<f64>,
     /// The structure with these springs, if they alone hold some motion of it.
     closed: OnceCell<Option<ClosedContacts>>,
+    /// Masses that nothing supports, see [`LinearDynamics::unsupported_masses`].
+    unsupported: OnceCell<Vec<f64>>,
 }
 
 /// The structure at rest with its contacts closed, see [`closed_contacts`].
@@ -168,6 +171,7 @@ impl LinearDynamics {
             structure: system.structure().clone(),
             springs: closed_contacts::closed_stiffness(ports),
             closed: OnceCell::new(),
+            unsupported: OnceCell::new(),
             directions,
         }
     }
@@ -185,6 +189,23 @@ impl LinearDynamics {
             }
         };
         self.closed.get_or_init(find).as_ref()
+    }
+
+    /// Returns per axis the mass (kg) that moves with it along a direction that neither springs
+    /// nor closed contacts support, and zero for a supported axis. Empty if the structure is
+    /// singular at rest. Decided once, at the first frequency.
+    pub fn unsupported_masses(&self, omega: f64) -> &[f64] {
+        let own = |omega: f64| match self.closed(omega) {
+            Some(closed) => closed.receptance(omega).map(|all| all.diagonal().iter().map(|r| r.re).collect()),
+            None => self.form.dynamics().static_receptances(omega),
+        };
+        let find = || {
+            let (Ok(once), Ok(stiffer)) = (own(omega), own(2.0 * omega)) else { return Vec::new() };
+            let free = closed_contacts::unsupported(&once, &stiffer, self.structure.largest()[2]);
+            let mass = |receptance: f64| 1.0 / (receptance * (REGULARIZING_FREQUENCY * omega).powi(2));
+            once.iter().zip(free).map(|(r, free)| if free { mass(*r) } else { 0.0 }).collect()
+        };
+        self.unsupported.get_or_init(find)
     }
 
     fn with_closed_contacts(&self) -> Option<ClosedContacts> {

@@ -1,8 +1,8 @@
 //! The equations at one excitation frequency: receptances, the motion without
-//! friction, penalties, and the initial guess.
+//! friction, the parameters of rigid contacts, and the initial guess.
 
 use super::contact_parameter::contact_parameter as penalty_of;
-use super::regularization::LEAST_EPSILON_RATIO;
+use super::regularization::{LEAST_EPSILON_RATIO, REGULARIZING_FREQUENCY};
 use super::{Discretization, HarmonicSolution, ZERO};
 use crate::method::harmonic_balance::aft::{PortMember, Ports};
 use crate::method::harmonic_balance::dynamics::linear_dynamics::LinearDynamics;
@@ -47,6 +47,7 @@ impl Discretization {
         } else {
             self.linear.receptance = self.receptance(ports, dynamics, omega)?;
         }
+        self.linear.mean_load = excitation.iter().find(|(h, _)| *h == 0).map(|(_, load)| load.clone());
         for k in 0..nh {
             let h = self.aft.harmonics[k];
             let load = excitation.iter().find(|(number, _)| *number as usize == h);
@@ -82,24 +83,28 @@ impl Discretization {
             Some(banded) => banded.direct_receptances(rate),
             None => dynamics.direct_receptances(rate, omega).map_err(|_| rate)?,
         };
-        for (penalty, port) in self.linear.penalty.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
+        let masses = if self.aft.harmonics[0] == 0 { dynamics.unsupported_masses(omega) } else { &[] };
+        for (contact, port) in self.linear.contacts.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             // one penalty for all axes of a port, so that its plane has no preferred direction
             let mean = port.range().map(|q| smooth[q]).sum::<f64>() / port.axes as f64;
             let receptance = mean + port.series_compliance;
             let imposed = port.series_compliance == 0.0 && receptance <= IMPOSED_RECEPTANCE * soft / (top * top) as f64;
-            *penalty = if imposed {
+            contact.epsilon = if imposed {
                 f64::INFINITY
             } else {
                 penalty_of(receptance, top, omega).max(LEAST_EPSILON_RATIO * port.least_penalty)
             };
+            let mass = masses.iter().skip(port.first_axis).take(port.axes).fold(0.0, |a: f64, &b| a.max(b));
+            contact.mean_stiffness = mass * (REGULARIZING_FREQUENCY * omega).powi(2);
         }
         self.linear.largest_holding_force = 0.0;
-        for (penalty, port) in self.linear.penalty.iter().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
+        for (contact, port) in self.linear.contacts.iter().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
             for q in port.range() {
                 let moving = self.linear.motion[q * nh..(q + 1) * nh].iter().zip(&self.aft.harmonics);
                 let velocity = moving.map(|(c, h)| *h as f64 * omega * c.norm()).fold(0.0, f64::max);
                 if velocity > 0.0 {
-                    self.linear.largest_holding_force = self.linear.largest_holding_force.max(penalty * velocity);
+                    self.linear.largest_holding_force =
+                        self.linear.largest_holding_force.max(contact.epsilon * velocity);
                 }
             }
         }

@@ -5,12 +5,13 @@
 //! `r(y, u)`:
 //! - A motion port has its motion as the unknown: `f = f(y)`, `r = y - u`.
 //! - A force port has its force as the unknown, `y = λ`: `f = y`,
-//!   `r = λ - P J(λ + ε u')`. `J` is the resolvent of the law, and `P` truncates to
-//!   the harmonics of the series. In stick the force is then free to take the value
+//!   `r = λ - P J(λ + ε u' + κ ū)`. `J` is the resolvent of the law, and `P` truncates to
+//!   the harmonics of the series. `κ` acts on the mean `ū` where such contacts alone support the
+//!   structure, see `contact_parameter`. In stick the force is then free to take the value
 //!   that the motion requires, and no velocity is multiplied by a penalty stiffness.
 //!
 //! The Jacobian is one formula for both: `δ_qp r_y - r_u R_qp f_y`. Motion ports have `r_y = 1`,
-//! `-r_u = 1`, `f_y = K`; force ports have `r_y = 1 - T`, `-r_u = T ε d/dt`, `f_y = 1`.
+//! `-r_u = 1`, `f_y = K`; force ports have `r_y = 1 - T`, `-r_u = T (ε d/dt + κ)`, `f_y = 1`.
 //!
 //! If contacts alone hold a body, `R` of the mean contains the springs of closed contacts, and
 //! their force is subtracted from `f`, see `closed_contacts`.
@@ -29,7 +30,7 @@
 //! - `scaling`: units of motions and residuals
 //! - `scaled_unknowns`: the equations as a function of unknowns of order one
 //! - `coarse_sampling`: fewer samples for derivatives of many contacts
-//! - `contact_parameter`: the parameter ε of a rigid contact
+//! - `contact_parameter`: the parameters ε and κ of a rigid contact
 //! - `regularization`: terms for equations that the model leaves singular
 
 mod coarse_sampling;
@@ -45,6 +46,7 @@ use super::aft::{FrequencyTime, InitialState, Port, Ports, StaticState, tangent_
 use super::budget::WorkCounter;
 use super::dynamics::banded::BandedForm;
 use super::dynamics::receptance::{Receptance, ReceptanceMatrices};
+use super::equations::contact_parameter::ContactParameters;
 use super::equations::harmonic_set::velocity_weight;
 use super::found_by::FoundBy;
 use super::linear_solve::linearization::LinearizedEquations;
@@ -98,13 +100,15 @@ pub(super) struct Discretization {
 pub(super) struct LinearPart {
     /// Receptance of the axes; empty in the banded form.
     pub receptance: Receptance,
-    /// Penalty ε per port, N s/m; infinite if the motion is imposed.
-    pub penalty: Vec<f64>,
+    /// Parameters of the force equations, per port.
+    pub contacts: Vec<ContactParameters>,
     /// Force that would hold the contacts against the motion without friction, N: the largest
     /// product of a penalty and a velocity.
     pub largest_holding_force: f64,
     /// Motion of the axes without friction, [axis][harmonic].
     pub motion: Vec<Complex64>,
+    /// Constant load on all places, N; empty without one.
+    pub mean_load: Option<DVector<Complex64>>,
     /// Motion of all places without friction, per harmonic.
     pub free_response: Vec<DVector<Complex64>>,
     /// Mean of the imposed motion along the axes, m.
@@ -243,9 +247,10 @@ impl Discretization {
             aft,
             linear: LinearPart {
                 receptance: Receptance::Formed(ReceptanceMatrices::default()),
-                penalty: vec![0.0; ports.len()],
+                contacts: vec![ContactParameters::supported(0.0); ports.len()],
                 largest_holding_force: 0.0,
                 motion: vec![ZERO; length],
+                mean_load: None,
                 free_response: Vec::new(),
                 imposed: vec![0.0; axes],
                 series: ports.iter().flat_map(|port| vec![port.series_compliance; port.axes]).collect(),
@@ -310,8 +315,8 @@ impl Discretization {
         };
         let motion = HarmonicSolution { c: all(&motion.c), force: all(&motion.force), ..*motion };
         let mut discretization = Discretization::without_solver(self.aft.clone(), ports, None);
-        let own = &self.linear.penalty;
-        discretization.linear.penalty = (0..ports.len()).map(|p| own[p % own.len()]).collect();
+        let own = &self.linear.contacts;
+        discretization.linear.contacts = (0..ports.len()).map(|p| own[p % own.len()]).collect();
         (discretization, motion)
     }
 
@@ -432,7 +437,7 @@ impl Discretization {
         let SearchContext { ports, omega, homotopy } = context;
         let (port, nh) = (&ports[p], self.harmonics().len());
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
-        let penalty = self.linear.penalty[p];
+        let contact = self.linear.contacts[p];
         let (c, force) = (&motion.c[range.clone()], &motion.force[range.clone()]);
         let slot = &mut self.workspace.tangents[tangent_range(&self.blocks, p, port, nh)];
         let image = &mut self.workspace.image[..range.len()];
@@ -440,7 +445,7 @@ impl Discretization {
             slot.fill(0.0);
             slot
         });
-        self.aft.force_port_image(port, (omega, penalty, homotopy.limit_factor), (c, force), image, slot);
+        self.aft.force_port_image(port, (omega, contact, homotopy.limit_factor), (c, force), image, slot);
         for (at, (force, image)) in range.zip(force.iter().zip(&*image)) {
             let mut r = force - image;
             if homotopy.proximal_weight > 0.0 {
@@ -578,7 +583,7 @@ impl Discretization {
         }
         self.aft.static_share = 1.0;
         let range = port.first_axis * nh..(port.first_axis + port.axes) * nh;
-        self.aft.sample(port, omega, self.linear.penalty[p], &motion.c[range.clone()], &motion.force[range]);
+        self.aft.sample(port, omega, self.linear.contacts[p], &motion.c[range.clone()], &motion.force[range]);
     }
 
     /// Returns displacement and internal states of a port at the beginning of the period. The
@@ -623,7 +628,7 @@ impl Discretization {
             omega,
             homotopy,
             length: near.length,
-            penalty: &self.linear.penalty,
+            contacts: &self.linear.contacts,
             tangents: &self.workspace.tangents,
             blocks: &self.blocks,
             units: &self.workspace.units,
@@ -644,7 +649,7 @@ impl Discretization {
             omega,
             homotopy,
             length,
-            penalty: &self.linear.penalty,
+            contacts: &self.linear.contacts,
             tangents: &self.workspace.tangents,
             blocks: &self.blocks,
             units: &self.workspace.units,
@@ -686,6 +691,7 @@ mod tests {
     use std::sync::Arc;
 
     /// A row of masses with joints of every law between them, with or without a constant force.
+    /// With it, another mass is held by rigid friction alone.
     fn mixed(masses: usize, constant: f64) -> System {
         let name = |i: usize| format!("m{i}");
         let mut model = Model::default();
@@ -706,6 +712,11 @@ mod tests {
         model.forces.push(Force { on: name(0), amplitude: 1.0, phase: 0.2, harmonic: 1 });
         if constant != 0.0 {
             model.forces.push(Force { on: name(1), amplitude: constant, phase: 0.0, harmonic: 0 });
+            model.masses.push(Mass::new("loose", 1.0));
+            for i in 0..2 {
+                let law = Arc::new(Coulomb { limit: 0.2 });
+                model.joints.push(Joint { name: format!("loose{i}"), between: [name(i), "loose".into()], law });
+            }
         }
         model.assemble().unwrap()
     }
@@ -808,7 +819,7 @@ mod tests {
                 let case = Case::new(system, std::f64::consts::TAU * hertz);
                 let solution = |top: usize, factor: f64| {
                     let mut discretization = case.discretization((1..=top).step_by(2).collect(), false);
-                    discretization.linear.penalty[0] *= factor;
+                    discretization.linear.contacts[0].epsilon *= factor;
                     let start = discretization.initial_guess(&case.system, &case.ports, None, case.omega);
                     let motion = discretization.solve(&case.ports, case.omega, start).unwrap();
                     postprocess::places(&mut discretization, &case.dynamics, case.omega, &motion).unwrap()

@@ -126,7 +126,7 @@ impl Discretization {
             argument: vec![Complex64::default(); nh],
         };
         let limits: Vec<Option<f64>> =
-            ports.iter().zip(&self.linear.penalty).map(|(port, e)| port.limit().filter(|_| e.is_finite())).collect();
+            ports.iter().zip(&self.linear.contacts).map(|(port, e)| port.limit().filter(|_| !e.is_imposed())).collect();
         if limits.iter().all(Option::is_none) {
             return None;
         }
@@ -191,7 +191,7 @@ impl Discretization {
     }
 }
 
-/// Sets `y` to the harmonics of `λ + ε u'` along the axis of a port with one axis.
+/// Sets `y` to the harmonics of `λ + ε u' + κ ū` along the axis of a port with one axis.
 fn argument(
     (discretization, p, port): (&Discretization, usize, &Port),
     omega: f64,
@@ -201,7 +201,7 @@ fn argument(
     let at = port.first_axis * y.len();
     let own = motion.c[at..].iter().zip(&motion.force[at..]).zip(discretization.harmonics());
     for (y, ((c, force), h)) in y.iter_mut().zip(own) {
-        *y = force + c * Complex64::new(0.0, discretization.linear.penalty[p] * *h as f64 * omega);
+        *y = force + c * discretization.linear.contacts[p].motion_derivative(*h, omega);
     }
 }
 

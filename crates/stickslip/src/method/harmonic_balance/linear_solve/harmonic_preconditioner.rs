@@ -119,8 +119,7 @@ fn harmonic_block(linear: &LinearizedEquations, k: usize, receptance: &DMatrix<C
             port.range().for_each(|q| matrix[q * size + q] += 1.0);
             continue;
         }
-        let penalty = linear.penalty[p];
-        let rate = if penalty.is_finite() { Complex64::new(0.0, penalty * h as f64 * linear.omega) } else { ZERO };
+        let rate = linear.contacts[p].motion_derivative(h, linear.omega);
         let turn: Vec<Complex64> = (0..port.axes * port.axes)
             .map(|ab| linear.mean(linear.tangent(p, port), port.axes, ab / port.axes, ab % port.axes, k))
             .collect();

@@ -4,6 +4,7 @@
 //! the lowest harmonics alone, or all of them.
 
 use crate::method::harmonic_balance::aft::{Port, Ports, tangent_range};
+use crate::method::harmonic_balance::equations::contact_parameter::ContactParameters;
 use crate::method::harmonic_balance::equations::homotopy::Homotopy;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -15,7 +16,7 @@ pub(crate) struct LinearizedEquations<'a> {
     pub omega: f64,
     pub homotopy: Homotopy,
     pub length: f64,
-    pub penalty: &'a [f64],
+    pub contacts: &'a [ContactParameters],
     pub tangents: &'a [f64],
     pub blocks: &'a [usize],
     pub units: &'a [f64],
@@ -72,7 +73,7 @@ impl LinearizedEquations<'_> {
             for (q, row) in ports.iter().enumerate() {
                 let own = self.tangent(q, row);
                 let tall = pair * row.axes;
-                if row.is_force() && self.penalty[q].is_infinite() {
+                if row.is_force() && self.contacts[q].is_imposed() {
                     continue;
                 }
                 // R f_y, with f_y = K or 1; R does not couple harmonics
@@ -105,8 +106,8 @@ impl LinearizedEquations<'_> {
                         }
                     }
                 }
-                // -r_u = 1, or T ε d/dt
-                let penalty = self.penalty[q];
+                // -r_u = 1, or T (ε d/dt + κ)
+                let contact = self.contacts[q];
                 for i in 0..tall {
                     let start = (row.first_axis * pair + i) * size + column.first_axis * pair;
                     let out = &mut jacobian[start..start + wide];
@@ -117,25 +118,23 @@ impl LinearizedEquations<'_> {
                     let slopes = &own[(i / pair * whole + i % pair) * whole * row.axes..][..whole * row.axes];
                     for a in 0..row.axes {
                         for (k, &h) in harmonics.iter().enumerate() {
-                            let rate = penalty * h as f64 * self.omega;
                             let (at, of) = (a * pair + 2 * k, a * whole + 2 * k);
-                            let (re, im) = (slopes[of] * rate, slopes[of + 1] * rate);
+                            let (re, im) = contact.row((slopes[of], slopes[of + 1]), h, self.omega);
                             if re == 0.0 && im == 0.0 {
                                 continue;
                             }
-                            // j times (x, y) is (-y, x)
                             if column.is_force() {
                                 for b in 0..column.axes {
                                     let i = b * pair + 2 * k;
                                     for i in i..i + 2 {
-                                        out[i] += im * product[at * wide + i] - re * product[(at + 1) * wide + i];
+                                        out[i] += re * product[at * wide + i] + im * product[(at + 1) * wide + i];
                                     }
                                 }
                                 continue;
                             }
                             let (x, y) = product[at * wide..(at + 2) * wide].split_at(wide);
                             for ((out, x), y) in out.iter_mut().zip(x).zip(y) {
-                                *out += im * x - re * y;
+                                *out += re * x + im * y;
                             }
                         }
                     }

@@ -278,15 +278,14 @@ impl LinearizedEquations<'_> {
                 }
                 continue;
             }
-            // λ minus T times the change of λ + ε u', with u = -R f
-            let penalty = self.penalty[p];
+            // λ minus T times the change of λ + ε u' + κ ū, with u = -R f
+            let contact = self.contacts[p];
             let changed: Vec<f64> = moved
                 .iter()
                 .enumerate()
                 .flat_map(|(i, u)| {
-                    let rate =
-                        if penalty.is_finite() { penalty * self.harmonics[i % nh] as f64 * self.omega } else { 0.0 };
-                    let z = Complex64::new(v[2 * i], v[2 * i + 1]) * unit - Complex64::new(0.0, rate) * u;
+                    let rate = contact.motion_derivative(self.harmonics[i % nh], self.omega);
+                    let z = Complex64::new(v[2 * i], v[2 * i + 1]) * unit - rate * u;
                     [z.re, z.im]
                 })
                 .collect();

@@ -25,6 +25,7 @@ pub(crate) use linear_modes::{LinearMode, SmallMode};
 
 use crate::method::MethodError;
 use crate::method::harmonic_balance::aft::{FrequencyTime, Port, Ports};
+use crate::method::harmonic_balance::equations::contact_parameter::ContactParameters;
 use crate::method::harmonic_balance::equations::contact_parameter::contact_parameter;
 use crate::method::harmonic_balance::equations::regularization::{LEAST_EPSILON_RATIO, force_regularization};
 use crate::method::harmonic_balance::static_equilibrium::static_equilibrium_of;
@@ -457,7 +458,8 @@ impl<'a> ModeEquations<'a> {
             let mut image = vec![ZERO; force.len()];
             let mut tangent = vec![0.0; if jacobian.is_some() { wide * wide } else { 0 }];
             let wanted = jacobian.is_some().then_some(&mut tangent[..]);
-            self.aft.force_port_image(port, (state.omega, penalty, 1.0), (&c, force), &mut image, wanted);
+            let contact = ContactParameters::supported(penalty);
+            self.aft.force_port_image(port, (state.omega, contact, 1.0), (&c, force), &mut image, wanted);
             for (a, w) in placed.directions.iter().enumerate() {
                 for k in 0..nh {
                     let at = a * nh + k;
