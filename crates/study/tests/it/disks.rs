@@ -1,7 +1,7 @@
 //! Bladed disks in study files.
 
 use std::f64::consts::TAU;
-use stickslip::method::{Method, harmonic_balance::HarmonicBalance};
+use stickslip::method::{Method, event_driven::EventDriven, harmonic_balance::HarmonicBalance};
 use stickslip::model::{Model, Ring};
 use stickslip_study::dataset::Style;
 use stickslip_study::run::{Context, run};
@@ -219,6 +219,43 @@ fn names_of_a_sector_stand_for_all() {
 }
 
 /// `ω² = (k + 2 kc (1 - cos 2πd/N)) / m`, with the joints' springs in kc if they stick.
+/// Dampers between blades of a disk, which only rigid friction holds, carry a constant load while
+/// they slip. The solution on one sector has the amplitude of the exact one, and the springs of the
+/// blades carry the load: a mean of `0.3 N / (4000 N/m)`.
+#[test]
+fn loose_dampers_of_a_disk_carry_a_load() {
+    let text = r#"schema = 1
+disk = { sectors = 6 }
+mass = [{ name = "blade", mass = "1 kg" }, { name = "damper", mass = "0.1 kg" }]
+spring = [
+  { between = ["blade", "ground"], stiffness = "4000 N/m", damping = "2 N s/m" },
+  { between = ["blade", "next.blade"], stiffness = "500 N/m" },
+]
+joint = [
+  { name = "own", between = ["damper", "blade"], law = { kind = "coulomb", limit = "1 N" } },
+  { name = "next", between = ["damper", "next.blade"], law = { kind = "coulomb", limit = "2 N" } },
+]
+force = [
+  { on = "blade", amplitude = "6 N", engine_order = 2 },
+  { on = "damper", amplitude = "0.3 N", harmonic = 0 },
+]
+[study]
+kind = "orbit"
+frequency = "8 Hz"
+"#;
+    let case = read_study("disk.toml", text, &[]).unwrap().case(0).unwrap();
+    let system = case.model.assemble().unwrap();
+    let orbit = |method: &dyn Method| method.solver(&system).unwrap().orbit(TAU * 8.0).unwrap();
+    let (sector, exact) = (orbit(&HarmonicBalance::default()), orbit(&EventDriven));
+    let truncation = sector.evidence.error_estimate.unwrap();
+    for (found, exact) in sector.places.iter().zip(&exact.places) {
+        let error = (found.amplitude() / exact.amplitude() - 1.0).abs();
+        assert!(error < 3.0 * truncation, "{} {}", found.amplitude(), exact.amplitude());
+    }
+    assert!((sector.places[0].mean / (0.3 / 4000.0) - 1.0).abs() < 1e-6, "{}", sector.places[0].mean);
+    assert!(exact.joints[0].slip_fraction > 0.5 && sector.joints[0].slip_fraction > 0.5, "{:?}", sector.joints);
+}
+
 #[test]
 fn frequencies_by_nodal_diameter() {
     let study = read("", "", "[study]\nkind = \"nodal-diameter\"\nmodes = 2\n").unwrap();

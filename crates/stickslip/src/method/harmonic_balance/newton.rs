@@ -6,7 +6,6 @@
 use super::aft::Ports;
 use super::dynamics::banded::StepParameters;
 use super::equations::homotopy::{RESIDUAL_TOLERANCE, SearchContext};
-use super::equations::regularization::REGULARIZING_FREQUENCY;
 use super::equations::{DerivativeScope, Discretization, HarmonicSolution};
 use super::globalization::SearchSettings;
 use super::linear_solve::newton_krylov::{FORMED_UNKNOWNS, StepStart};
@@ -190,10 +189,11 @@ impl Discretization {
             StopCriterion::Share(share) => RESIDUAL_TOLERANCE.max(share * first),
         };
         // a residual changes the mean of a direction without support much more than the vibration,
-        // so the iteration goes on to its rounding
+        // so the iteration for an orbit goes on to rounding
         let is_unsupported = self.linear.contacts.iter().any(|contact| contact.mean_stiffness > 0.0);
+        let to_rounding = is_unsupported && matches!(settings.goal, StopCriterion::Solved);
         let newton = DampedNewton {
-            tolerance: if is_unsupported { REGULARIZING_FREQUENCY * solved_at } else { solved_at },
+            tolerance: if to_rounding { 0.0 } else { solved_at },
             rounding: defaults.rounding,
             iterations: settings.iterations,
             // forces that do not settle are soon left to the proximal point method

@@ -69,9 +69,12 @@ pub(super) fn places(
 }
 
 /// Returns true if the mean forces balance without the springs that regularize unsupported
-/// directions. `x` are the harmonics of all places.
+/// directions. `x` are the harmonics of all places. The ports are those of the solution, and those
+/// of the whole ring if it is one of its sectors.
 pub(super) fn mean_forces_balance(
-    (system, ports, omega): (&System, &Ports, f64),
+    system: &System,
+    (ports, ring_ports): (&Ports, Option<&Ports>),
+    omega: f64,
     discretization: &Discretization,
     motion: &HarmonicSolution,
     x: &[DVector<Complex64>],
@@ -79,6 +82,10 @@ pub(super) fn mean_forces_balance(
     let nh = discretization.harmonics().len();
     if discretization.harmonics()[0] != 0 {
         return true;
+    }
+    if let (Some(wave), Some(ring)) = (ports.wave(), ring_ports) {
+        let (discretization, motion) = discretization.over_ring(wave, ring, motion);
+        return mean_forces_balance(system, (ring, None), omega, &discretization, &motion, x);
     }
     let excitation = system.excitation(omega);
     let mut left = excitation
@@ -165,7 +172,7 @@ fn orbit_of_all(
     x: Vec<DVector<Complex64>>,
     wave: Option<CyclicSymmetry>,
 ) -> Option<Orbit> {
-    if !mean_forces_balance((setting.system, setting.ports, setting.omega), discretization, motion, &x) {
+    if !mean_forces_balance(setting.system, (setting.ports, None), setting.omega, discretization, motion, &x) {
         return None;
     }
     let harmonics = discretization.harmonics().to_vec();

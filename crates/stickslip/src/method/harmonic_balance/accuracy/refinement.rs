@@ -189,9 +189,12 @@ impl HarmonicBalanceSolver {
                 Err(_) if top > first && !self.is_budget_used() => break,
                 Err(error) => return Err(self.solve_error(error)),
             };
-            // with few harmonics also a body that drifts may seem to move periodically
-            let system = (&*self.system, &self.ports, omega);
-            if top > first && !mean_forces_balance(system, &self.discretizations[&top], &motion, &x) {
+            // a body that drifts may have a periodic solution with few harmonics, and one that does
+            // not drift may lack it, so only longer series decide
+            let ports = (&self.ports, self.ring_ports.as_ref());
+            if top > first && !mean_forces_balance(&self.system, ports, omega, &self.discretizations[&top], &motion, &x)
+            {
+                *inaccurate = None;
                 return Err(OrbitError::drift(NAME, self.excitation_frequency));
             }
             if (self.ports.has_forces() || self.steep) && top > first {

@@ -200,7 +200,7 @@ impl FrequencyTime {
             }
         }
         let size = 2 * self.harmonics.len();
-        // the rotations contain the sines, which would take a third of a Newton step
+        // as `half_sample_change`, from a table: the sines would take a third of a Newton step
         let half_change = |h: usize| Complex64::new(0.0, 0.5 * self.rotations[h].im);
         let widened = |h: usize| if undo { 1.0 / (1.0 + half_change(h).norm_sqr() / 3.0) } else { 1.0 };
         for (a, &h) in self.harmonics.iter().enumerate() {

@@ -5,7 +5,7 @@
 //! of `c + R f - c_lin = r`, `R = Wᵀ Z⁻¹ W`, is `(1 + R K)⁻¹ r = r - Wᵀ (Z + W K Wᵀ)⁻¹ W K r`
 //! (Woodbury). `Z + W K Wᵀ` has the band of the structure. Unknown forces of laws of velocity
 //! border it, as if each contact were one more place: `Z y - W δλ = 0` and
-//! `(1 - T) δλ + ε T D Wᵀ y = r`, with the time derivative `D`.
+//! `(1 - T) δλ + T (ε D + κ) Wᵀ y = r`, with the time derivative `D` and κ for the mean alone.
 
 use crate::method::harmonic_balance::aft::Ports;
 use crate::method::harmonic_balance::equations::contact_parameter::ContactParameters;
@@ -21,7 +21,7 @@ pub(crate) const DESCRIBING_DOFS: usize = 40;
 
 /// Parameters of the linearized equations, in addition to the tangents.
 pub(crate) struct StepParameters<'a> {
-    /// Penalty ε per port, N s/m.
+    /// Parameters of the force equations, per port.
     pub contacts: &'a [ContactParameters],
     /// Parameters of the homotopy.
     pub homotopy: Homotopy,

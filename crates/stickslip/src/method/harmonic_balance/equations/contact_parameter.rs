@@ -138,7 +138,9 @@ mod tests {
         let orbit = HarmonicBalance::default().solver(&model.assemble().unwrap()).unwrap().orbit(rate).unwrap();
         let place = &orbit.places[0];
         assert!((place.amplitude() / amplitude - 1.0).abs() < 1e-9, "{} {amplitude}", place.amplitude());
-        assert!((place.mean * stiffness / load - 1.0).abs() < 1e-4, "{}", place.mean);
+        // rounding times the compliance of the regularizing spring of 2 kg, as above
+        let rounding = f64::EPSILON * load / (2.0 * (REGULARIZING_FREQUENCY * rate).powi(2));
+        assert!((place.mean - load / stiffness).abs() < 4.0 * rounding, "{}", place.mean);
         assert_eq!(orbit.joints[0].slip_fraction, 0.0);
     }
 
@@ -147,19 +149,20 @@ mod tests {
     #[test]
     fn friction_carries_a_load_while_it_slips() {
         let load = -2.5;
-        let mut slips = 0.0f64;
         for hertz in [52.0, 54.0, 60.0] {
             let [found, exact] = orbits(&damped_blades(&[("b0", 2.0), ("b1", 6.0)], load), hertz).map(Result::unwrap);
             let carried: f64 =
                 found.places[1..].iter().zip(BLADES).map(|(place, stiffness)| place.mean * stiffness).sum();
-            assert!((carried / load - 1.0).abs() < 1e-6, "{hertz} Hz: {carried} N");
+            // the balance is that of a solution: its residual is rounding
+            assert!((carried / load - 1.0).abs() < 1e-9, "{hertz} Hz: {carried} N");
+            let truncation = found.evidence.error_estimate.unwrap();
+            let largest = exact.places.iter().map(|place| place.amplitude()).fold(0.0, f64::max);
             for (found, exact) in found.places.iter().zip(&exact.places) {
-                let error = (found.amplitude() / exact.amplitude() - 1.0).abs();
-                assert!(error < 2e-3, "{hertz} Hz: {} {}", found.amplitude(), exact.amplitude());
+                let error = (found.amplitude() - exact.amplitude()).abs() / largest;
+                assert!(error < 3.0 * truncation, "{hertz} Hz: {} {}", found.amplitude(), exact.amplitude());
             }
-            slips = exact.joints.iter().fold(slips, |slips, joint| slips.max(joint.slip_fraction));
+            assert!(exact.joints.iter().any(|joint| joint.slip_fraction > 0.5), "{hertz} Hz: {:?}", exact.joints);
         }
-        assert!(slips > 0.5, "{slips}");
     }
 
     /// The load exceeds the limit, or the damper slips in one direction only.

@@ -1,7 +1,7 @@
 //! The equations at one excitation frequency: receptances, the motion without
 //! friction, the parameters of rigid contacts, and the initial guess.
 
-use super::contact_parameter::contact_parameter as penalty_of;
+use super::contact_parameter::contact_parameter;
 use super::regularization::{LEAST_EPSILON_RATIO, REGULARIZING_FREQUENCY};
 use super::{Discretization, HarmonicSolution, ZERO};
 use crate::method::harmonic_balance::aft::{PortMember, Ports};
@@ -85,14 +85,14 @@ impl Discretization {
         };
         let masses = if self.aft.harmonics[0] == 0 { dynamics.unsupported_masses(omega) } else { &[] };
         for (contact, port) in self.linear.contacts.iter_mut().zip(ports.iter()).filter(|(_, port)| port.is_force()) {
-            // one penalty for all axes of a port, so that its plane has no preferred direction
+            // one ε for all axes of a port, so that its plane has no preferred direction
             let mean = port.range().map(|q| smooth[q]).sum::<f64>() / port.axes as f64;
             let receptance = mean + port.series_compliance;
             let imposed = port.series_compliance == 0.0 && receptance <= IMPOSED_RECEPTANCE * soft / (top * top) as f64;
             contact.epsilon = if imposed {
                 f64::INFINITY
             } else {
-                penalty_of(receptance, top, omega).max(LEAST_EPSILON_RATIO * port.least_penalty)
+                contact_parameter(receptance, top, omega).max(LEAST_EPSILON_RATIO * port.least_penalty)
             };
             let mass = masses.iter().skip(port.first_axis).take(port.axes).fold(0.0, |a: f64, &b| a.max(b));
             contact.mean_stiffness = mass * (REGULARIZING_FREQUENCY * omega).powi(2);
