@@ -52,7 +52,9 @@ export async function run(slot, request, progress = () => {}) {
     for await (const event of lines(response.body)) {
       if (["begin", "progress", "partial"].includes(event.event)) { progress(event); } else { last = event; }
     }
-    return last?.event === "superseded" ? null : last;
+    if (last !== null && last.event !== "superseded") { return last; }
+    // the server saw an older request after this one, or ended: the newest request is sent again
+    return running.get(slot) === control ? run(slot, request, progress) : null;
   } catch (error) {
     if (control.signal.aborted) { return null; }
     throw error;

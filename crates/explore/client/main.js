@@ -19,6 +19,8 @@ const TABS = [["response", "Response", response], ["orbit", "Orbit", orbit], ["m
 let entries = [];
 let shown = "response";
 let describing = 0;
+/** Timer of the next attempt to reach the server. */
+let reconnecting = 0;
 
 function tabs() {
   for (const [name, title, part] of /** @type {[string, string, any][]} */ (TABS)) {
@@ -103,7 +105,10 @@ function offline(error) {
   const lost = error instanceof TypeError;
   const again = `Start the explorer again with --port ${location.port}, and open the address that it prints: your changes are kept.`;
   message(lost ? `The server does not answer. ${again}` : String(error.message ?? error));
-  if (lost) { setTimeout(reconnect, 1500); }
+  if (lost) {
+    clearTimeout(reconnecting);
+    reconnecting = setTimeout(reconnect, 1500);
+  }
 }
 
 async function reconnect() {

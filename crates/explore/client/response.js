@@ -111,8 +111,8 @@ async function compute(moving, asked = false) {
     view: { kind: "study", points: reduced, references: quantity.value === "" && state.description.kind === "response", scale: state.description.kind === "response" ? axisScale : null, panels: panels.value || null },
   };
   let points_done = 0;
+  const late = setTimeout(() => { status.textContent = "computing …"; place.classList.add("stale"); }, 250);
   try {
-    const late = setTimeout(() => { status.textContent = "computing …"; place.classList.add("stale"); }, 250);
     const event = await run("study", request, (event) => {
       if (event.event === "begin") { points_done = event.points ?? 0; }
       if (event.event === "progress" && performance.now() - begun > 500) {
@@ -127,7 +127,6 @@ async function compute(moving, asked = false) {
         tell("partial", event);
       }
     });
-    clearTimeout(late);
     if (event === null) { return; }
     if (wait) { long = event.event === "expect"; }
     const seconds = (performance.now() - begun) / 1000;
@@ -139,6 +138,7 @@ async function compute(moving, asked = false) {
     partial = null;
     tell("offline", error);
   } finally {
+    clearTimeout(late);
     if (own === newest) {
       movingRun = 0;
       if (again) { compute(true); } else if (rest) { compute(false); }
