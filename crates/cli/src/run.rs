@@ -496,7 +496,7 @@ fn complain(dataset: &Dataset) {
     // Number of failed points named on standard error; the record names all.
     let named_failures = 10;
     let failures = dataset.failures_by_reason();
-    for failure in failures.iter().take(named_failures) {
+    for (failure, _) in failures.iter().take(named_failures) {
         complain!("{}: {failure}", dataset.name);
     }
     for status in [Accuracy::Truncated, Accuracy::Unchecked].map(Accuracy::status) {
@@ -509,8 +509,9 @@ fn complain(dataset: &Dataset) {
             complain!("{}: {points} point{plural} {status}: {error}, see the notes in record.json", dataset.name);
         }
     }
-    if failures.len() > named_failures {
-        complain!("{}: and {} more failed points, see record.json", dataset.name, failures.len() - named_failures);
+    let more: usize = failures.iter().skip(named_failures).map(|(_, count)| count).sum();
+    if more > 0 {
+        complain!("{}: and {more} more failed point{}, see record.json", dataset.name, plural(more));
     }
 }
 

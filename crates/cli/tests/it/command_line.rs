@@ -466,7 +466,7 @@ fn check_says_what_is_known_before_a_run() {
         "3 degrees of freedom",
         "121.25",
         "120.94",
-        "0.101 times the excitation is enough at 120.9589 Hz",
+        "0.101 times the excitation makes it slip at 120.9589 Hz",
         " on one thread",
     ] {
         assert!(text.contains(word), "{word}: {text}");

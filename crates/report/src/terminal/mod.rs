@@ -94,7 +94,7 @@ impl Terminal {
             let _ = writeln!(out, "note: {more} more note{}; all are in record.json", plural(more));
         }
         let failures = dataset.failures_by_reason();
-        for failure in failures.iter().take(FAILURES) {
+        for (failure, _) in failures.iter().take(FAILURES) {
             let text = clean(&failure.to_string());
             for (i, line) in self.wrapped(&text, "  ").iter().enumerate() {
                 match line.strip_prefix("failed").filter(|_| i == 0) {
@@ -104,7 +104,8 @@ impl Terminal {
                 .unwrap_or(()); // Writing to a string cannot fail.
             }
         }
-        if let Some(more @ 1..) = failures.len().checked_sub(FAILURES) {
+        let more: usize = failures.iter().skip(FAILURES).map(|(_, count)| count).sum();
+        if more > 0 {
             let _ = writeln!(
                 out,
                 "{} at {more} more point{}; all are in record.json",
@@ -418,7 +419,10 @@ mod tests {
     #[test]
     fn failures_are_named_then_counted() {
         let same_reason = Terminal::default().text(&samples::hostile(), &[]);
-        assert!(same_reason.contains(", and at 8 more: ") && !same_reason.contains("more points"), "{same_reason}");
+        assert!(
+            same_reason.contains(" and 8 more, the last at ") && !same_reason.contains("more points"),
+            "{same_reason}"
+        );
         let mut dataset = samples::hostile();
         dataset.failures.iter_mut().enumerate().for_each(|(i, failure)| failure.reason += &format!(" ({i})"));
         let text = Terminal::default().text(&dataset, &[]);

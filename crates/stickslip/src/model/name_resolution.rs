@@ -267,7 +267,7 @@ impl Places {
         if let Some([one, other]) = normals.as_deref().filter(|ends| ends.len() == 2 && ends[0] != ends[1]) {
             let message = format!(
                 "the normal directions of both nodes differ: {one} of `{}` and {other} of `{}`; list the directions \
-                 of both nodes in the same order, tangents first",
+                 of both nodes in the same order, tangents first, or give both a [[place]] with the same `normal`",
                 between[0], between[1]
             );
             return Err(ModelError::new(element, key, message));

@@ -288,8 +288,9 @@ pub enum OrbitError {
     },
     /// No stiffness, or friction alone, carries the mean of the forces.
     #[error(
-        "{method} found no periodic motion at {}, because a body drifts: friction or contacts alone hold part of the \
-         structure, and the mean force exceeds what they carry; increase the normal loads, or add a spring{advice}",
+        "{method} found no periodic motion at {}, because a body drifts: only friction or contacts hold part of the \
+         structure, and they do not balance the mean force on this part; increase the normal loads, or add a \
+         spring{advice}",
         hertz(*omega)
     )]
     Drift {
@@ -464,6 +465,10 @@ fn settling_advice(repeats: Option<usize>, needed: Option<f64>, advice: &str) ->
             format!("; it repeats after {repeats} periods: set `period` to {repeats} times its value (default 1)")
         }
         None => match needed {
+            // a second of computation has about a million periods of a small model
+            Some(needed) if needed > 1e6 => {
+                format!("; the motion hardly decays and would need more than a million periods: add damping{by_newton}")
+            }
             Some(needed) => {
                 format!(
                     "; from its decay, it would settle after about {needed:.0} periods of the orbit: raise `periods`{by_newton}"

@@ -41,17 +41,29 @@ pub struct Dataset {
 
 impl Dataset {
     /// Returns the failures with consecutive ones of the same reason joined, such as those of all
-    /// places at one peak.
-    pub fn failures_by_reason(&self) -> Vec<Failure> {
+    /// frequencies at which a body drifts, and the number of failures in each. Reasons may differ
+    /// in their numbers; the text has those of the first failure.
+    pub fn failures_by_reason(&self) -> Vec<(Failure, usize)> {
         let joined = |same: &[Failure]| {
             let Failure { location, reason } = same[0].clone();
-            match same.len() {
-                1 => Failure { location, reason },
-                count => Failure { location: format!("{location}, and at {} more", count - 1), reason },
-            }
+            let location = match (same.len(), &same[same.len() - 1].location) {
+                (1, _) => location,
+                (2, last) => format!("{location} and {last}"),
+                (count, last) => format!("{location} and {} more, the last at {last}", count - 1),
+            };
+            (Failure { location, reason }, same.len())
         };
-        self.failures.chunk_by(|a, b| a.reason == b.reason).map(joined).collect()
+        self.failures.chunk_by(|a, b| differ_in_numbers_only(&a.reason, &b.reason)).map(joined).collect()
     }
+}
+
+/// Returns true if two texts differ at most in their numbers.
+fn differ_in_numbers_only(one: &str, other: &str) -> bool {
+    // whole words are left out, because only one of two numbers may have an exponent
+    let words = |text: &str| -> String {
+        text.split(' ').filter(|word| !word.starts_with(|c: char| c.is_ascii_digit() || c == '-')).collect()
+    };
+    words(one) == words(other)
 }
 
 /// A table: named columns of equal length.
@@ -582,4 +594,35 @@ pub struct Record {
     pub points: BTreeMap<String, u64>,
     /// True if the run was interrupted and holds only the points finished until then.
     pub interrupted: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn failure(location: &str, reason: &str) -> Failure {
+        Failure { location: location.into(), reason: reason.into() }
+    }
+
+    /// Other words, and other failures in between, separate groups.
+    #[test]
+    fn failures_that_differ_in_numbers_are_joined() {
+        let failures = vec![
+            failure("1 Hz", "no motion at 1 Hz, residual 1e-3"),
+            failure("2 Hz", "no motion at 2.5 Hz, residual 0.1"),
+            failure("3 Hz", "no motion at 3 Hz, residual -2.1e+0"),
+            failure("4 Hz", "a body drifts at 4 Hz"),
+            failure("5 Hz", "no motion at 5 Hz, residual 1"),
+        ];
+        let groups = Dataset { failures, ..Dataset::default() }.failures_by_reason();
+        let texts: Vec<String> = groups.iter().map(|(group, count)| format!("{count} {group}")).collect();
+        assert_eq!(
+            texts,
+            [
+                "3 failed at 1 Hz and 2 more, the last at 3 Hz: no motion at 1 Hz, residual 1e-3",
+                "1 failed at 4 Hz: a body drifts at 4 Hz",
+                "1 failed at 5 Hz: no motion at 5 Hz, residual 1",
+            ]
+        );
+    }
 }

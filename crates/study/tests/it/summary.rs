@@ -57,7 +57,7 @@ fn summary_of_the_couple() {
         assert!(text.contains(word), "{word}: {text}");
     }
     assert!(
-        text.contains("119.5 to 120.2704 Hz, 120.6697 to 122.5 Hz; 0.101 times the excitation is enough"),
+        text.contains("119.5 to 120.2704 Hz, 120.6697 to 122.5 Hz; 0.101 times the excitation makes it slip"),
         "{text}"
     );
     // one of the three masses may have two peaks
@@ -67,6 +67,33 @@ fn summary_of_the_couple() {
     assert!(text.contains("slips at 2 N, 200 µm of relative displacement"), "{text}");
     // without degrees of freedom there are no modes
     assert!(!summary(templates::find("element").unwrap().study).to_string().contains("Hz"));
+}
+
+/// No force reaches the second joint while the first one, at the place of the force, holds. After
+/// its slip it does.
+#[test]
+fn loads_of_joints_are_those_with_all_joints_stuck() {
+    let model = |limit: &str| {
+        summary(&format!(
+            r#"schema = 1
+mass = [{{ name = "a", mass = "1 kg" }}, {{ name = "b", mass = "2 kg" }}]
+spring = [{{ between = ["a", "b"], stiffness = "2000 N/m", damping = "1 N s/m" }}]
+joint = [
+  {{ name = "ja", between = ["a", "ground"], law = {{ kind = "coulomb", limit = "{limit}" }} }},
+  {{ name = "jb", between = ["b", "ground"], law = {{ kind = "coulomb", limit = "2 N" }} }},
+]
+force = [{{ on = "a", amplitude = "6 N" }}]
+[study]
+kind = "response"
+frequency = {{ from = "4 Hz", to = "14 Hz", points = 6 }}
+"#
+        ))
+        .to_string()
+    };
+    let slips = model("1 N");
+    assert!(slips.contains("rigid until then; sticks while the other joints stick\n"), "{slips}");
+    let sticks = model("10 N");
+    assert!(sticks.contains("sticks, even under a million times the excitation"), "{sticks}");
 }
 
 #[test]
@@ -103,7 +130,39 @@ fn unconstrained_masses() {
         ("[[spring]]\nbetween = [\"contact\", \"blade3\"]\nstiffness = \"kt\"\n", ""),
         ("kt = \"10000 N/m\"", "# none"),
     ];
-    warns(&template("blade-couple", &ground), &["no spring holds `contact`", "only friction"]);
+    warns(&template("blade-couple", &ground), &["no spring holds `contact`", "only friction", "its mean position"]);
+}
+
+/// The dampers of all sectors have one warning.
+#[test]
+fn loose_dampers_of_a_disk() {
+    let disk = r#"schema = 1
+disk = { sectors = 9 }
+mass = [{ name = "blade", mass = "1 kg" }, { name = "damper", mass = "0.3 kg" }]
+spring = [{ between = ["blade", "ground"], stiffness = "4000 N/m", damping = "2 N s/m" }]
+joint = [{ name = "j", between = ["damper", "blade"], law = { kind = "coulomb", limit = "1 N" } }]
+force = [{ on = "blade", amplitude = "6 N", engine_order = 2 }]
+[study]
+kind = "orbit"
+frequency = "5 Hz"
+"#;
+    warns(disk, &["`damper_0`, `damper_1`", "and 3 more: only friction keeps them in place", "their mean position"]);
+}
+
+/// A law without force at rest balances no constant force, however small it is.
+#[test]
+fn smooth_friction_creeps_under_a_constant_force() {
+    let block = |law: &str| {
+        format!(
+            "schema = 1\nmass = [{{ name = \"a\", mass = \"1 kg\" }}]\njoint = [{{ name = \"j\", between = [\"a\", \
+             \"ground\"], law = {{ {law} }} }}]\nforce = [{{ on = \"a\", amplitude = \"0.3 N\" }}, {{ on = \"a\", amplitude = \
+             \"0.1 N\", harmonic = 0 }}]\n[study]\nkind = \"orbit\"\nfrequency = \"9 Hz\"\n"
+        )
+    };
+    let smooth = summary(&block(r#"kind = "coulomb-tanh", limit = "1 N", velocity = "1 mm/s""#)).warnings;
+    assert!(smooth.iter().any(|text| text.contains("`coulomb-tanh` of `j` has no force at rest")), "{smooth:?}");
+    let rigid = summary(&block(r#"kind = "coulomb", limit = "1 N""#)).warnings;
+    assert!(!rigid.iter().any(|text| text.contains("equilibrium")), "{rigid:?}");
 }
 
 /// A block on a contact whose preload pushes it away: there is no warning if a force pushes it

@@ -35,7 +35,9 @@ impl ModelSummary {
         if count == 0 {
             parts.push("no mode".to_owned());
         } else {
-            let damping: Vec<String> = order.iter().map(|m| format_significant(100.0 * m.damping, 2)).collect();
+            // without damping the ratio is a multiple of rounding
+            let percent = |m: &&NaturalMode| if m.damping.abs() < 1e-12 { 0.0 } else { 100.0 * m.damping };
+            let damping: Vec<String> = order.iter().map(|m| format_significant(percent(m), 2)).collect();
             let damping = match damping.iter().all(|d| *d == damping[0]) {
                 true => damping[0].clone(),
                 false => damping.join(", "),
@@ -105,15 +107,20 @@ impl ModelSummary {
         }
         let factor = format_significant(1.0 / onset.largest, 3);
         let resonant = onset.largest > ROUNDING_SLIP_FACTOR;
+        // the loads are those with all joints stuck; slip of another joint changes them
+        let slips = |joint: &JointSummary| joint.onset.as_ref().is_some_and(|onset| !onset.slip_ranges.is_empty());
+        let another_slips = self.joints.iter().any(|other| other.name != joint.name && slips(other));
+        let sticks = if another_slips { "sticks while the other joints stick" } else { "sticks" };
         if onset.largest == 0.0 {
             text += "; the excitation does not reach it";
         } else if relative_load(onset) == 0.0 {
-            text += "; sticks, even under a million times the excitation";
+            let always = if another_slips { "" } else { ", even under a million times the excitation" };
+            text += &format!("; {sticks}{always}");
         } else if onset.slip_ranges.is_empty() && joint.micro_slip {
             let share = format_significant(100.0 * onset.largest, 3);
             text += &format!("; only micro-slip, up to {share} % of the slip limit{at}");
         } else if onset.slip_ranges.is_empty() {
-            text += &format!("; sticks; {factor} times the excitation would make it slip{at}");
+            text += &format!("; {sticks}; {factor} times the excitation would make it slip{at}");
         } else if several {
             let mut ranges: Vec<String> = onset
                 .slip_ranges
@@ -129,10 +136,10 @@ impl ModelSummary {
                 true => {
                     format!("; {slip} at {ranges}; any excitation makes it slip at its undamped resonance{at}")
                 }
-                false => format!("; {slip} at {ranges}; {factor} times the excitation is enough{at}"),
+                false => format!("; {slip} at {ranges}; {factor} times the excitation makes it slip{at}"),
             };
         } else {
-            text += &format!("; {slip} occurs; {factor} times the excitation is enough");
+            text += &format!("; {slip} occurs; {factor} times the excitation makes it slip");
         }
         text
     }

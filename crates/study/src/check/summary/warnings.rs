@@ -14,7 +14,7 @@ use crate::syntax::key::DAMPING_RATIO;
 use std::collections::{BTreeSet, HashMap};
 use std::f64::consts::{PI, TAU};
 use stickslip::dimension::Dimension;
-use stickslip::model::{Axis, FirstSlip, LinearModes, LooseBody, TRANSLATIONS};
+use stickslip::model::{Axis, FirstSlip, LinearModes, LooseBody, SystemJoint, TRANSLATIONS};
 use stickslip::structure::ReducedComponent;
 
 /// Largest number of names that a warning lists; for more it states the number.
@@ -61,14 +61,17 @@ pub(super) fn list_names(names: &[String]) -> String {
 
 fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let pronoun = |count: usize| if count == 1 { "it" } else { "them" };
-    let one = |one: &LooseBody| {
-        let names = list_names(&one.masses);
-        let them = pronoun(one.masses.len());
-        if one.held_by_friction {
-            format!("no spring holds {names}: only friction keeps {them} in place, as long as not all joints slip")
-        } else {
-            format!("{names} can move freely: no spring and no joint connects {them} to `ground`")
-        }
+    let held = |masses: &[String]| {
+        let (names, them) = (list_names(masses), pronoun(masses.len()));
+        let their = if masses.len() == 1 { "its" } else { "their" };
+        format!(
+            "no spring holds {names}: only friction keeps {them} in place, as long as not all joints slip, and {their} \
+             mean position depends on the history"
+        )
+    };
+    let free = |masses: &[String]| {
+        let (names, them) = (list_names(masses), pronoun(masses.len()));
+        format!("{names} can move freely: no spring and no joint connects {them} to `ground`")
     };
     // bodies on preloaded faces are correct; bodies between unloaded faces have a separate
     // warning
@@ -98,16 +101,37 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let unbalanced = unbalanced_preload(cases);
     let open = match (&unbalanced, open_under_load(&cases[0])) {
         (None, Some(found)) => Some(found),
-        _ => open.or_else(|| cases[0].lacks_equilibrium.then(|| NO_EQUILIBRIUM.to_owned())),
+        _ => open.or_else(|| cases[0].lacks_equilibrium.then(|| no_equilibrium(&cases[0]))),
     };
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
-    let others = others.filter(|one| !between(one) && !one.held_in_motion);
-    others.take(MAX_NAMED).map(one).chain(open).chain(unbalanced).collect()
+    let others: Vec<&LooseBody> = others.filter(|one| !between(one) && !one.held_in_motion).collect();
+    // one warning for all bodies, such as the dampers of all sectors
+    let masses = |by_friction: bool| -> Vec<String> {
+        let all = others.iter().filter(|one| one.held_by_friction == by_friction);
+        all.flat_map(|one| one.masses.clone()).collect()
+    };
+    let named = |masses: Vec<String>, text: &dyn Fn(&[String]) -> String| (!masses.is_empty()).then(|| text(&masses));
+    let loose = [named(masses(true), &held), named(masses(false), &free)];
+    loose.into_iter().flatten().chain(open).chain(unbalanced).collect()
 }
 
-const NO_EQUILIBRIUM: &str = "no static equilibrium was found under the constant forces and preloads, and a part of the \
-    structure can move freely; increase the normal loads, or hold this part by a spring; if one of these loads should \
-    close a contact that it opens, exchange the two places of its `between`, or reverse the load";
+/// Returns the warning of a structure without static equilibrium.
+fn no_equilibrium(one: &SurveyedCase) -> String {
+    let creeps = |joint: &&SystemJoint| joint.law().prox().is_some_and(|law| law.force_at_velocity(0.0).is_some());
+    let creeping = match one.survey.system().joints().iter().find(creeps) {
+        Some(joint) => format!(
+            "; the law `{}` of `{}` has no force at rest, so the joint creeps under every constant force: use a law that sticks",
+            joint.law().name(),
+            joint.name()
+        ),
+        None => String::new(),
+    };
+    format!(
+        "no static equilibrium was found under the constant forces and preloads, and a part of the structure can move \
+         freely; increase the normal loads, or hold this part by a spring; if one of these loads should close a contact \
+         that it opens, exchange the two places of its `between`, or reverse the load{creeping}"
+    )
+}
 
 /// Warns of open contacts of a structure that can move freely, if the constant forces or the
 /// preloads move their faces apart: these may have been meant to press the contacts.

@@ -51,6 +51,10 @@ impl Default for EqualStepSettings {
 const DROPS: &str =
     "its friction drops abruptly at the onset of slip; only a law with a `velocity` above zero can be regularized";
 
+/// Reason for rejecting a rigid slider.
+const RIGID: &str = "its slider is rigid, and `event-driven` does not take all laws of the model; set `width`, or add a \
+                     spring in series";
+
 /// Flow of a structure with any laws except rigid sliders.
 pub(crate) struct AverageAccelerationFlow {
     pub assembly: Assembly,
@@ -96,7 +100,7 @@ impl AverageAccelerationFlow {
                 {
                     Err(DROPS)
                 }
-                None if chosen.ideal_elements().is_some() => Err("its slider is rigid; it needs a spring in series"),
+                None if chosen.ideal_elements().is_some() => Err(RIGID),
                 None => Err("it defines neither the force after a step nor a differential equation"),
             }
         })?;
