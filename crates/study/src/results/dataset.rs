@@ -48,6 +48,7 @@ impl Dataset {
             let Failure { location, reason } = same[0].clone();
             let location = match (same.len(), &same[same.len() - 1].location) {
                 (1, _) => location,
+                (_, last) if last.is_empty() => location,
                 (2, last) => format!("{location} and {last}"),
                 (count, last) => format!("{location} and {} more, the last at {last}", count - 1),
             };
@@ -614,6 +615,9 @@ mod tests {
             failure("4 Hz", "a body drifts at 4 Hz"),
             failure("5 Hz", "no motion at 5 Hz, residual 1"),
         ];
+        let without_place = vec![failure("", "no motion at 1 Hz"); 2];
+        let joined = &Dataset { failures: without_place, ..Dataset::default() }.failures_by_reason()[0];
+        assert_eq!((joined.0.to_string().as_str(), joined.1), ("failed: no motion at 1 Hz", 2));
         let groups = Dataset { failures, ..Dataset::default() }.failures_by_reason();
         let texts: Vec<String> = groups.iter().map(|(group, count)| format!("{count} {group}")).collect();
         assert_eq!(
