@@ -37,10 +37,9 @@ pub(super) fn places(
             let h = discretization.harmonics()[k];
             let along = |q: usize| acting[q * nh + k];
             if h == 0 {
-                let forces = dynamics.force_on_places(h, along);
                 // the responses of an unsupported structure to the load and to the forces alone are
                 // so large that their difference would be rounding
-                let load = discretization.linear.mean_load.as_ref().map_or_else(|| -&forces, |load| load - &forces);
+                let load = load_without(discretization.linear.mean_load.as_ref(), &dynamics.force_on_places(h, along));
                 let mut x = DVector::from_element(load.len(), ZERO);
                 match &mut discretization.banded {
                     Some(banded) => banded.respond(k, |i| load[i], x.as_mut_slice()),
@@ -68,13 +67,15 @@ pub(super) fn places(
         .collect()
 }
 
+/// Returns the load (N) on all places minus forces on them.
+fn load_without(load: Option<&DVector<Complex64>>, forces: &DVector<Complex64>) -> DVector<Complex64> {
+    load.map_or_else(|| -forces, |load| load - forces)
+}
+
 /// Returns true if the mean forces balance without the springs that regularize unsupported
-/// directions. `x` are the harmonics of all places. The ports are those of the solution, and those
-/// of the whole ring if it is one of its sectors.
+/// directions. `x` are the harmonics of all places.
 pub(super) fn mean_forces_balance(
-    system: &System,
-    (ports, ring_ports): (&Ports, Option<&Ports>),
-    omega: f64,
+    (system, ports, dynamics): (&System, &Ports, &LinearDynamics),
     discretization: &Discretization,
     motion: &HarmonicSolution,
     x: &[DVector<Complex64>],
@@ -83,22 +84,15 @@ pub(super) fn mean_forces_balance(
     if discretization.harmonics()[0] != 0 {
         return true;
     }
-    if let (Some(wave), Some(ring)) = (ports.wave(), ring_ports) {
-        let (discretization, motion) = discretization.over_ring(wave, ring, motion);
-        return mean_forces_balance(system, (ring, None), omega, &discretization, &motion, x);
-    }
-    let excitation = system.excitation(omega);
-    let mut left = excitation
-        .iter()
-        .find(|(h, _)| *h == 0)
-        .map_or_else(|| DVector::from_element(system.dofs(), ZERO), |(_, load)| load.clone());
-    let mut size = left.norm();
-    for q in 0..ports.count() {
-        let force = motion.force[q * nh].re;
-        let rows = ports.axis(system, q).rows();
-        rows.iter().for_each(|&(i, weight)| left[i] -= weight * force);
-        size += rows.iter().map(|(_, weight)| weight * weight).sum::<f64>().sqrt() * force.abs();
-    }
+    let load = &discretization.linear.mean_load;
+    let left = load_without(load.as_ref(), &dynamics.force_on_places(0, |q| motion.force[q * nh]));
+    let along = |q: usize| {
+        let squares: f64 = ports.axis(system, q).rows().iter().map(|(_, weight)| weight * weight).sum();
+        squares.sqrt() * motion.force[q * nh].re.abs()
+    };
+    // all sectors of a travelling wave have the same forces
+    let sectors = ports.wave().map_or(1, |wave| wave.sectors) as f64;
+    let size = load.as_ref().map_or(0.0, |load| load.norm()) + sectors * (0..ports.count()).map(along).sum::<f64>();
     // at large displacements the balance is limited by the rounding of the spring forces
     let (mut held, mut rounding) = (vec![0.0; system.dofs()], vec![0.0; system.dofs()]);
     system.structure().stiffness_entries().for_each(|(row, column, stiffness)| {
@@ -134,6 +128,7 @@ struct FourierPath {
 pub(super) struct OrbitInput<'a> {
     pub system: &'a Arc<System>,
     pub ports: &'a Ports,
+    pub dynamics: &'a LinearDynamics,
     /// Ports of the whole ring, if one of its sectors was solved.
     pub ring_ports: Option<&'a Ports>,
     pub omega: f64,
@@ -154,6 +149,9 @@ pub(super) fn orbit(
     motion: &HarmonicSolution,
     x: Vec<DVector<Complex64>>,
 ) -> Option<Orbit> {
+    if !mean_forces_balance((setting.system, setting.ports, setting.dynamics), discretization, motion, &x) {
+        return None;
+    }
     match (setting.ports.wave(), setting.ring_ports) {
         (Some(wave), Some(ports)) => {
             let (mut discretization, motion) = discretization.over_ring(wave, ports, motion);
@@ -172,9 +170,6 @@ fn orbit_of_all(
     x: Vec<DVector<Complex64>>,
     wave: Option<CyclicSymmetry>,
 ) -> Option<Orbit> {
-    if !mean_forces_balance(setting.system, (setting.ports, None), setting.omega, discretization, motion, &x) {
-        return None;
-    }
     let harmonics = discretization.harmonics().to_vec();
     let JointSamples { force, contact, states } = sample_joints(&setting, discretization, motion, &x);
     let OrbitInput {
@@ -186,6 +181,7 @@ fn orbit_of_all(
         truncation,
         tolerance,
         orbit_check,
+        dynamics: _,
         ring_ports: _,
     } = setting;
     let symmetry = if odd { Symmetry::HalfPeriod } else { Symmetry::FullPeriod };

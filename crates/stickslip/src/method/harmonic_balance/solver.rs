@@ -333,6 +333,7 @@ impl HarmonicBalanceSolver {
         let setting = postprocess::OrbitInput {
             system: &self.system,
             ports: &self.ports,
+            dynamics: &self.receptance,
             ring_ports: self.ring_ports.as_ref(),
             omega,
             excitation_harmonic: self.periods,

@@ -87,6 +87,7 @@ pub(super) fn static_equilibrium(
     let setting = postprocess::OrbitInput {
         system,
         ports,
+        dynamics,
         ring_ports,
         omega,
         excitation_harmonic: 1,

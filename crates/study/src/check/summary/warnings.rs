@@ -61,18 +61,6 @@ pub(super) fn list_names(names: &[String]) -> String {
 
 fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let pronoun = |count: usize| if count == 1 { "it" } else { "them" };
-    let held = |masses: &[String]| {
-        let (names, them) = (list_names(masses), pronoun(masses.len()));
-        let their = if masses.len() == 1 { "its" } else { "their" };
-        format!(
-            "no spring holds {names}: only friction keeps {them} in place, as long as not all joints slip, and {their} \
-             mean position depends on the history"
-        )
-    };
-    let free = |masses: &[String]| {
-        let (names, them) = (list_names(masses), pronoun(masses.len()));
-        format!("{names} can move freely: no spring and no joint connects {them} to `ground`")
-    };
     // bodies on preloaded faces are correct; bodies between unloaded faces have a separate
     // warning
     let survey = &cases[0].survey;
@@ -106,13 +94,21 @@ fn loose_parts(cases: &[SurveyedCase]) -> Vec<String> {
     let others = survey.loose().iter().filter(|one| one.contacts.is_empty() || !one.held_by_friction);
     let others: Vec<&LooseBody> = others.filter(|one| !between(one) && !one.held_in_motion).collect();
     // one warning for all bodies, such as the dampers of all sectors
-    let masses = |by_friction: bool| -> Vec<String> {
-        let all = others.iter().filter(|one| one.held_by_friction == by_friction);
-        all.flat_map(|one| one.masses.clone()).collect()
+    let one_warning = |by_friction: bool| {
+        let alike = others.iter().filter(|one| one.held_by_friction == by_friction);
+        let masses: Vec<String> = alike.flat_map(|one| one.masses.clone()).collect();
+        let (names, them) = (list_names(&masses), pronoun(masses.len()));
+        let their = if masses.len() == 1 { "its" } else { "their" };
+        let text = match by_friction {
+            true => format!(
+                "no spring holds {names}: only friction keeps {them} in place, as long as not all joints slip, and \
+                 {their} mean position depends on the history"
+            ),
+            false => format!("{names} can move freely: no spring and no joint connects {them} to `ground`"),
+        };
+        (!masses.is_empty()).then_some(text)
     };
-    let named = |masses: Vec<String>, text: &dyn Fn(&[String]) -> String| (!masses.is_empty()).then(|| text(&masses));
-    let loose = [named(masses(true), &held), named(masses(false), &free)];
-    loose.into_iter().flatten().chain(open).chain(unbalanced).collect()
+    [true, false].into_iter().filter_map(one_warning).chain(open).chain(unbalanced).collect()
 }
 
 /// Returns the warning of a structure without static equilibrium.

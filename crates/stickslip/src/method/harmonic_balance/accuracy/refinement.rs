@@ -191,9 +191,8 @@ impl HarmonicBalanceSolver {
             };
             // a body that drifts may have a periodic solution with few harmonics, and one that does
             // not drift may lack it, so only longer series decide
-            let ports = (&self.ports, self.ring_ports.as_ref());
-            if top > first && !mean_forces_balance(&self.system, ports, omega, &self.discretizations[&top], &motion, &x)
-            {
+            let structure = (&*self.system, &self.ports, &self.receptance);
+            if top > first && !mean_forces_balance(structure, &self.discretizations[&top], &motion, &x) {
                 *inaccurate = None;
                 return Err(OrbitError::drift(NAME, self.excitation_frequency));
             }

@@ -169,8 +169,8 @@ impl FrequencyTime {
         tangent: Option<&mut [f64]>,
     ) {
         let n = self.samples();
-        let widen = |h: usize| if undo { 1.0 / (1.0 + half_sample_change(h, n).norm_sqr() / 3.0) } else { 1.0 };
-        self.synthesise(y, |h| Complex64::new(widen(h), 0.0));
+        let widen = |change: Complex64| if undo { 1.0 / (1.0 + change.norm_sqr() / 3.0) } else { 1.0 };
+        self.synthesise(y, |h| Complex64::new(widen(half_sample_change(h, n)), 0.0));
         self.reserve_slopes(3);
         for i in 0..n {
             let y = self.signal[i];
@@ -200,20 +200,19 @@ impl FrequencyTime {
             }
         }
         let size = 2 * self.harmonics.len();
-        // as `half_sample_change`, from a table: the sines would take a third of a Newton step
-        let half_change = |h: usize| Complex64::new(0.0, 0.5 * self.rotations[h].im);
-        let widened = |h: usize| if undo { 1.0 / (1.0 + half_change(h).norm_sqr() / 3.0) } else { 1.0 };
+        // once per harmonic: the sines of all pairs would take a third of a Newton step
+        self.column.iter_mut().zip(&self.harmonics).for_each(|(change, &h)| *change = half_sample_change(h, n));
         for (a, &h) in self.harmonics.iter().enumerate() {
             for (b, &k) in self.harmonics.iter().enumerate() {
                 let (mut minus, mut plus) = spectrum_pair(&self.spectra[0], h, k);
                 if mean {
-                    let (row, column) = (half_change(h).conj(), half_change(k));
+                    let (row, column) = (self.column[a].conj(), self.column[b]);
                     let (minus_1, plus_1) = spectrum_pair(&self.spectra[1], h, k);
                     let (minus_2, plus_2) = spectrum_pair(&self.spectra[2], h, k);
                     minus += (row + column) * minus_1 + row * column * minus_2;
                     plus += (row + column.conj()) * plus_1 + row * column.conj() * plus_2;
                 }
-                add_block(tangent, size, (a, h), (b, k), as_block(minus, plus).map(|x| widened(k) * x));
+                add_block(tangent, size, (a, h), (b, k), as_block(minus, plus).map(|x| widen(self.column[b]) * x));
             }
         }
     }

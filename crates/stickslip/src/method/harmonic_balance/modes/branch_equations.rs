@@ -212,6 +212,7 @@ impl<'a> BranchEquations<'a> {
         let setting = postprocess::OrbitInput {
             system: &self.system,
             ports: &self.ports,
+            dynamics: &self.dynamics,
             ring_ports: self.around.as_ref(),
             omega: self.omega,
             excitation_harmonic: 1,
