@@ -79,6 +79,52 @@ fn a_stuck_spring_carries_its_share_of_a_constant_force() {
     }
 }
 
+/// Two stuck springs on a soft structure: the search may end far from static equilibrium. There the
+/// far spring is relaxed at zero. The near one has moved until it just reaches its limit, so its
+/// mean force is the limit minus `kt` times the amplitude.
+#[test]
+fn stuck_springs_stay_near_static_equilibrium() {
+    let (outer, inner, [near, far], limit, omega) =
+        (1104.6, [1697.0, 81784.7], [1359.1, 96641.6], 3.08, 10.0 * std::f64::consts::TAU);
+    let (masses, damping, [vibration, load]) = ([1.127, 0.886, 0.955], [2.473, 4.058, 4.292], [8.75, 2.09]);
+    let names = ["a", "b", "c"].map(String::from);
+    let spring = |ends: [&str; 2], stiffness, damping| Spring { between: ends.map(String::from), stiffness, damping };
+    let joint = |name: &str, on: &str, stiffness, limit| Joint {
+        name: name.into(),
+        between: [on.into(), GROUND.into()],
+        law: Arc::new(Jenkins { stiffness, limit }),
+    };
+    let model = Model {
+        masses: names.iter().zip(masses).map(|(name, mass)| Mass::new(name.clone(), mass)).collect(),
+        springs: vec![
+            spring(["a", GROUND], outer, damping[0]),
+            spring(["a", "b"], inner[0], damping[1]),
+            spring(["b", "c"], inner[1], damping[2]),
+        ],
+        joints: vec![joint("near", "b", near, limit), joint("far", "a", far, 7.727)],
+        forces: [(vibration, 1), (load, 0)]
+            .map(|(amplitude, harmonic)| Force { on: "c".into(), amplitude, phase: 0.0, harmonic })
+            .to_vec(),
+        ..Model::default()
+    };
+    let chain = |[a, b, c]: [f64; 3]| nalgebra::matrix![a + b, -b, 0.0; -b, b + c, -c; 0.0, -c, c];
+    let stiffness =
+        |near: f64| chain([outer, inner[0], inner[1]]) + nalgebra::Matrix3::from_diagonal(&[far, near, 0.0].into());
+    let inertia = nalgebra::Matrix3::from_diagonal(&masses.into()) * (omega * omega);
+    let dynamic = (stiffness(near) - inertia).zip_map(&(chain(damping) * omega), Complex64::new);
+    let moved = dynamic.lu().solve(&nalgebra::Vector3::from([0.0, 0.0, vibration].map(Complex64::from))).unwrap();
+    let mean_force = limit - near * moved[1].norm();
+    let expected = stiffness(0.0).lu().solve(&nalgebra::Vector3::new(0.0, -mean_force, load)).unwrap();
+    let system = model.assemble().unwrap();
+    for method in [&EventDriven as &dyn Method, &HarmonicBalance::default()] {
+        let found = orbit(method, &system, omega);
+        assert_eq!(found.evidence.stuck, ["near", "far"], "{}", method.name());
+        for (place, expected) in found.places.iter().zip(&expected) {
+            assert!((place.mean / expected - 1.0).abs() < 1e-6, "{}: {place:?}, {expected}", method.name());
+        }
+    }
+}
+
 /// If the motion from static equilibrium exceeds the limit, the slider moves only as far as
 /// necessary. The orbit then just reaches its limit.
 #[test]

@@ -43,10 +43,7 @@ pub(super) fn places(
                 let mut x = DVector::from_element(load.len(), ZERO);
                 match &mut discretization.banded {
                     Some(banded) => banded.respond(k, |i| load[i], x.as_mut_slice()),
-                    None => {
-                        x = dynamics.respond(h, omega, &load).map_err(|_| 0.0)?;
-                        dynamics.correct_mean(omega, &mut x, |q| discretization.mean(q, motion)).map_err(|_| 0.0)?;
-                    }
+                    None => x = dynamics.respond(h, omega, &load).map_err(|_| 0.0)?,
                 }
                 return Ok(x);
             }

@@ -127,26 +127,39 @@ pub(crate) fn select_equilibrium_orbit(
     first: Orbit,
     aim: ClosingTargets,
 ) -> Orbit {
-    if first.symmetry == Symmetry::HalfPeriod || first.evidence.history_dependent.is_empty() {
+    // sliders are held by the range of their motion: at the end of the continuum, rounding makes
+    // them slip
+    if first.symmetry == Symmetry::HalfPeriod {
         return first;
     }
     let springs = map.springs();
     let places: Vec<f64> = springs.iter().map(|spring| place(system, equilibrium, spring)).collect();
-    let found = iterate(map, system, &first, (&springs, &places), aim);
+    // a search that ended far from static equilibrium leads to places that alternate
+    let found = [FirstPlaces::OfOrbit, FirstPlaces::OfEquilibrium]
+        .into_iter()
+        .find_map(|begin| iterate(map, system, &first, (&springs, &places, begin), aim));
     map.limit(&springs);
     found.unwrap_or(first)
+}
+
+/// Places at which the iteration begins: those in the orbit that was found, moved as far as the
+/// limits require, or those of static equilibrium.
+#[derive(Clone, Copy, PartialEq)]
+enum FirstPlaces {
+    OfOrbit,
+    OfEquilibrium,
 }
 
 fn iterate(
     map: &mut dyn OrbitMap,
     system: &System,
     first: &Orbit,
-    (springs, equilibrium): (&[ElasticSlider], &[f64]),
+    (springs, equilibrium, begin): (&[ElasticSlider], &[f64], FirstPlaces),
     aim: ClosingTargets,
 ) -> Option<Orbit> {
     let settings = ResidualTractionSettings::default();
     let (mut orbit, mut rounds) = (first.clone(), AndersonHistory::default());
-    for _ in 0..settings.rounds {
+    for round in 0..settings.rounds {
         let held = held(&orbit, springs, equilibrium);
         if held
             .iter()
@@ -154,7 +167,11 @@ fn iterate(
         {
             return Some(orbit);
         }
-        let places = rounds.next(&held);
+        let places = if round == 0 && begin == FirstPlaces::OfEquilibrium {
+            DVector::from_iterator(held.len(), held.iter().map(|slider| slider.equilibrium))
+        } else {
+            rounds.next(&held)
+        };
         let pins: Vec<HeldSlider> = held
             .iter()
             .zip(&places)
@@ -190,7 +207,8 @@ struct StuckSlider {
     spring: ElasticSlider,
     /// Relative displacement at t = 0, m.
     begin: f64,
-    /// Actual and required displacement of the relaxed spring, m.
+    /// Displacement of the relaxed spring, m: in static equilibrium, actual and required.
+    equilibrium: f64,
     actual: f64,
     required: f64,
 }
@@ -226,7 +244,8 @@ fn held(orbit: &Orbit, springs: &[ElasticSlider], equilibrium: &[f64]) -> Vec<St
             let reach = (reach * (1.0 - 2.0 * settings.tolerance)).max(0.5 * (high - low));
             let begin = begin.joints[spring.joint].displacement[0];
             let is = begin - orbit.initial_state[spring.state] / spring.stiffness;
-            Some(StuckSlider { spring, begin, actual: is, required: place.max(high - reach).min(low + reach) })
+            let required = place.max(high - reach).min(low + reach);
+            Some(StuckSlider { spring, begin, equilibrium: *place, actual: is, required })
         })
         .collect()
 }

@@ -3,7 +3,7 @@
 use super::harmonic_dynamics::{Directions, HarmonicDynamics, columns, diagonal, rate};
 use super::uncoupled_modes::UndampedResonance;
 use crate::method::harmonic_balance::equations::regularization::regularizing_stiffness;
-use crate::structure::{DynamicStiffness, Matrices, Structure};
+use crate::structure::{DynamicStiffness, Structure};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -49,7 +49,7 @@ struct UnitResponses {
     columns: Arc<DMatrix<Complex64>>,
 }
 
-/// A large or sparse structure.
+/// A large or sparse structure, or one with massless places.
 #[derive(Debug, Clone)]
 pub(super) struct FactoredDynamics {
     structure: Structure,
@@ -182,53 +182,5 @@ impl HarmonicDynamics for FactoredDynamics {
 
     fn known_unit_responses(&self, harmonic: usize, omega: f64) -> Option<Arc<DMatrix<Complex64>>> {
         self.kept_unit_responses(rate(harmonic, omega), omega)
-    }
-}
-
-/// A small structure whose modes do not serve, as with massless places.
-#[derive(Debug, Clone)]
-pub(super) struct SmallDynamics {
-    structure: Structure,
-    directions: Directions,
-}
-
-impl SmallDynamics {
-    pub fn new(structure: &Structure, directions: &Directions) -> Self {
-        SmallDynamics { structure: structure.clone(), directions: directions.clone() }
-    }
-
-    fn dynamic_stiffness(&self, s: Complex64) -> DMatrix<Complex64> {
-        let Matrices { mass, damping, stiffness } = &**self.structure.full();
-        let n = self.structure.dofs();
-        DMatrix::from_fn(n, n, |i, k| s * s * mass[(i, k)] + s * damping[(i, k)] + stiffness[(i, k)])
-    }
-
-    fn receptance_at(&self, s: Complex64) -> Result<DMatrix<Complex64>, UndampedResonance> {
-        let inverse = self.dynamic_stiffness(s).try_inverse().ok_or(UndampedResonance)?;
-        let direction = columns(self.structure.dofs(), &self.directions).map(|w| Complex64::new(w, 0.0));
-        Ok(direction.transpose() * inverse * direction)
-    }
-}
-
-impl HarmonicDynamics for SmallDynamics {
-    fn receptance(&self, harmonic: usize, omega: f64) -> Result<DMatrix<Complex64>, UndampedResonance> {
-        self.receptance_at(rate(harmonic, omega))
-    }
-
-    fn respond(
-        &self,
-        harmonic: usize,
-        omega: f64,
-        force: &DVector<Complex64>,
-    ) -> Result<DVector<Complex64>, UndampedResonance> {
-        self.dynamic_stiffness(rate(harmonic, omega)).lu().solve(force).ok_or(UndampedResonance)
-    }
-
-    fn static_receptances(&self, omega: f64) -> Result<Vec<f64>, UndampedResonance> {
-        FactoredDynamics::new(&self.structure, &self.directions).static_receptances(omega)
-    }
-
-    fn direct_receptances(&self, rate: f64, _omega: f64) -> Result<Vec<f64>, UndampedResonance> {
-        Ok(diagonal(&self.receptance_at(Complex64::new(rate, 0.0))?))
     }
 }

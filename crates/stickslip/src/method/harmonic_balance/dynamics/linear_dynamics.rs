@@ -11,9 +11,9 @@
 //! Displacements and forces are still those of the whole ring.
 
 use super::closed_contacts;
-use super::factored::{FactoredDynamics, SmallDynamics};
+use super::factored::FactoredDynamics;
 use super::harmonic_dynamics::{Directions, HarmonicDynamics};
-use super::modal_sum::{ComplexModes, rigid_body_fraction};
+use super::modal_sum::ComplexModes;
 use super::travelling_wave::TravellingWaves;
 use super::uncoupled_modes::{UncoupledDynamics, UndampedResonance};
 use crate::method::harmonic_balance::aft::{KRYLOV_AXES, Ports};
@@ -32,9 +32,6 @@ const ZERO: Complex64 = Complex64::new(0.0, 0.0);
 /// Limits of the linear dynamics.
 #[derive(Debug, Clone, Copy)]
 struct LinearDynamicsSettings {
-    /// Share of the largest static receptance below which springs hold a direction. The largest is
-    /// that of a soft spring, if one holds a direction alone.
-    held_receptance: f64,
     /// Number of degrees of freedom beyond which modes of full matrices are not computed: at 200
     /// they take a second, with the third power.
     modal_dofs: usize,
@@ -47,7 +44,7 @@ struct LinearDynamicsSettings {
 
 impl Default for LinearDynamicsSettings {
     fn default() -> Self {
-        LinearDynamicsSettings { held_receptance: 1e-5, modal_dofs: 200, modal_axes: 150, highest_harmonic: 1e6 }
+        LinearDynamicsSettings { modal_dofs: 200, modal_axes: 150, highest_harmonic: 1e6 }
     }
 }
 
@@ -59,12 +56,10 @@ enum Form {
     /// Modes of a large structure, or of one in modes with many axes, whose damping does not
     /// couple them.
     Uncoupled(Arc<UncoupledDynamics>),
-    /// Factors of a large structure.
-    Factored(FactoredDynamics),
     /// Modes of a small structure.
     Modes(Box<ComplexModes>),
-    /// A small structure without such modes.
-    Small(SmallDynamics),
+    /// Factors of any other structure.
+    Factored(FactoredDynamics),
 }
 
 impl Form {
@@ -74,30 +69,27 @@ impl Form {
             return Form::Waves(waves);
         }
         let settings = LinearDynamicsSettings::default();
-        let is_factored = structure.is_sparse() || structure.dofs() > settings.modal_dofs;
+        let is_large = structure.is_sparse() || structure.dofs() > settings.modal_dofs;
         // in a reduced model the coordinates are modes, and receptances are computed in blocks
         let is_modal = structure.diagonals().is_some();
-        if (is_factored || (directions.len() >= KRYLOV_AXES && is_modal))
+        if (is_large || (directions.len() >= KRYLOV_AXES && is_modal))
             && let Some(uncoupled) = UncoupledDynamics::new(structure, directions)
         {
             return Form::Uncoupled(Arc::new(uncoupled));
         }
-        if is_factored {
-            return Form::Factored(FactoredDynamics::new(structure, directions));
-        }
-        match ComplexModes::new(system, directions) {
-            Some(modes) => Form::Modes(Box::new(modes)),
-            None => Form::Small(SmallDynamics::new(structure, directions)),
-        }
+        let modes = if is_large { None } else { ComplexModes::new(system, directions) };
+        modes.map_or_else(
+            || Form::Factored(FactoredDynamics::new(structure, directions)),
+            |modes| Form::Modes(Box::new(modes)),
+        )
     }
 
     fn dynamics(&self) -> &dyn HarmonicDynamics {
         match self {
             Form::Waves(waves) => waves,
             Form::Uncoupled(uncoupled) => &**uncoupled,
-            Form::Factored(factored) => factored,
             Form::Modes(modes) => &**modes,
-            Form::Small(small) => small,
+            Form::Factored(factored) => factored,
         }
     }
 }
@@ -308,41 +300,6 @@ impl LinearDynamics {
             Some(moved) => Ok(&*moved * DVector::from_fn(self.directions.len(), |q, _| along(q))),
             None => self.respond(harmonic, omega, &self.force_on_places(harmonic, along)),
         }
-    }
-
-    /// Corrects the mean positions `x` (length n) so that they agree with `along` along the
-    /// axes. If only laws hold a direction, positions are the small difference of large terms,
-    /// and rounding of the forces would shift them.
-    ///
-    /// # Errors
-    /// A structure that is singular at rest.
-    pub fn correct_mean(
-        &self,
-        omega: f64,
-        x: &mut DVector<Complex64>,
-        along: impl Fn(usize) -> f64,
-    ) -> Result<(), UndampedResonance> {
-        let settings = LinearDynamicsSettings::default();
-        let q = self.directions.len();
-        let unheld = rigid_body_fraction(ZERO, omega).re / self.structure.largest()[0];
-        // at rest no place moves more than the place under the force
-        if let Form::Uncoupled(uncoupled) = &self.form
-            && uncoupled.static_receptances(omega)?.iter().all(|r| *r < settings.held_receptance * unheld)
-        {
-            return Ok(());
-        }
-        let off =
-            DVector::from_fn(q, |a, _| along(a) - self.directions[a].iter().map(|&(i, w)| w * x[i].re).sum::<f64>());
-        let receptance = self.receptance(0, omega)?.map(|r| r.re);
-        let largest = receptance.amax();
-        if largest == 0.0 || largest < settings.held_receptance * unheld {
-            return Ok(()); // springs hold all that moves, or nothing moves
-        }
-        // only along directions that nothing else holds
-        let Ok(inverse) = receptance.pseudo_inverse(settings.held_receptance * largest) else { return Ok(()) };
-        let force = (inverse * off).map(|f| Complex64::new(f, 0.0));
-        *x += self.respond_along(0, omega, |a| force[a])?;
-        Ok(())
     }
 
     /// Returns the harmonics next to the resonances above harmonic `top`.

@@ -661,12 +661,6 @@ impl Discretization {
         );
         true
     }
-
-    /// Returns the mean of the joint's motion along an axis without the imposed motion, m.
-    pub fn mean(&self, q: usize, motion: &HarmonicSolution) -> f64 {
-        let at = q * self.harmonics().len();
-        motion.c[at].re + self.linear.series[q] * motion.force[at].re - self.linear.imposed[q]
-    }
 }
 
 /// Returns `motion` with other harmonics. New harmonics are zero.
