@@ -73,6 +73,14 @@ pub fn inspect(files: &[PathBuf], format: Option<&str>, picture: Option<&Path>) 
     let mut rows = Vec::new();
     let mut row_names = None;
     for file in files {
+        if format.is_none() && file.extension().is_some_and(|extension| extension == "toml") {
+            let file = file.display();
+            complain!(
+                "error: {file}: this command describes matrices, meshes and data; `stickslip check {file}` describes a study"
+            );
+            wrong = true;
+            continue;
+        }
         if format.is_none()
             && let Some(read) = mesh::read_if_mesh(file)
         {

@@ -1,4 +1,4 @@
-//! A column of numbers: its name, its unit and the distance of its values.
+//! A column of numbers or texts: its name, its unit and the distance of its values.
 
 /// A column of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -9,8 +9,10 @@ pub struct Column {
     pub unit: String,
     /// Description of the column in the words of the file; may be empty.
     pub label: String,
-    /// The values as in the file. A missing value is NaN.
+    /// The values as in the file. A missing value is NaN. Texts are numbered from 1.
     pub values: Vec<f64>,
+    /// The first text of a column of texts; `None` for a column of numbers.
+    pub first_text: Option<String>,
 }
 
 /// Equal distances between the values of a column.

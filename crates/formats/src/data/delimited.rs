@@ -109,17 +109,20 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
         let times = names.entry(name.clone()).or_default();
         *times += 1;
         let name = if *times == 1 { name } else { format!("{name}_{times}") };
-        let values = if numeric[at] {
-            rows[first..].iter().map(|row| number(&row.fields[at], dialect).unwrap_or(f64::NAN)).collect()
+        let below = || rows[first..].iter().map(|row| &row.fields[at]);
+        let first_text =
+            below().find(|field| !field.is_empty() && number(field, dialect).is_none()).map(|field| decoded(field));
+        let values = if first_text.is_none() {
+            below().map(|field| number(field, dialect).unwrap_or(f64::NAN)).collect()
         } else {
-            let (values, words) = numbered_words(rows[first..].iter().map(|row| decoded(&row.fields[at])));
+            let (values, words) = numbered_words(below().map(|field| decoded(field)));
             notes.push(format!(
                 "`{name}` contains texts, which are numbered in the order of their first appearance: {}",
                 words.join(", ")
             ));
             values
         };
-        columns.push(Column { name, unit, label: title, values });
+        columns.push(Column { name, unit, label: title, values, first_text });
     }
     Ok(DataFile { columns, notes, ..DataFile::default() })
 }

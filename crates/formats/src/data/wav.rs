@@ -110,7 +110,7 @@ fn samples(data: &[u8], format: &SampleFormat, order: ByteOrder) -> Result<Vec<C
     let mut columns = vec![Column { name: "time".into(), unit: "s".into(), values: time, ..Column::default() }];
     for (i, values) in values.into_iter().enumerate() {
         let label = "fraction of full scale".to_owned();
-        columns.push(Column { name: format!("channel_{}", i + 1), label, values, unit: String::new() });
+        columns.push(Column { name: format!("channel_{}", i + 1), label, values, ..Column::default() });
     }
     Ok(columns)
 }

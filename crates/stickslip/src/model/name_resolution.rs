@@ -261,6 +261,28 @@ impl Places {
             );
             return Err(ModelError::new(element, key, message));
         }
+        let is_displacement = |name: &&String| {
+            let end = self.ends.get(*name).filter(|end| matches!(end, PlaceTarget::At(_)));
+            end.is_some_and(|end| !self.is_rotation(*end))
+        };
+        if let Some(name) = between.iter().find(is_displacement) {
+            let node = name.split_once('.').map(|(node, _)| node).filter(|node| self.directions.contains_key(*node));
+            let other = if *name == between[0] { &between[1] } else { &between[0] };
+            let message = match (count, node) {
+                (1, _) => {
+                    format!("`{name}` is a displacement, but `{other}` is a node: write `{other}.{}`", directions[0])
+                }
+                (_, Some(node)) => format!(
+                    "the law acts along {count} directions ({}): write the node `{node}` instead of `{name}`",
+                    directions.join(", ")
+                ),
+                (_, None) => format!(
+                    "the law acts along {count} directions ({}), but `{name}` has one; connect nodes with `directions`",
+                    directions.join(", ")
+                ),
+            };
+            return Err(ModelError::new(element, key, message));
+        }
         // tangents are interchangeable, but with different normals the order of the nodes would
         // decide which one counts
         let normals = normal.map(|at| nodes.iter().filter_map(|own| own.get(at)).collect::<Vec<_>>());

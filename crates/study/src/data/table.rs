@@ -91,7 +91,7 @@ impl DataTable {
     /// Returns the values of a column in SI; `role` is its use or its name.
     ///
     /// # Errors
-    /// There is no such column, or it has another dimension.
+    /// There is no such column, it contains texts, or it has another dimension.
     pub fn values(&self, role: &str, dimension: Dimension) -> Result<Vec<f64>, ColumnError> {
         let found = self.find(role).ok_or_else(|| self.missing(role))?;
         if found.has_two_units() {
@@ -102,6 +102,7 @@ impl DataTable {
             );
             return Err(ColumnError { message, help: format!("write \"{name} [{own}]\", or correct the file") });
         }
+        self.check_numbers(&found)?;
         let factor = factor(&found, dimension).map_err(|unit| {
             let message = format!(
                 "the column `{}` of `{}` has {unit}, but {} is expected",
@@ -125,7 +126,25 @@ impl DataTable {
         })
     }
 
-    /// Returns the values of a column as they stand in the file.
+    /// Returns an error if a column contains texts.
+    fn check_numbers(&self, found: &FoundColumn<'_>) -> Result<(), ColumnError> {
+        let Some(text) = &found.column.first_text else { return Ok(()) };
+        let (name, text) = (excerpt(&found.column.name), excerpt(text));
+        let message = format!("the column `{name}` of `{}` contains `{text}`, but numbers are expected", self.name);
+        Err(ColumnError { message, help: "write a number in each row, or leave the field empty".to_owned() })
+    }
+
+    /// Returns the values of a column of numbers as they stand in the file.
+    ///
+    /// # Errors
+    /// There is no such column, or it contains texts.
+    pub fn plain_numbers(&self, role: &str) -> Result<Vec<f64>, ColumnError> {
+        let found = self.find(role).ok_or_else(|| self.missing(role))?;
+        self.check_numbers(&found)?;
+        Ok(found.column.values.clone())
+    }
+
+    /// Returns the values of a column as they stand in the file; texts are numbered.
     ///
     /// # Errors
     /// There is no such column.

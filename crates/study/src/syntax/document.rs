@@ -1,6 +1,7 @@
 //! A TOML text as a tree in which every key and value knows its location.
 
 use crate::syntax::error::{Location, Problem};
+use crate::syntax::format::plural_suffix;
 use crate::syntax::suggest::excerpt;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -55,7 +56,11 @@ impl TomlValue {
             TomlValue::Number { whole: Some(whole), .. } => format!("the number {whole}"),
             TomlValue::Flag(flag) => format!("`{flag}`"),
             TomlValue::Date => "a date".to_owned(),
-            TomlValue::List(_) => "a list".to_owned(),
+            TomlValue::List(values) => {
+                let is_table = |entry: &TomlNode| matches!(entry.value, TomlValue::Table(_));
+                let noun = if values.iter().all(is_table) { "table" } else { "value" };
+                format!("a list of {} {noun}{}", values.len(), plural_suffix(values.len()))
+            }
             TomlValue::Table(_) => "a table".to_owned(),
         }
     }

@@ -695,4 +695,7 @@ fn wrong_targets_are_refused_before_the_run() {
     write("displacement_m,force_N\n0,0\n1,1\n0.5,\n");
     let said = refused(&study).to_string();
     assert!(said.contains("row 3 of `rig` has no number"), "{said}");
+    write("displacement_m,force_N\n0,0\n0.5,1\n1,open\n");
+    let said = refused(&study).to_string();
+    assert!(said.contains("the column `force_N` of `rig` contains `open`, but numbers are expected"), "{said}");
 }

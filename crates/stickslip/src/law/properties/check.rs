@@ -43,6 +43,7 @@ impl dyn Law + '_ {
     /// [`LawError`] names the first parameter that is invalid, or describes the inconsistency.
     pub fn check(&self) -> Result<(), LawError> {
         in_range(self.info(), &self.values())?;
+        self.check_consistency().map_err(|message| LawError::Inconsistent { law: self.name(), message })?;
         // Errors of states are relative to this scale; zero would give NaN.
         let sizes = [
             self.step().filter(|step| step.states() > 0).map(|step| step.state_scale()),
@@ -58,7 +59,7 @@ impl dyn Law + '_ {
                            must return false";
             return Err(LawError::Inconsistent { law: self.name(), message: message.to_owned() });
         }
-        self.check_consistency().map_err(|message| LawError::Inconsistent { law: self.name(), message })
+        Ok(())
     }
 }
 

@@ -120,34 +120,35 @@ pub(crate) trait OrbitMap: ReturnMap {
 /// Returns the orbit of the continuum around `first` in which held sliders keep their static
 /// equilibrium, or are unloaded without one. Closes it with the same targets.
 ///
-/// Returns `first` if it is a single orbit, or if the iteration fails.
+/// Returns `first` if it is a single orbit, or if both iterations fail.
 pub(crate) fn select_equilibrium_orbit(
     map: &mut dyn OrbitMap,
     (system, equilibrium): (&System, Option<&StaticEquilibrium>),
     first: Orbit,
     aim: ClosingTargets,
 ) -> Orbit {
-    // sliders are held by the range of their motion: at the end of the continuum, rounding makes
-    // them slip
+    // `history_dependent` does not decide: at the end of the continuum, rounding can make a held
+    // slider slip
     if first.symmetry == Symmetry::HalfPeriod {
         return first;
     }
     let springs = map.springs();
     let places: Vec<f64> = springs.iter().map(|spring| place(system, equilibrium, spring)).collect();
-    // a search that ended far from static equilibrium leads to places that alternate
-    let found = [FirstPlaces::OfOrbit, FirstPlaces::OfEquilibrium]
+    // if the search ended far from static equilibrium, its places can alternate
+    let found = [FirstPlaces::Limited, FirstPlaces::Unlimited]
         .into_iter()
         .find_map(|begin| iterate(map, system, &first, (&springs, &places, begin), aim));
     map.limit(&springs);
     found.unwrap_or(first)
 }
 
-/// Places at which the iteration begins: those in the orbit that was found, moved as far as the
-/// limits require, or those of static equilibrium.
+/// Places at which the iteration begins.
 #[derive(Clone, Copy, PartialEq)]
 enum FirstPlaces {
-    OfOrbit,
-    OfEquilibrium,
+    /// Those of static equilibrium, moved as far as the limits require in the orbit that was found.
+    Limited,
+    /// Those of static equilibrium.
+    Unlimited,
 }
 
 fn iterate(
@@ -167,7 +168,7 @@ fn iterate(
         {
             return Some(orbit);
         }
-        let places = if round == 0 && begin == FirstPlaces::OfEquilibrium {
+        let places = if round == 0 && begin == FirstPlaces::Unlimited {
             DVector::from_iterator(held.len(), held.iter().map(|slider| slider.equilibrium))
         } else {
             rounds.next(&held)
@@ -207,9 +208,11 @@ struct StuckSlider {
     spring: ElasticSlider,
     /// Relative displacement at t = 0, m.
     begin: f64,
-    /// Displacement of the relaxed spring, m: in static equilibrium, actual and required.
+    /// Displacement of the relaxed spring in static equilibrium, m.
     equilibrium: f64,
+    /// Actual displacement of the relaxed spring, m.
     actual: f64,
+    /// Required displacement of the relaxed spring, m.
     required: f64,
 }
 

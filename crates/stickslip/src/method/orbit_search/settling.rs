@@ -183,10 +183,21 @@ fn classified(
 }
 
 /// Returns the fastest drift of a motion that counts as settled, relative to the vibration of each
-/// place; `None` if there is none.
+/// place; `None` if there is none. A place that springs pull back does not drift.
 fn slow_drift(system: &System, omega: f64, returns: &[Vec<f64>], samples: &[Sample]) -> Option<ObservedMotion> {
     let settings = SettlingSettings::default();
-    let places = system.place_axes().iter().zip(system.places());
+    let moved: Vec<f64> =
+        returns[returns.len() - 1].iter().zip(&returns[0]).map(|(last, first)| last - first).collect();
+    let (mut force, mut largest) = (vec![0.0; system.dofs()], vec![0.0; system.dofs()]);
+    for (row, column, stiffness) in system.structure().stiffness_entries() {
+        force[row] += stiffness * moved[column];
+        largest[row] += (stiffness * moved[column]).abs();
+    }
+    let is_held = |axis: &Axis| {
+        let largest: f64 = axis.rows().iter().map(|(row, weight)| weight.abs() * largest[*row]).sum();
+        axis.component(&force).abs() > 0.5 * largest
+    };
+    let places = system.place_axes().iter().zip(system.places()).filter(|(axis, _)| !is_held(axis));
     let relative = places.map(|(axis, place)| {
         let swing = samples.iter().map(|now| axis.component(&now.velocity).abs() / omega).fold(0.0, f64::max);
         let drift = drift(axis, returns, settings.creep_evenness);
@@ -254,10 +265,14 @@ mod tests {
     /// coefficient of 0.5. A harmonic force of 1 N acts along x, and the constant `load` along
     /// both.
     fn block(load: [f64; 2]) -> System {
+        block_on_springs(load, 0.0)
+    }
+
+    fn block_on_springs(load: [f64; 2], stiffness: f64) -> System {
         let law = FrictionContact { tangential: 1e5, normal: 2e5, friction: 0.5, preload: 10.0, tangents: 1 };
         let names = vec!["x".into(), "z".into()];
         let one = DMatrix::identity(2, 2);
-        let structure = Structure::new(names, one.clone(), one * 60.0, DMatrix::zeros(2, 2)).unwrap();
+        let structure = Structure::new(names, one.clone(), &one * 60.0, one * stiffness).unwrap();
         let axes = vec![Axis::new(vec![(0, 1.0)]), Axis::new(vec![(1, 1.0)])];
         let mut builder = System::builder(structure).joint("foot", Arc::new(law), axes);
         for (row, load) in load.into_iter().enumerate() {
@@ -325,6 +340,7 @@ mod tests {
             panic!("no drift")
         };
         assert!((speed / (1e-3 * OMEGA / TAU) - 1.0).abs() < 1e-9, "{speed}");
+        assert_eq!(slow_drift(&block_on_springs([0.0, 10.0], 1e4), OMEGA, &creeping, &samples), None);
         let decaying = returns(&|k| 1e-3 * (-0.02 * k as f64).exp());
         assert_eq!(slow_drift(&system, OMEGA, &decaying, &samples), None);
         let none = classified(&system, OMEGA, (settings.periods, &returns(&|k| ((k * k) as f64).sin())), &samples);

@@ -91,7 +91,7 @@ impl NodalPreload {
         self.is_force = table.has("force");
         let (role, dimension) =
             if self.is_force { ("force", Dimension::FORCE) } else { ("pressure", Dimension::PRESSURE) };
-        let (nodes, values) = (table.plain_values("node")?, table.values(role, dimension)?);
+        let (nodes, values) = (table.plain_numbers("node")?, table.values(role, dimension)?);
         if table.has("gap") && !table.has_unit("gap") {
             let message = format!("the column `gap` of `{name}` has no unit");
             return Err(error(message, "state it in [[data]]: columns = { gap = \"NAME [mm]\" }"));

@@ -154,7 +154,7 @@ fn partial_fractions(s: Complex64, lambda: Complex64, omega: f64) -> (Complex64,
 }
 
 /// Returns `1/s²`; at rest, the value with the soft spring.
-pub(super) fn rigid_body_fraction(s: Complex64, omega: f64) -> Complex64 {
+fn rigid_body_fraction(s: Complex64, omega: f64) -> Complex64 {
     if s == ZERO { Complex64::new((REGULARIZING_FREQUENCY * omega).powi(-2), 0.0) } else { 1.0 / (s * s) }
 }
 
