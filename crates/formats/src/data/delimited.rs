@@ -110,8 +110,8 @@ fn read(bytes: &[u8]) -> Result<DataFile, Error> {
         *times += 1;
         let name = if *times == 1 { name } else { format!("{name}_{times}") };
         let below = || rows[first..].iter().map(|row| &row.fields[at]);
-        let first_text =
-            below().find(|field| !field.is_empty() && number(field, dialect).is_none()).map(|field| decoded(field));
+        let mut texts = below().filter(|field| !field.is_empty() && number(field, dialect).is_none());
+        let first_text = if numeric[at] { None } else { texts.next().map(|field| decoded(field)) };
         let values = if first_text.is_none() {
             below().map(|field| number(field, dialect).unwrap_or(f64::NAN)).collect()
         } else {

@@ -123,13 +123,8 @@ impl FunctionHeader {
             (unit, below) => format!("({unit})/({below})"),
         };
         let mut push = |name: &str, label: String, unit: &str, values: Vec<f64>| {
-            file.columns.push(Column {
-                name: format!("{position}.{name}"),
-                unit: unit.to_owned(),
-                label,
-                values,
-                first_text: None,
-            });
+            let (name, unit) = (format!("{position}.{name}"), unit.to_owned());
+            file.columns.push(Column { name, unit, label, values, ..Column::default() });
         };
         let label = [self.label.as_str(), &self.ordinate.name]
             .iter()

@@ -29,7 +29,7 @@ impl Nodes {
         for (name, values) in [("node", self.label), ("x", x), ("y", y), ("z", z)] {
             let label = if name == "node" { "" } else { "coordinate" };
             let name = format!("{position}.{name}");
-            file.columns.push(Column { name, unit: String::new(), label: label.to_owned(), values, first_text: None });
+            file.columns.push(Column { name, label: label.to_owned(), values, ..Column::default() });
         }
     }
 }
